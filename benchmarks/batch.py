@@ -27,7 +27,7 @@ from measuring import options, python, resident, timed
 
 from auv_fmu.closed_loop import Setting, closed_loop
 from orchestrator.master.experiment import Experiment
-from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
@@ -90,7 +90,7 @@ def check(n: int) -> None:
     """Print how many runs of the ready studies end as the straight line does."""
     for name in ready_studies():
         study = read_study(name)
-        systems = {one: loaded(one) for one in study.scenario}
+        systems = {one: load_scenario(one) for one in study.scenario}
         engine = BatchEngine({one: system for one, (_, system) in systems.items()})
         space = Space(study, systems)
         runs = [space[number] for number in Random(name).sample(range(len(space)), n)]

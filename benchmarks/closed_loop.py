@@ -29,7 +29,7 @@ from auv_fmu.euler import STEP
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.loaded import LoadedInstance
-from orchestrator.master.loop import Stepping, chosen
+from orchestrator.master.loop import Stepping, choose_loop
 from orchestrator.master.schedule import Member
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
@@ -83,7 +83,7 @@ def main() -> None:
     rows = []
     system = wired(current_fmus())
     steps_time(system, 10)
-    fast = chosen("compiled", Experiment(STEP, STEP))
+    fast = choose_loop("compiled", Experiment(STEP, STEP))
     for _ in range(given.repetitions):
         straight = timed(lambda: deque(closed_loop(given.steps), maxlen=0))
         fmus = steps_time(system, given.steps)

@@ -18,11 +18,11 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.master.experiment import COUPLINGS, Experiment
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
-from orchestrator.master.stepper import made
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
+from orchestrator.master.stepper import compile_stepper
 from orchestrator.system.structure import System
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -43,7 +43,7 @@ def _time(system: System, step: float, coupling: str) -> float:
     def run(n: int) -> float:
         experiment = Experiment(n * step, step, coupling=coupling)
         begin = perf_counter()
-        simulate(planned(system, experiment), loop=chosen("compiled", experiment))
+        simulate_plan(make_plan(system, experiment), loop=choose_loop("compiled", experiment))
         return perf_counter() - begin
 
     return 1e6 * (run(_STEPS) - run(1)) / (_STEPS - 1)
@@ -60,7 +60,7 @@ def _print(name: str, errors: list[float], least: float) -> None:
 
 def main() -> None:
     """Print the tables."""
-    made()
+    compile_stepper()
     with TemporaryDirectory() as name:
         folder = Path(name)
         for title, model in _MODELS.items():
@@ -89,7 +89,7 @@ def main() -> None:
                 errors = []
                 for h in steps:
                     table = Table()
-                    simulate(planned(system, Experiment(5.0, h, coupling=coupling)), [table])
+                    simulate_plan(make_plan(system, Experiment(5.0, h, coupling=coupling)), [table])
                     right = np.sin(table.time) / (1.0 - gain)
                     errors.append(float(np.abs(table["a.y1"] - right).max()))
                 stable = max(errors) < 1.0

@@ -29,10 +29,10 @@ from orchestrator.formats.osp_and_container import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate
-from orchestrator.runs.bundle import build
+from orchestrator.master.simulation import simulate_plan
+from orchestrator.runs.bundle import build_bundle
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
@@ -60,9 +60,9 @@ def ours(system: System, order: str) -> tuple[Run, float]:
     def run(steps: int) -> float:
         request = Request(stop_time=steps * step, step=step, order=order)
         prepared, table = prepare(Scenario(system.name), system, request), Table()
-        loop = chosen("auto", prepared.experiment)
+        loop = choose_loop("auto", prepared.experiment)
         start = perf_counter()
-        ending = simulate(prepared.plan, [table], loop=loop)
+        ending = simulate_plan(prepared.plan, [table], loop=loop)
         seconds = perf_counter() - start
         if ending.failure is not None or len(table) != steps + 1:
             raise InputError(f"{ending.failure or ending.remark}")
@@ -158,7 +158,7 @@ def main() -> None:
     print(f"medians of {ROUNDS} rounds of at most {STEPS} steps")
     with TemporaryDirectory(prefix="auvfmu") as folder:
         if not files:
-            build(Path(folder), kind=NATIVE)
+            build_bundle(Path(folder), kind=NATIVE)
             files = [*sorted(Path(folder).glob("*.fmu")), Path(folder, "auv.ssp")]
         left_out = 0
         for path in files:

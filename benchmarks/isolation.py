@@ -16,8 +16,8 @@ from auv_fmu.euler import STEP
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
@@ -25,8 +25,8 @@ from orchestrator.system.structure import System
 
 def start_time(system: System, order: str) -> float:
     """Seconds of a run of one step, each FMU in a process of its own."""
-    plan = planned(system, Experiment(STEP, STEP, order))
-    return timed(lambda: simulate(plan, [Table()], Isolation()))
+    plan = make_plan(system, Experiment(STEP, STEP, order))
+    return timed(lambda: simulate_plan(plan, [Table()], Isolation()))
 
 
 def main() -> None:

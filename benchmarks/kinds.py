@@ -32,7 +32,7 @@ from auv_fmu.euler import STEP
 from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
 from orchestrator.system.structure import System
@@ -77,7 +77,7 @@ def straight_line(steps: int) -> float:
 
 def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
     """Steps of a run whose rows are kept in memory, without its set-up."""
-    stepping = chosen(loop, Experiment(STEP, STEP, order))
+    stepping = choose_loop(loop, Experiment(STEP, STEP, order))
     # A set-up takes as long as thousands of compiled steps, and a larger table has other costs.
     times = MORE_COMPILED if loop == "compiled" else 1
     return sum(steps_time(system, steps, order, stepping) for _ in range(times)) / times
@@ -85,7 +85,7 @@ def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
 
 def in_c(program: Path, steps: int) -> float:
     """Steps in a program that calls the FMUs from C."""
-    return c_host.run([program], program.parent, steps, [])[1]
+    return c_host.run_host([program], program.parent, steps, [])[1]
 
 
 def in_another(system: System, host: str, is_read: bool, steps: int) -> float:
@@ -104,7 +104,7 @@ def engines(python: System, native: System, folder: Path) -> dict[str, Engine]:
         NATIVE: partial(in_our_master, native, "python", "gauss-seidel"),
         COMPILED: partial(in_our_master, native, "compiled", "gauss-seidel"),
         COMPILED_JACOBI: partial(in_our_master, native, "compiled", "jacobi"),
-        C_PROGRAM: partial(in_c, c_host.compiled(folder, native, Experiment(STEP, STEP))),
+        C_PROGRAM: partial(in_c, c_host.compile_host(folder, native, Experiment(STEP, STEP))),
     }
     for name, host in OTHERS.items():
         if find_spec(HOSTS[host].package) is not None:

@@ -26,11 +26,11 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import NEVER, Hook, Run
-from orchestrator.master.loop import LOOPS, chosen
+from orchestrator.master.loop import LOOPS, choose_loop
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer, Selection
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 
@@ -98,11 +98,11 @@ def main() -> None:
             checkpoints = Checkpoints(folder / "checkpoint", {}, options.checkpoint_every, False)
             observers.append(checkpoints)
             hooks.insert(0, checkpoints)
-        simulate(
-            planned(load("fig4", options.kind), experiment),
+        simulate_plan(
+            make_plan(load("fig4", options.kind), experiment),
             observers,
             None,
-            chosen(options.loop, experiment),
+            choose_loop(options.loop, experiment),
             hooks,
         )
         sizes = {path.name: path.stat().st_size for path in folder.glob("checkpoint/*")}

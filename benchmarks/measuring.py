@@ -19,8 +19,8 @@ from orchestrator.master.experiment import ORDERS, Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import PYTHON_LOOP, Stepping
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.structure import System
 
 #: The first argument of a script where it makes one run, in a process of its own.
@@ -57,7 +57,9 @@ def steps_time(
     """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
 
     def run(n: int) -> None:
-        simulate(planned(system, Experiment(n * STEP, STEP, order)), [Table()], isolation, loop)
+        simulate_plan(
+            make_plan(system, Experiment(n * STEP, STEP, order)), [Table()], isolation, loop
+        )
 
     return timed(lambda: run(steps)) - timed(lambda: run(1))
 

@@ -24,16 +24,16 @@ from unittest.mock import patch
 
 from measuring import python
 
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import store
+from orchestrator.studies.store import open_store
 from orchestrator.studies.study_file import study_of
-from orchestrator.studies.sweep import making
+from orchestrator.studies.sweep import making_runs
 from orchestrator.vehicle.indices import index_columns
 
 SCENARIO = "fig4"
@@ -81,7 +81,7 @@ class Cost(NamedTuple):
 
 def cost(engine: Engine, runs: Iterable[Point], workers: int) -> Cost:
     """What runs take when some processes make them."""
-    with making(Timed(engine), iter(runs), workers=workers) as blocks:
+    with making_runs(Timed(engine), iter(runs), workers=workers) as blocks:
         for _ in islice(blocks, _WARM * workers):
             pass
         start = perf_counter()
@@ -91,7 +91,7 @@ def cost(engine: Engine, runs: Iterable[Point], workers: int) -> Cost:
 
 def prepared(kind: str) -> Prepared:
     """The scenario with FMUs of a kind."""
-    return prepare(*loaded(SCENARIO, kind), Request(kind=kind))
+    return prepare(*load_scenario(SCENARIO, kind), Request(kind=kind))
 
 
 def starts(n: int, stop_time: float) -> Space:
@@ -99,7 +99,7 @@ def starts(n: int, stop_time: float) -> Space:
     ranges = {"plant.eta0.y": [-10.0, 10.0], "plant.eta0.z": [-10.0, 10.0]}
     sample = {"method": "random", "n": n, "seed": 1, "range": ranges}
     study = study_of("starts", {"scenario": SCENARIO, "stop_time": stop_time, "sample": sample})
-    return Space(study, {SCENARIO: loaded(SCENARIO)})
+    return Space(study, {SCENARIO: load_scenario(SCENARIO)})
 
 
 def keeping(n: int) -> tuple[float, float, float]:
@@ -108,10 +108,10 @@ def keeping(n: int) -> tuple[float, float, float]:
     start = process_time()
     with (
         TemporaryDirectory(prefix="auvfmu") as folder,
-        store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
+        open_store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
     ):
         assert unfinished is not None
-        with making(Idle(), (space[i] for i in range(n)), workers=1) as blocks:
+        with making_runs(Idle(), (space[i] for i in range(n)), workers=1) as blocks:
             for outcomes in blocks:
                 unfinished.add(outcomes)
         database = sum(file.stat().st_size for file in Path(folder).glob("unfinished*"))
@@ -125,7 +125,7 @@ def block(n: int) -> float:
     space = starts(n, 1.0)
     with (
         patch.object(blocks_module, "_MOST_RUNS", 1),
-        making(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
+        making_runs(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
     ):
         start = perf_counter()
         made = sum(1 for _ in blocks)
@@ -146,7 +146,7 @@ def main() -> None:
     engines: dict[str, Callable[[], Engine]] = {
         "FMUs in Python": lambda: FmuEngine({SCENARIO: prepared("python")}),
         "FMUs in C": lambda: FmuEngine({SCENARIO: prepared("native")}),
-        "equations": lambda: BatchEngine({SCENARIO: loaded(SCENARIO)[1]}),
+        "equations": lambda: BatchEngine({SCENARIO: load_scenario(SCENARIO)[1]}),
     }
     costs = {}
     for name, make in engines.items():

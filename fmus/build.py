@@ -1,6 +1,6 @@
 """Build the FMU of every component folder: `python -m fmus.build --out DIR`.
 
-Runs in a process of its own, because PythonFMU imports what it builds. Writes a file only if
+Runs in a separate process, because PythonFMU imports what it builds. Writes a file only if
 the sources have changed since it was written.
 """
 
@@ -19,7 +19,7 @@ from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
 from fmus.python.packaging import LOADERS, PythonKind, best_loader
 
-#: What a folder of built FMUs was built from, and what was built.
+#: The file that says what a folder of FMUs was built from, and what was built.
 MANIFEST = "build.json"
 
 
@@ -53,7 +53,7 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
 
 
 def built_before(manifest: Path) -> dict[str, Any]:
-    """What a manifest says; empty if there is none, or it is none of ours."""
+    """What a manifest says; empty if there is none, or it is not ours."""
     try:
         content = json.loads(manifest.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -68,7 +68,7 @@ def _digest(path: Path) -> str:
 
 
 def chosen_loader(destination: Path, wanted: str | None) -> str:
-    """The loader that is wanted; None: what is there, else native where it can be compiled."""
+    """The loader asked for; None: the one that is there, else native if it can be compiled."""
     before = built_before(destination / MANIFEST)
     there = before.get("fingerprint") == fingerprint(PYTHON)
     kept = before["settings"].get("loader") if there else None

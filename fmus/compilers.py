@@ -57,8 +57,8 @@ class Compiler(NamedTuple):
 
     Attributes:
         name: with its version.
-        command: that runs it, with options of its own.
-        targets: what it is told for each machine, if it makes libraries for several.
+        command: that runs it, with its options.
+        targets: its option for each machine, if it makes libraries for several.
         limit: how long it may take [s].
 
     """
@@ -180,7 +180,7 @@ def universal(libraries: Sequence[bytes]) -> bytes:
     """One file of libraries for different processors.
 
     Raises:
-        ValueError: one is no 64-bit Mach-O file.
+        ValueError: one is not a 64-bit Mach-O file.
 
     """
     head, body = _FAT.pack(_MAGIC_FAT, len(libraries)), b""

@@ -14,7 +14,7 @@ from pathlib import Path
 from fmus.kinds import CONTAINED
 from fmus.ports.port import Port
 
-#: The oldest time a zip archive can hold: the time of a build is no part of its result.
+#: The oldest time a zip archive can hold: the time of a build is not part of its result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -68,7 +68,7 @@ def fingerprint(kind: str) -> str:
 
 
 def write_archive(path: Path, entries: dict[str, bytes]) -> None:
-    """Write a zip archive whose bytes depend on nothing but its entries, all at once."""
+    """Write a zip archive whose bytes depend only on its entries, all at once."""
     partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
         with zipfile.ZipFile(partial, "w") as archive:

@@ -25,17 +25,17 @@ _HTML = Path(__file__).with_name("page.html")
 _REFUSALS = """\
 ## What is refused
 
-A value that is not finite, out of its range or no choice, an output, another value for a fixed
-parameter during the run: the call is answered with fmi2Discard, nothing of it is taken, and `fault`
-rises. So is a step whose size is negative or not finite, or whose result would not be finite:
-everything is as it was before, noise included. The run goes on with the next good call; `fault`
-stays true until fmi2Reset, or until a state is restored that had none.
+A value that is not finite, out of its range or not one of the choices, a value for an output, a new
+value for a fixed parameter during the run: the call is answered with fmi2Discard, none of its
+values is taken, and `fault` rises. So is a step whose size is negative or not finite, or whose
+result would not be finite: everything is as it was before, noise included. The run goes on with the
+next good call; `fault` stays true until fmi2Reset, or until a state without a fault is restored.
 
-A parameter that cannot be taken before the run, a call in the wrong mode, a value reference that is
-not there or of another type, a state that no run can have led to: the call is answered with
-fmi2Error, and so is every call after it but a get, until fmi2Reset or a good state. The parameter
-raises `fault` as well. A get that is refused has no consequence, and fmi2GetReal gives the numbers
-of Integers and Booleans, too.
+A parameter that cannot be taken before the run, a call in the wrong mode, a value reference that
+does not exist or is of another type, a state that no run can have led to: the call is answered with
+fmi2Error, and so is every later call except a get, until fmi2Reset or a good state. The parameter
+raises `fault` as well. A refused get has no consequence, and fmi2GetReal also gives the numbers of
+Integers and Booleans.
 
 The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
 `docs/status.md` of the project."""
@@ -46,7 +46,7 @@ _PLACE = re.compile(r"\[\d+\]\.")
 _NATIVE = """\
 ## What it is made of
 
-This FMU holds libraries and needs nothing but the C library of its platform, no Python. They were
+This FMU holds libraries and needs only the C library of its platform, no Python. They were
 compiled from the C sources in its folder `sources`, which any importer can compile for another
 platform: one file that includes all others. The equations in them were translated from the Python
 text that the FMU's twin runs, so both give the same numbers."""
@@ -66,8 +66,8 @@ In Python:
 A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs."""
 
 
-def page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
-    """The page of a component in Markdown: what it is, its ports, what it refuses, an example."""
+def component_page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+    """Write the page of a component in Markdown: description, ports, refusals, an example."""
     text = (package_folder(components()[name]) / "page.md").read_text(encoding="utf-8").strip()
     ports = (*ports_of(name), FAULT)
     refusals = _REFUSALS
@@ -135,9 +135,9 @@ def _range(port: Port) -> str:
     return " ".join(filter(None, (lower, upper)))
 
 
-def html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+def component_html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(page(name, kind, fmi))
+    body = MarkdownIt("commonmark").enable("table").render(component_page(name, kind, fmi))
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)

@@ -17,7 +17,7 @@ from platformdirs import user_cache_path
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from orchestrator.commands.main import main
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
 
 # A slow machine is no error, and the same tree gives the same result every time.
@@ -105,11 +105,11 @@ def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
 def _built(shared: Path, kind: str, fmi: str = FMI_VERSIONS[0]) -> Path:
     """Make a bundle of the FMUs that runs take, unless another worker has done so."""
     folder = shared / f"{kind}{fmi}"
-    with claimed(shared, wait=True), pytest.MonkeyPatch.context() as patch:
+    with hold_lock(shared, wait=True), pytest.MonkeyPatch.context() as patch:
         if not folder.exists():
             fmus = bundle.current_fmus(kind, fmi)
             patch.setattr(bundle, "run_fmus", partial(_copy, fmus))
-            bundle.build(folder, kind=kind, fmi=fmi)
+            bundle.build_bundle(folder, kind=kind, fmi=fmi)
     return folder
 
 

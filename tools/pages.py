@@ -29,7 +29,7 @@ from auv_fmu.proof.gain_conditions import at_least, coupling
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
 from fmus.discovery import components
-from fmus.documentation import page as component_page
+from fmus.documentation import component_page
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
 from orchestrator.formats.schema import TomlTable, entries

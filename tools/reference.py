@@ -18,8 +18,8 @@ from fmpy.util import write_csv
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import CsvFile
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
@@ -68,7 +68,7 @@ def write_reference(dist: Path, folder: Path) -> list[Path]:
     written = [path for fmu in fmus for path in write_component_reference(fmu, folder)]
     written.append(folder / "auv_ref.csv")
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
-    completed(planned(closed_loop(dist), jacobi), [CsvFile(written[-1])])
+    simulate_to_end(make_plan(closed_loop(dist), jacobi), [CsvFile(written[-1])])
     written.append(_write_options(folder / "auv"))
     return written
 

@@ -14,7 +14,7 @@ from PIL import Image
 
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study_file import read_figures, read_study
@@ -33,7 +33,7 @@ def main() -> None:
     for folder in folders:
         result = StudyResult(folder)
         study = read_study(result.record["study"])
-        space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
+        space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
         plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
             list(draw_figures(plans, study.title, result, Path(drawn)))

@@ -30,8 +30,8 @@ from orchestrator.machine.cache import users_folder
 from orchestrator.machine.errors import InputError, did_you_mean, last_line, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs import bundle
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
@@ -202,7 +202,7 @@ class Loop:
         """The folder of the bundle of a kind."""
         folder = self.folder / kind
         how, fmi = KINDS[kind]
-        bundle.build(folder, kind=how, fmi=fmi)
+        bundle.build_bundle(folder, kind=how, fmi=fmi)
         return folder
 
     def fmus(self, kind: str) -> dict[str, str]:
@@ -220,7 +220,7 @@ class Loop:
     def ours(self, order: str) -> np.ndarray:
         """The positions by our own master."""
         table = Table()
-        completed(planned(self.system, Experiment(self.steps * STEP, STEP, order)), [table])
+        simulate_to_end(make_plan(self.system, Experiment(self.steps * STEP, STEP, order)), [table])
         return table.group(*(".".join(port) for port in POSITIONS))[1:]
 
     def driven(self, python: Path, driver: str, kind: str) -> tuple[np.ndarray, float]:

@@ -11,5 +11,5 @@ module               what it states
 :mod:`.packaging`    an FMU that holds libraries, and their sources
 ==================== ===============================================================
 
-`runtime` holds what is the same for all components: the functions of FMI and what is behind them.
+`runtime` holds what all components share: the functions of FMI and their implementation.
 """

@@ -138,7 +138,7 @@ class Expressions:
         for suffix, part in code.shape.parts if isinstance(code.shape, Structure) else ():
             if suffix == f".{node.attr}":
                 return Code(f"{code.within(_POSTFIX)}{suffix}", part)
-        raise self.fail(node, f"{node.attr} is no field here")
+        raise self.fail(node, f"{node.attr} is not a field")
 
     def _subscript(self, node: ast.Subscript, wanted: Shape | None) -> Code:
         code = self.code(node.value)
@@ -154,9 +154,11 @@ class Expressions:
         """The element of an array at a place that is computed."""
         place = self.code(node.slice)
         if not isinstance(code.shape, Structure) or not code.shape.is_array:
-            raise self.fail(node, "a computed subscript of what is no tuple of equal parts")
+            raise self.fail(
+                node, "a computed subscript of something other than a tuple of parts of one type"
+            )
         if place.shape != INTEGER:
-            raise self.fail(node, "a subscript that is no whole number")
+            raise self.fail(node, "a subscript that is not a whole number")
         self.made.raises = True
         text = f"{code.within(_POSTFIX)}.v[PLACE({place.text}, {len(code.shape.parts)})]"
         return Code(text, code.shape.parts[0][1])
@@ -208,7 +210,7 @@ class Expressions:
 
     def _compare(self, node: ast.Compare, wanted: Shape | None) -> Code:
         operands = [node.left, *node.comparators]
-        if not all(map(is_path, operands[1:-1])):
+        if not all(map(is_dotted_name, operands[1:-1])):
             raise self.fail(node, "what stands between two comparisons must be a name")
         parts = []
         for operator, left, right in zip(node.ops, operands, operands[1:]):
@@ -246,7 +248,7 @@ class Expressions:
         codes: list[Code] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                if not is_path(node.value):
+                if not is_dotted_name(node.value):
                     raise self.fail(node, "a star before something that has no name")
                 codes += self.parts(node, self.code(node.value))
             else:
@@ -256,7 +258,7 @@ class Expressions:
 
     def _dict(self, node: ast.Dict, wanted: Shape | None) -> Code:
         if not isinstance(wanted, Structure):
-            raise self.fail(node, "a dict that is no result")
+            raise self.fail(node, "a dict that is not a result")
         given = {ast.literal_eval(k): v for k, v in zip(node.keys, node.values) if k is not None}
         codes = [self.code(given[suffix[1:]], part) for suffix, part in wanted.parts]
         return Code(_literal(wanted, codes), wanted)
@@ -279,13 +281,13 @@ class Expressions:
                 raise self.fail(node, f"{len(codes)} values for {len(shape.parts)} fields")
             return Code(_literal(shape, codes), shape)
         if not isinstance(called, FunctionType):
-            raise self.fail(node, f"{ast.unparse(node.func)} is no function of equations")
+            raise self.fail(node, f"{ast.unparse(node.func)} is not a function of equations")
         function = self._program.function(called)
         codes = self._elements(node.args, list(function.arguments.values()))
         if [code.shape for code in codes] != list(function.arguments.values()):
-            raise self.fail(node, f"other arguments than those of {function.name}")
+            raise self.fail(node, f"arguments that do not match {function.name}")
         self.made.raises |= function.raises
-        # What returns nothing is a statement of its own.
+        # A call that returns nothing is a statement.
         return Code(function.call([code.text for code in codes]), function.returns or INTEGER)
 
 
@@ -315,8 +317,8 @@ def _initializer(code: Code) -> str:
     return code.text[len(prefix) - 1 :] if code.text.startswith(prefix) else code.text
 
 
-def is_path(node: ast.expr) -> bool:
+def is_dotted_name(node: ast.expr) -> bool:
     """Whether an expression is a name, or a part of one."""
     if isinstance(node, (ast.Attribute, ast.Subscript)):
-        return is_path(node.value)
+        return is_dotted_name(node.value)
     return isinstance(node, (ast.Name, ast.Constant))

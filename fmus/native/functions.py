@@ -15,7 +15,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import get_type_hints
 
-from fmus.native.expressions import Code, Expressions, is_path
+from fmus.native.expressions import Code, Expressions, is_dotted_name
 from fmus.native.language import foreign
 from fmus.native.program import (
     DOUBLE,
@@ -26,11 +26,11 @@ from fmus.native.program import (
     Structure,
     Untranslatable,
     c_name,
-    plain,
+    strip_sphinx_marks,
 )
 from fmus.ports.port import Refusal
 
-WIDTH = 98
+LINE_WIDTH = 98
 INDENT = "    "
 
 _STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
@@ -50,7 +50,7 @@ def laid_out(text: str, indent: str) -> list[str]:
 
 
 def _lines(text: str, indent: str) -> list[str]:
-    if len(indent) + len(text) <= WIDTH:
+    if len(indent) + len(text) <= LINE_WIDTH:
         return [indent + text]
     start, end = _widest(text)
     # Inside of a short bracket there is nothing to gain.
@@ -70,7 +70,7 @@ def _lines(text: str, indent: str) -> list[str]:
 def _wrapped(text: str, indent: str) -> list[str]:
     """Lines that end after commas and before operators."""
     wrapper = textwrap.TextWrapper(
-        WIDTH,
+        LINE_WIDTH,
         initial_indent=indent,
         subsequent_indent=indent + INDENT,
         break_long_words=False,
@@ -243,7 +243,7 @@ class _Translation:
                     yield from self._assignment(one, other)
         else:
             code = self._in_c.code(value)
-            if not is_path(value):
+            if not is_dotted_name(value):
                 name = self._name_of_all(target, value)
                 yield self._stored([(name, code)])
                 code = Code(name, code.shape)
@@ -326,7 +326,7 @@ def _alike(values: list[tuple[str, Code]]) -> Iterator[list[tuple[str, Code]]]:
 
 def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
     """Lines with a comment at the end, or before them."""
-    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= WIDTH:
+    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= LINE_WIDTH:
         return [f"{lines[0]} {comment}"]
     return [f"{indent}{comment}", *lines]
 
@@ -334,7 +334,7 @@ def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
 def _comment(docstring: str | None) -> list[str]:
     if not docstring:
         return []
-    lines = plain(textwrap.dedent(docstring)).rstrip().splitlines()
+    lines = strip_sphinx_marks(textwrap.dedent(docstring)).rstrip().splitlines()
     if len(lines) == 1:
         return [f"/* {lines[0]} */"]
     return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]

@@ -1,6 +1,6 @@
 """The language of equations: the part of Python that every kind of FMU can run.
 
-`docs/language.md` is its description for readers; what is here finds what is outside it.
+`docs/language.md` describes it for readers; this module finds code outside it.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ BUILT_IN = frozenset(("abs",))
 OUTSIDE = {
     "plant.white_noise": "makes the generator of the standard library that has the state",
     "euler.internal_steps": "makes an integer; the runtime in C has a twin, which looks first",
-    "closed_loop.closed_loop": "is the generator of instants that all else is held against",
+    "closed_loop.closed_loop": "is the generator of instants that all else is checked against",
 }
 
 #: Packages whose functions, tuples and constants equations share.

@@ -101,7 +101,7 @@ def fmu_entries(
     return {
         "modelDescription.xml": described(guid),
         **_pictures(component, declared.PORTS, fmi),
-        "documentation/index.html": documentation.html(component, NATIVE, fmi).encode(),
+        "documentation/index.html": documentation.component_html(component, NATIVE, fmi).encode(),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
         **{

@@ -68,7 +68,7 @@ def shape_of(kind: Any) -> Shape:
         hints = get_type_hints(kind)
         parts = tuple((f".{name}", shape_of(hint)) for name, hint in hints.items())
         return Structure(kind.__name__, parts, kind)
-    raise TypeError(f"{kind} is no type of the language of equations")
+    raise TypeError(f"{kind} is not a type in the language of equations")
 
 
 def structure(items: list[Shape], name: str | None = None) -> Structure:
@@ -81,7 +81,7 @@ def structure(items: list[Shape], name: str | None = None) -> Structure:
     return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
 
 
-def numbers(shape: Shape) -> int:
+def count_numbers(shape: Shape) -> int:
     """How many numbers a shape holds.
 
     Raises:
@@ -89,17 +89,17 @@ def numbers(shape: Shape) -> int:
 
     """
     if isinstance(shape, Structure):
-        return sum(numbers(part) for _, part in shape.parts)
+        return sum(count_numbers(part) for _, part in shape.parts)
     if shape != DOUBLE:
         raise TypeError(f"{shape.name} among numbers")
     return 1
 
 
-def inner(shape: Shape) -> Iterator[Structure]:
+def inner_structures(shape: Shape) -> Iterator[Structure]:
     """The structures that a structure needs, and itself after them."""
     if isinstance(shape, Structure):
         for _, part in shape.parts:
-            yield from inner(part)
+            yield from inner_structures(part)
         yield shape
 
 
@@ -111,7 +111,7 @@ def declaration(shape: Structure) -> str:
         members = [f"{shape.parts[0][1].name} v[{len(members)}];"]
     lines = [f"    {line}" for line in members or ["char nothing; /* C has no empty structure */"]]
     text = inspect.cleandoc(shape.made.__doc__).splitlines()[0] if shape.made else ""
-    head = f"/* {plain(text)} */\n" if text else ""
+    head = f"/* {strip_sphinx_marks(text)} */\n" if text else ""
     return head + "\n".join(["typedef struct {", *lines, f"}} {shape.name};"])
 
 
@@ -120,11 +120,11 @@ def _comments(made: Any) -> dict[str, str]:
     if made is None:
         return {}
     found = re.findall(r"^    (\w+):.*#: (.*)$", inspect.getsource(made), re.MULTILINE)
-    return {f".{name}": f" /* {plain(text)} */" for name, text in found}
+    return {f".{name}": f" /* {strip_sphinx_marks(text)} */" for name, text in found}
 
 
-def plain(text: str) -> str:
-    """A text without the marks that Sphinx reads."""
+def strip_sphinx_marks(text: str) -> str:
+    """Take the marks that Sphinx reads out of a text."""
     return re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text).replace("*/", "* /")
 
 
@@ -174,7 +174,7 @@ class Program:
 
     def defined(self, shape: Shape) -> Shape:
         """The shape, whose structures are defined."""
-        for part in inner(shape):
+        for part in inner_structures(shape):
             text = declaration(part)
             if self.structures.setdefault(part.name, text) != text:
                 raise Untranslatable(f"two structures have the name {part.name}")
@@ -189,7 +189,7 @@ class Program:
             shape = DOUBLE if type(value) is float else INTEGER
             text = repr(value)
         else:
-            raise Untranslatable(f"{name} is no number")
+            raise Untranslatable(f"{name} is not a number")
         self.constants.setdefault(name, f"static const {shape.name} {name} = {text};")
         return shape
 

@@ -8,7 +8,7 @@ from importlib import import_module
 
 from auv_fmu import euler
 from fmus.native.functions import function_in_c, laid_out
-from fmus.native.program import Function, Program, Structure, numbers
+from fmus.native.program import Function, Program, Structure, count_numbers
 from fmus.ports.behaviour import Behaviour, read_behaviour
 from fmus.ports.port import FAULT, H_MAX, Port, Value
 
@@ -17,7 +17,7 @@ _HEAD = """\
  *
  * Translated from the Python text of its equations, function by function, in the order in which
  * they need each other. A name begins with the module that the function stands in. The numbers in
- * brackets are those of the equations in "Three-dimensional tracking control of autonomous
+ * brackets are the equation numbers of "Three-dimensional tracking control of autonomous
  * underwater vehicles with limited torque and without velocity sensors".
  */
 #include "arithmetic.h"
@@ -116,8 +116,8 @@ def _types(program: Program, said: Behaviour) -> str:
         f"typedef {inputs.name} model_inputs;\n"
         f"typedef {outputs.name} model_outputs;\n"
         f"typedef struct {{\n    {state.name} state;\n{derived}}} model_state;\n\n"
-        f"enum {{ MODEL_INPUTS = {numbers(inputs)}, MODEL_OUTPUTS = {numbers(outputs)}, "
-        f"MODEL_STATE = {numbers(state)} }};"
+        f"enum {{ MODEL_INPUTS = {count_numbers(inputs)}, "
+        f"MODEL_OUTPUTS = {count_numbers(outputs)}, MODEL_STATE = {count_numbers(state)} }};"
     )
 
 

@@ -1,6 +1,6 @@
 """How ObserverController runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`.
 
-A sampled controller: its outputs are those of the beginning of the step, when the measurements
+A sampled controller: its outputs belong to the beginning of the step, when the measurements
 were taken.
 """
 

@@ -121,7 +121,7 @@ class Hooks(Protocol):
     def expected(parameters: Any, state: Any, outputs: Any) -> Any:
         """Return the outputs that belong to a state that is restored.
 
-        They are held against the outputs that are restored with it, which are given to tell what
+        They are compared with the outputs that are restored with it, which are given for whatever
         else some outputs depend on, such as noise. Without this hook, outputs do not follow from
         the state only: a controller's belong to the beginning of its last step.
 
@@ -179,7 +179,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         module: `behaviour` in the folder of the component.
 
     Raises:
-        TypeError: it is no behaviour.
+        TypeError: it is not a behaviour.
 
     """
     where, said = module.__name__, vars(module)
@@ -195,7 +195,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     for name, value in said.items():
         own = isinstance(value, FunctionType) and value.__module__ == where
         if own and name not in HOOKS and not name.startswith("_"):
-            raise TypeError(f"{where}.{name} is none of the hooks {', '.join(HOOKS)}")
+            raise TypeError(f"{where}.{name} is not one of the hooks {', '.join(HOOKS)}")
     hints = {name: get_type_hints(hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
@@ -203,7 +203,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     for name, found in hints.items():
         known = (*HOOKS[name], *noisy, "return")
         for argument in found.keys() - set(known):
-            raise TypeError(f"{where}.{name} takes {argument}, which is none of {', '.join(known)}")
+            raise TypeError(
+                f"{where}.{name} takes {argument}, which is not one of {', '.join(known)}"
+            )
     if "measured" in hooks and len(noisy) != 1:
         raise TypeError(f"{where}.measured takes {len(noisy)} groups of outputs, not one")
     return Behaviour(

@@ -96,7 +96,7 @@ def root_of(version: str, name: str, description: str, **identity: str) -> Eleme
 
 
 def text(root: Element) -> bytes:
-    """A document, whose bytes depend on nothing but its elements."""
+    """A document, whose bytes depend only on its elements."""
     indent(root)
     content: bytes = tostring(root, encoding="utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"

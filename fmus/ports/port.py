@@ -1,4 +1,4 @@
-"""Declaration of ports: the one place where a component says what it has.
+"""Declaration of ports: the one place where a component says which it has.
 
 modelDescription.xml, the checks of the slave, the connectors of the SSP, the tables in the
 documentation and the tests all read these declarations, directly or through the built FMU.
@@ -142,7 +142,7 @@ def setting(
     minimum: int | None = None,
     maximum: int | None = None,
 ) -> Port:
-    """A fixed parameter that is no Real: of the type that its start value has."""
+    """A fixed parameter that is not a Real: it has the type of its start value."""
     kind = {bool: "Boolean", int: "Integer", str: "String"}[type(start)]
     about = ("parameter", "fixed", kind, description, None)
     return Port(name, *about, start, minimum, maximum, choices or {})
@@ -188,5 +188,5 @@ FAULT = Port(
     "True from the moment the component refused an input, a parameter or a step",
 )
 
-#: What all is a function of. A variable only in FMI 3.0.
+#: The independent variable. A variable only in FMI 3.0.
 TIME = Port("time", "independent", "continuous", "Real", "Time", "s")

@@ -154,7 +154,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             self.log("", status, ANSWER)
 
     def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
-        """Log a message, the first time only that its key, or else its text, comes up.
+        """Log a message only the first time that its key, or else its text, occurs.
 
         The host adds the name of the instance.
         """
@@ -241,7 +241,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             # A run with another parameter than the host asked for must not begin.
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
             self._store.fault = True
-            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, explained(error))
+            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, describe_error(error))
         else:
             self._stale = self._stale or self._mode == INITIALISING
 
@@ -265,8 +265,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         store.inputs, store.parameters = inputs, parameters
 
 
-def explained(error: BaseException) -> str:
-    """What speaks against something; what is no refusal of ours is named as what it is."""
+def describe_error(error: BaseException) -> str:
+    """Give the reason in an exception; one that is not a Refusal is named by its type."""
     if isinstance(error, Refusal):
         return str(error)
     return f"{place(error)}{type(error).__name__}: {error}"

@@ -29,7 +29,7 @@ from fmus.python.callbacks import (
     STEPPING,
     TERMINATED,
     Callbacks,
-    explained,
+    describe_error,
 )
 from fmus.python.state import (
     Snapshot,
@@ -173,7 +173,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
                 self._begin()
             except BaseException as error:
                 self._state, self._store.outputs = None, [0.0] * len(self._store.outputs)
-                return f"initialisation refused: {explained(error)}"
+                return f"initialisation refused: {describe_error(error)}"
             self._stale = False
         return ""
 
@@ -225,7 +225,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             )
             self._accept(state, self._pack(outputs))
         except BaseException as error:
-            what = explained(error)
+            what = describe_error(error)
             self._store.fault = True
             said = f"step refused at t = {current_time:g} s: {what}"
             self._answer(Fmi2Status.discard, said, key=what)
@@ -235,7 +235,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def _accept(self, state: State, values: list[float]) -> None:
         """Take over state and outputs, if no number of theirs is out of bounds."""
         if not self._norm(state) <= LARGEST_STATE:
-            raise Refusal(f"the state is not finite, or beyond {LARGEST_STATE:g}")
+            raise Refusal(f"the state is not finite, or exceeds {LARGEST_STATE:g}")
         if not isfinite(sum(values)):
             # What is finite may still be too large to be added up.
             for reference, value in zip(self._store.output_references, values):
@@ -266,7 +266,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         try:
             hidden = self.hidden_state()
         except BaseException as error:
-            return unusable(explained(error))
+            return unusable(describe_error(error))
         return Snapshot(
             identity=self._identity(),
             mode=self._mode,
@@ -283,7 +283,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         try:
             self._restore(state)
         except BaseException as error:
-            self._fail(f"state refused: {explained(error)}")
+            self._fail(f"state refused: {describe_error(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
         store = self._store
@@ -293,7 +293,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         else:
             meaning = self._meaning(wanted["parameters"])
             if not self._norm(wanted["state"]) <= LARGEST_STATE:
-                raise Refusal(f"beyond {LARGEST_STATE:g}")
+                raise Refusal(f"it exceeds {LARGEST_STATE:g}")
             self._check_outputs(meaning[0], wanted["state"], wanted["outputs"])
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self.restore_hidden_state(wanted["hidden"])
@@ -310,7 +310,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         groups: Any = {group: tuple(values[at]) for group, at in self._output_places.items()}
         expected = self.expected(parameters, state, groups)
         if expected is not None and not nearly_equal(self._pack(expected), values):
-            raise Refusal("its outputs are not those of its state")
+            raise Refusal("its outputs do not belong to its state")
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

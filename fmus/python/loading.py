@@ -9,12 +9,12 @@ the class.
 - The search never frees what it makes of each base of each class it meets: more than a kilobyte
   an instance.
 - It puts the resources folder on sys.path and never takes it off; it never frees the path either.
-- It takes it for granted that messages and strings can be encoded, and ends the process otherwise.
+- It takes it for granted that messages and strings can be encoded, and otherwise ends the process.
 - Its library frees the object that watches over the interpreter twice when the process ends,
   which now and then ends in "corrupted double-linked list" and an exit status of 134.
 
 It answers an exception with fmi2Fatal, and its message has no line. A slave on the base of this
-package raises none; what a plain one raises is caught here, and told with file and line.
+package raises none; what a plain one raises is caught here and reported with file and line.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from pythonfmu.enums import Fmi2Status
 #: Category of a log entry that tells the native loader the status of the call.
 ANSWER = "answer"
 
-#: What is answered in the place of values that could not be had.
+#: The answer instead of values that could not be read.
 MISSING: dict[str, Any] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
 
 #: The same, by the callback that is asked for them.
@@ -87,7 +87,7 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
 
 
 def _let_speak_clearly(slave: Any) -> None:
-    """Have a class of slaves log and return nothing but text that can be encoded."""
+    """Make a class of slaves log and return only text that can be encoded."""
     log, get_string = slave.log, slave.get_string
 
     def clear_log(self: Any, msg: object, *args: Any, **kwargs: Any) -> None:

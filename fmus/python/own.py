@@ -25,7 +25,7 @@ settle(caught({component}), globals(), locals())
 """
 
 
-def build_own(script: Path, destination: Path, loader: str | None = None) -> Path:
+def build_script(script: Path, destination: Path, loader: str | None = None) -> Path:
     """Build the FMU of a script.
 
     Args:
@@ -55,7 +55,7 @@ def main() -> int:
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     options = parser.parse_args()
     try:
-        print(build_own(options.script, options.out, options.loader))
+        print(build_script(options.script, options.out, options.loader))
     except Exception as error:
         where = f"{options.script}{_line(error, options.script)}"
         print(f"{where}: {type(error).__name__}: {error}", file=sys.stderr)

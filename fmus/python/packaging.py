@@ -34,8 +34,8 @@ settle({component}, globals(), locals())
 #: How FMUs are loaded: by a library of our own, or by PythonFMU's.
 LOADERS = ("native", "plain")
 
-#: Sources of the native loader, which lets an FMU run in a host that is no Python program; loader.h
-#: says what each is for, and fmi2.c includes all others.
+#: Sources of the native loader, which lets an FMU run in a host that is not a Python program;
+#: loader.h says what each is for, and fmi2.c includes all others.
 LOADER = Path(__file__).parent / "loader"
 
 #: How they are compiled, in their folder, into a library.
@@ -144,7 +144,7 @@ def compiled_loader() -> bytes:
 
 
 def _with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:
-    """The entries of an FMU with the loader in the place of PythonFMU's library."""
+    """The entries of an FMU with the loader instead of PythonFMU's library."""
     changed = dict(entries)
     for name, content in entries.items():
         if name.startswith(_LINUX) and name.endswith(".so"):
@@ -162,7 +162,7 @@ def best_loader() -> str:
 
 
 def seal(entries: dict[str, bytes], destination: Path) -> None:
-    """Write an FMU sealed: reproducible, and alone in its process.
+    """Write an FMU sealed: reproducible, and isolated from others in its process.
 
     All PythonFMU FMUs of a process share one interpreter and import their modules by bare name:
     of two FMUs that bundle a module of the same name, the second silently runs the first one's
@@ -244,5 +244,5 @@ class PythonKind:
         """
         text = _SCRIPT.format(package=package, component=component)
         entries = fmu_entries(component, text, self.loader)
-        entries["documentation/index.html"] = documentation.html(component).encode()
+        entries["documentation/index.html"] = documentation.component_html(component).encode()
         seal(entries, path)

@@ -45,7 +45,7 @@ class Noisy(Component[State, Inputs, Outputs, Parameters]):
         # Some of what setstate takes it changes in silence, or only gauss finds out about.
         *_, following = hidden
         if generator.getstate() != hidden or type(following) not in (float, type(None)):
-            raise Refusal("its noise generator is in no state that it can be in")
+            raise Refusal("its noise generator is in an impossible state")
         if not isfinite(following or 0.0):
             raise Refusal("its noise is not finite")
         self._random = generator

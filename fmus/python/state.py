@@ -24,7 +24,7 @@ _SCALARS = (float, int, bool, str, type(None))
 #: reported, so they are refused when they are set.
 _UNUSABLE = "unusable"
 
-#: Difference of what was computed from the same numbers on two machines.
+#: How far results from the same numbers may differ between two machines.
 _ROUNDING = 1e-9
 
 #: Key of the checksum in the bytes of a state.
@@ -78,7 +78,7 @@ def restored(kind: Any, value: Any) -> Any:
 
     Args:
         kind: its type.
-        value: it, perhaps with lists in the place of tuples.
+        value: the state or part, perhaps with lists instead of tuples.
 
     Raises:
         Refusal: it is of another type or length, or not finite.
@@ -87,7 +87,7 @@ def restored(kind: Any, value: Any) -> Any:
     kinds = _elements(kind)
     if kinds is not None:
         if not isinstance(value, (list, tuple)) or len(value) != len(kinds):
-            raise Refusal(f"{_shown(value)} in the place of {len(kinds)} values")
+            raise Refusal(f"{_shown(value)} instead of {len(kinds)} values")
         made = map(restored, kinds, value)
         return kind._make(made) if hasattr(kind, "_make") else tuple(made)
     if _is_union(kind):
@@ -97,7 +97,7 @@ def restored(kind: Any, value: Any) -> Any:
             raise Refusal("a value is not finite")
         return value
     if kind in _SCALARS and type(value) is not kind:
-        raise Refusal(f"{_shown(value)} is no {kind.__name__}")
+        raise Refusal(f"{_shown(value)} is not of type {kind.__name__}")
     return frozen(value)
 
 
@@ -140,7 +140,7 @@ class Snapshot(TypedDict):
 
 
 def unusable(why: str) -> dict[str, Any]:
-    """What stands for a state that there is none of."""
+    """A stand-in for a state that cannot be had."""
     return {_UNUSABLE: why}
 
 
@@ -153,16 +153,16 @@ def to_bytes(snapshot: Mapping[str, Any]) -> bytes:
 
 
 def from_bytes(content: bytes) -> dict[str, Any]:
-    """What was made into bytes; what is no state at all is refused when it is set."""
+    """The snapshot in the bytes; anything that is not a state is refused when it is set."""
     try:
         saved = json.loads(content)
         if not isinstance(saved, dict):
-            return unusable("the bytes are not those of a state")
+            return unusable("the bytes are not a state")
         checksum = saved.pop(_CHECKSUM, None)
         if _UNUSABLE not in saved and checksum != _checksum(saved):
             return unusable("the bytes were changed since they were written")
     except (ValueError, RecursionError):
-        return unusable("the bytes are not those of a state")
+        return unusable("the bytes are not a state")
     return saved
 
 
@@ -175,7 +175,7 @@ def _checksum(snapshot: Mapping[str, Any]) -> int:
 
 
 def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -> Snapshot:
-    """A copy of what was saved, if it can be a state of this component.
+    """A copy of a saved state, if it can be one of this component.
 
     Args:
         saved: in memory, or from bytes.
@@ -192,10 +192,10 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
     if saved.get("identity") != identity:
         raise Refusal(f"not a state of {identity}")
     if saved.keys() != Snapshot.__annotations__.keys():
-        raise Refusal("it has other parts")
+        raise Refusal("it has missing or unknown parts")
     mode, state = saved["mode"], saved["state"]
     if mode not in MODES:
-        raise Refusal(f"no mode is {mode!r:.40}")
+        raise Refusal(f"{mode!r:.40} is not a mode")
     if not isinstance(saved["fault"], bool):
         raise Refusal("its fault is neither true nor false")
     outputs = _values(store, store.output_references, saved["outputs"])
@@ -206,7 +206,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
     parameters = saved["parameters"]
     declared = [port for port in store.ports if port.causality == "parameter"]
     if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
-        raise Refusal("it has other parameters")
+        raise Refusal("it has missing or unknown parameters")
     return Snapshot(
         identity=identity,
         mode=mode,
@@ -222,7 +222,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
 
 def _values(store: Store, references: Sequence[int], values: Any) -> list[float]:
     if not isinstance(values, (list, tuple)) or len(values) != len(references):
-        raise Refusal("it has other ports")
+        raise Refusal("its values do not match the ports")
     for reference, value in zip(references, values):
         store.ports[reference].checked(value)
     return [*values]

@@ -1,4 +1,4 @@
-"""`auv-fmu build`, `new`, `list` and `gains`: making FMUs, and what is known before a run."""
+"""`auv-fmu build`, `new`, `list` and `gains`: build FMUs, and answer without a run."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from orchestrator.commands.options import add_fmi, add_options, add_out, add_set
 from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import BASES, DEFAULT_FOLDERS, build_own, new_controller
+from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
@@ -26,15 +26,15 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--platforms",
         metavar="NAME,...|all",
-        help=f"that --kind {NATIVE} has libraries for, by the names of FMI; all but this machine's "
-        "own need auv-fmu[native]; default: this machine",
+        help=f"platforms for the libraries of --kind {NATIVE}, by their FMI names; other than this "
+        "machine's need auv-fmu[native]; default: this machine",
     )
     parser.add_argument(
         "script",
         nargs="?",
         type=Path,
         metavar="SCRIPT.py",
-        help="a slave of PythonFMU, whose FMU is built beside it; default: the bundle",
+        help="a PythonFMU slave, whose FMU is built beside it; default: the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
     add_out(parser, f"{folders}, or the folder of SCRIPT.py")
@@ -42,8 +42,8 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--loader",
         choices=("native", "plain"),
-        help=f"of --kind {PYTHON}; native: the FMUs also run in hosts that are no Python programs; "
-        "needs a C compiler and is the default where there is one",
+        help=f"for --kind {PYTHON}; native: the FMUs also run in hosts that are not Python "
+        "programs; needs a C compiler and is the default if there is one",
     )
     parser.set_defaults(action=_build)
 
@@ -52,16 +52,16 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu new`."""
     kinds = parser.add_subparsers(required=True, metavar="KIND")
     controller = kinds.add_parser("controller", help="a folder with a controller that runs")
-    controller.add_argument("name", metavar="NAME", help="of the controller, MyLaw or my_law")
+    controller.add_argument("name", metavar="NAME", help="its name: MyLaw or my_law")
     controller.add_argument(
-        "folder", nargs="?", type=Path, metavar="DIR", help="to make; default: NAME/"
+        "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
     )
     controller.add_argument(
         "--base",
-        choices=BASES,
-        default=BASES[0],
-        help="plain: PythonFMU alone; hardened: the base of the bundle's components, which checks "
-        f"values, saves states and survives exceptions; default: {BASES[0]}",
+        choices=CONTROLLER_BASES,
+        default=CONTROLLER_BASES[0],
+        help="plain: only PythonFMU; hardened: the base of the bundle's components, which checks "
+        f"values, saves states and survives exceptions; default: {CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)
 
@@ -84,7 +84,7 @@ def _build(options: argparse.Namespace) -> int:
         show(build_own(options.script, options.out, options.loader, force=options.force))
         return OK
     folder = options.out or DEFAULT_FOLDERS[options.kind]
-    written = bundle.build(
+    written = bundle.build_bundle(
         folder,
         options.loader,
         kind=options.kind,

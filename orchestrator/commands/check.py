@@ -12,10 +12,10 @@ from fmpy.validation import validate_fmu
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.machine.errors import Findings, InputError, reason
-from orchestrator.machine.user_files import unpacked
+from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
-from orchestrator.runs.loading import loaded
-from orchestrator.runs.preparation import SOME_TIME, prepare
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
@@ -23,21 +23,23 @@ from orchestrator.studies.study_file import read_study
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
 
-#: What surprises the user of an FMU, by the flag of its description and what that is then.
+#: What surprises the user of an FMU, by a flag of its description and the value that means it.
 _SURPRISES = {
-    ("canBeInstantiatedOnlyOncePerProcess", True): "one instance a process: a further one gets a "
-    "process of its own",
+    ("canBeInstantiatedOnlyOncePerProcess", True): "allows one instance per process: each "
+    "further one runs in a separate process",
     ("needsExecutionTool", True): "needs the program that it was made with",
-    ("canHandleVariableCommunicationStepSize", False): "takes steps of one length only: the stop "
-    "time must be a multiple of the step",
+    ("canHandleVariableCommunicationStepSize", False): "takes only steps of a fixed length: the "
+    "stop time must be a multiple of the step",
     ("canRunAsynchronuously", True): "may compute a step while its host goes on",
-    ("canGetAndSetFMUstate", False): "gives no state: a run of it cannot be resumed",
+    ("canGetAndSetFMUstate", False): "cannot save its state: a run of it cannot be resumed",
 }
 
 
 def add_check(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu check`."""
-    parser.add_argument("file", metavar="FILE|DIR|SCENARIO", help="what is looked at, not run")
+    parser.add_argument(
+        "file", metavar="FILE|DIR|SCENARIO", help="what to check, without running it"
+    )
     add_variant(parser)
     parser.set_defaults(action=_check)
 
@@ -62,14 +64,14 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Look at the file of a study, and not at what it runs; there is nothing more to be known."""
+    """Check the file of a study, but not what it runs; there is nothing else to know."""
     with findings.collecting():
         read_study(options.file)
     return []
 
 
 def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Look at an FMU; returns what is to be known of it."""
+    """Check an FMU; returns what to know of it."""
     component = examine(Path(options.file), findings)
     if component is None:
         return []
@@ -77,7 +79,7 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
 
 
 def _binary(component: Component, findings: Findings) -> list[str]:
-    """Look at the library of an FMU; returns what is to be known of it."""
+    """Check the library of an FMU; returns what to know of it."""
     with findings.collecting():
         check_binary(component, component.folder)
         if not binary_of(component, component.folder).is_file():
@@ -86,23 +88,23 @@ def _binary(component: Component, findings: Findings) -> list[str]:
 
 
 def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Look at a system as a whole, then at its components; returns what is to be known of it."""
+    """Check a system as a whole, then its components; returns what to know of it."""
     to_know: list[str] = []
     with findings.collecting():
-        scenario, system = loaded(options.file, variant=options.variant, findings=findings)
+        scenario, system = load_scenario(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
             known = (*_binary(component, findings), *surprises(component))
             to_know += [f"{name}: {text}" for text in known]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
-            to_know.append("names no stop time: a run wants --stop-time")
-            request = Request(stop_time=(system.start_time or 0.0) + SOME_TIME)
+            to_know.append("names no stop time: a run needs --stop-time")
+            request = Request(stop_time=(system.start_time or 0.0) + FALLBACK_STOP_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)
         to_know += [
-            f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved where the FMUs "
-            "compute their outputs between steps, and else delayed by a step"
+            f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved if the FMUs "
+            "compute their outputs between steps, else delayed by a step"
             for ring in rings(prepared.system)
         ]
         to_know += prepared.doubts()
@@ -110,18 +112,18 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
 
 
 def examine(fmu: Path, findings: Findings) -> Component | None:
-    """Take note of all that is wrong with an FMU.
+    """Note everything that is wrong with an FMU.
 
     Args:
         fmu: the file.
-        findings: take it.
+        findings: take the notes.
 
     Returns:
-        The FMU; None: it is none that can be run.
+        The FMU; None: it cannot be run.
 
     """
     with findings.collecting():
-        # What is read of a description with references to nothing depends on the reader.
+        # Readers differ in what they make of a description with references to nothing.
         for text in list(_dangling(fmu)) or _flaws(fmu):
             findings.note(text)
         component = read_component(fmu.stem, fmu)
@@ -134,13 +136,13 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
         for variable in (*component.having("input"), *component.having("parameter")):
             other = seen.setdefault((variable.type, variable.valueReference), variable.name)
             if other != variable.name:
-                findings.note(f"{other} and {variable.name} are one: to set one sets both")
+                findings.note(f"{other} and {variable.name} are one: setting one sets both")
         return component
     return None
 
 
 def surprises(component: Component) -> Iterator[str]:
-    """What an FMU cannot do, or does in another way than most."""
+    """What an FMU cannot do, or does differently from most."""
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text
@@ -152,8 +154,8 @@ def surprises(component: Component) -> Iterator[str]:
 
 def _flaws(fmu: Path) -> list[str]:
     """What the standard's schema and rules have against the description."""
-    if not (unpacked(fmu).folder / "modelDescription.xml").is_file():
-        # What reads the FMU says so.
+    if not (unpack(fmu).folder / "modelDescription.xml").is_file():
+        # The reader of the FMU says so.
         return []
     try:
         return [str(problem) for problem in validate_fmu(str(fmu))]
@@ -164,7 +166,7 @@ def _flaws(fmu: Path) -> list[str]:
 def _dangling(fmu: Path) -> Iterator[str]:
     """References in the structure of the model to variables that do not exist."""
     try:
-        root = ElementTree.parse(unpacked(fmu).folder / "modelDescription.xml").getroot()
+        root = ElementTree.parse(unpack(fmu).folder / "modelDescription.xml").getroot()
     except (OSError, ElementTree.ParseError):
         return
     known = range(1, 1 + len(root.findall("ModelVariables/ScalarVariable")))

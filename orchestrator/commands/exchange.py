@@ -1,4 +1,4 @@
-"""`auv-fmu export`, `hosts` and `verify`: what is exchanged with other tools."""
+"""`auv-fmu export`, `hosts` and `verify`: exchange systems and results with other tools."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
-    read,
+    read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.hosts import HOSTS, compare
@@ -22,15 +22,15 @@ from orchestrator.exchange.verify import verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, order_of
-from orchestrator.runs.folder import replaced
+from orchestrator.master.experiment import ORDERS, read_order
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import left_behind, load
-from orchestrator.runs.preparation import DEFAULT_STEP, SOME_TIME, prepare
+from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
-FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
+EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
     "ssp": write_ssp,
     "osp": write_osp,
     "container": write_container,
@@ -45,7 +45,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     parser.add_argument(
         "--format",
-        choices=tuple(FORMATS),
+        choices=tuple(EXPORT_FORMATS),
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
@@ -60,39 +60,40 @@ def add_export(parser: argparse.ArgumentParser) -> None:
 def add_hosts(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu hosts`."""
     parser.add_argument(
-        "host", nargs="*", metavar="HOST", help=f"of {', '.join(HOSTS)}; default: all"
+        "host", nargs="*", metavar="HOST", help=f"one of {', '.join(HOSTS)}; default: all"
     )
     _add_scenario(parser)
     add_options(parser, Request, "kind")
     parser.add_argument(
-        "--steps", type=int, default=5000, metavar="N", help="how many; default: 5000"
+        "--steps", type=int, default=5000, metavar="N", help="number of steps; default: 5000"
     )
     parser.set_defaults(action=_hosts)
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu verify`."""
-    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="with a column `time`")
+    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="table with a column `time`")
     _add_scenario(parser)
     parser.add_argument(
         "--tolerance",
         type=float,
         default=1e-6,
-        help="relative to the larger of one and the port's largest value; default: 1e-6",
+        help="largest deviation, relative to the larger of 1 and the port's largest value; "
+        "default: 1e-6",
     )
     parser.add_argument(
         "--order",
-        type=order_of,
+        type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help="in which the tool steps the components, or the names of all of them; default: "
-        f"{' and '.join(ORDERS)}, the one that fits",
+        help="order in which the tool steps the components, or the names of all of them; default: "
+        f"the better match of {' and '.join(ORDERS)}",
     )
     parser.add_argument(
         "--initial",
         choices=_INITIAL,
         default=_INITIAL[0],
-        help="whether the tool exchanges values in initialisation mode, or not before the first "
-        f"step; default: {_INITIAL[0]}",
+        help="full: the tool exchanges values in initialisation mode; none: only just before the "
+        f"first step; default: {_INITIAL[0]}",
     )
     parser.add_argument(
         "--verbose", action="store_true", help="name every column that was not compared"
@@ -111,11 +112,11 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    scenario, system = read(options, options.fmi)
+    scenario, system = read_system(options, options.fmi)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
         # What names no end is written without one.
-        stop_time=None if ends else (system.start_time or 0.0) + SOME_TIME,
+        stop_time=None if ends else (system.start_time or 0.0) + FALLBACK_STOP_TIME,
         step=options.step,
         parameters=assignments(options),
         strict=options.strict,
@@ -131,8 +132,8 @@ def _export(options: argparse.Namespace) -> int:
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
     folder = options.out or Path("exports", prepared.scenario.stem)
-    with replaced(folder, force=options.force) as unfinished:
-        written = FORMATS[options.format](system, unfinished)
+    with replace_files(folder, force=options.force) as unfinished:
+        written = EXPORT_FORMATS[options.format](system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))
     return OK

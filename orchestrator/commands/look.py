@@ -8,16 +8,23 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from orchestrator.commands.options import add_options, add_set, add_system, read, request, status
+from orchestrator.commands.options import (
+    add_options,
+    add_set,
+    add_system,
+    read_system,
+    request,
+    status,
+)
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
-from orchestrator.figures.plot import plot, wanted
+from orchestrator.figures.plot import plot, wanted_columns
 from orchestrator.figures.style import Drawn, save
-from orchestrator.figures.view import page
+from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Observer, Progress
-from orchestrator.runs.folder import VIEW, replaced
+from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
@@ -38,7 +45,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="RESULT|PATTERN",
         help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
-        "default: errors, commands and estimates",
+        "default patterns: errors, commands and estimates",
     )
     _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
@@ -81,7 +88,7 @@ def _plot(options: argparse.Namespace) -> int:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
     for path in paths:
         _warn(table_in(path))
-    runs = [read_result(path, lambda columns: wanted(columns, patterns)) for path in paths]
+    runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
     tables = (run.result for run in runs)
     figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
     with _written([options.out], options.force) as folder:
@@ -136,7 +143,7 @@ def _view(options: argparse.Namespace) -> int:
     title = str(read_record(file).get("title") or run.label)
     shown = list(_of_vehicles(run, out, title))
     try:
-        pages = {file.name: page(heading, one) for one, file, heading in shown}
+        pages = {file.name: view_page(heading, one) for one, file, heading in shown}
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
     with _written([file for _, file, _ in shown], options.force) as folder:
@@ -153,7 +160,7 @@ def _of_vehicles(run: Drawn, path: Path, title: str) -> Iterator[tuple[Drawn, Pa
 
 
 def _animate(options: argparse.Namespace) -> int:
-    scenario, system = read(options)
+    scenario, system = read_system(options)
     out = options.out or Path("results", f"{scenario.stem}.gif")
     check_film(out, options.fps)
     prepared = prepare(scenario, system, request(options))
@@ -175,7 +182,7 @@ def _animate(options: argparse.Namespace) -> int:
 def _written(files: Sequence[Path], force: bool) -> Iterator[Path]:
     """A folder to write files into that then lie in theirs, whole or not at all; says where."""
     names = [file.name for file in files]
-    with replaced(files[0].parent, names, force=force) as unfinished:
+    with replace_files(files[0].parent, names, force=force) as unfinished:
         yield unfinished
     for file in files:
         show(file)

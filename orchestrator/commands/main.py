@@ -1,4 +1,4 @@
-"""The entry point of `auv-fmu`, which imports what a command needs once that is named."""
+"""The entry point of `auv-fmu`, which imports only what the named command needs."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ COMMANDS = {
     "list": ("build", "list the scenarios"),
     "gains": ("build", "check the conditions of Theorems 1 and 2"),
     "run": ("run_command", "run a scenario, a scenario file or an SSP"),
-    "check": ("check", "say all that is wrong with an FMU, an SSP, a scenario or a study"),
-    "sweep": ("many_runs", "make the runs of a study, or those that are missing"),
+    "check": ("check", "list everything wrong with an FMU, an SSP, a scenario or a study"),
+    "sweep": ("many_runs", "make the runs of a study that are still missing"),
     "plot": ("look", "draw any signals of stored results"),
-    "view": ("look", "write a page to turn a stored result and play it"),
+    "view": ("look", "write a page that plays a stored result in 3D"),
     "animate": ("look", "write a film of a scenario"),
-    "new": ("build", "begin something of your own"),
+    "new": ("build", "start a controller of your own"),
     "report": ("many_runs", "run all scenarios and compare with the paper"),
     "table": (
-        "many_runs", "hold the printed table of section 4.2 against all that the paper leaves open"
+        "many_runs", "compare the printed table of section 4.2 with every reading of the paper"
     ),
     "export": ("exchange", "write a scenario for other tools"),
     "hosts": ("exchange", "run a scenario in other co-simulation tools"),
@@ -55,7 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # Where it can keep no fonts it says so at length, and draws all the same.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
-    streams.fill()
+    streams.fill_streams()
     status = OK
     try:
         with orderly_end(arguments is None), warnings.catch_warnings():
@@ -106,15 +106,15 @@ def _check_no_empty(arguments: Sequence[str]) -> None:
         if not argument:
             raise InputError(f"the argument after {before} is empty")
         if re.fullmatch(r"--[\w-]+=", argument):
-            raise InputError(f"{argument} says nothing")
+            raise InputError(f"{argument} has no value")
 
 
 def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """The parser of the command line.
 
     Args:
-        given: arguments; of commands that are not among them only the help is there, as to import
-            what a command needs takes up to a second.
+        given: arguments; other commands have only their help, because importing all that a
+            command needs takes up to a second.
 
     """
     parser = argparse.ArgumentParser(

@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from orchestrator.commands.options import add_options, add_out, taken
+from orchestrator.commands.options import add_options, add_out, from_options
 from orchestrator.commands.streams import INTERRUPTED, OK, say, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
@@ -14,7 +14,7 @@ from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
-from orchestrator.studies.sweep import Means, folder_of, swept
+from orchestrator.studies.sweep import Means, complete_study, study_folder
 
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
@@ -34,13 +34,13 @@ def add_report(parser: argparse.ArgumentParser) -> None:
         "scenarios",
         nargs="*",
         metavar="FILE.toml",
-        help="a scenario file to be in the report beside those of `auv-fmu list`",
+        help="a scenario file to include in the report, besides the ones of `auv-fmu list`",
     )
     parser.add_argument(
         "--studies",
         action="store_true",
-        help="hold the printed table against every reading as well, and make the ready studies, "
-        "or what is missing of them",
+        help="also compare the printed table with every reading, and make the missing runs of the "
+        "ready studies",
     )
     add_options(parser, Request, "kind")
     add_out(parser, Path("results", "report"))
@@ -57,11 +57,13 @@ def add_table(parser: argparse.ArgumentParser) -> None:
 
 def _sweep(options: argparse.Namespace) -> int:
     study = read_study(options.study)
-    folder = folder_of(study, options.out)
+    folder = study_folder(study, options.out)
     try:
-        result = swept(study, taken(Means, options), folder, options.command, say, progress=True)
+        result = complete_study(
+            study, from_options(Means, options), folder, options.command, say, progress=True
+        )
     except KeyboardInterrupt:
-        say(f"interrupted; {folder} keeps what is done: the same command goes on from there")
+        say(f"interrupted; {folder} keeps the finished runs: the same command goes on from there")
         return INTERRUPTED
     show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
     show(f"written to {folder}{os.sep}")

@@ -1,4 +1,4 @@
-"""Options that several commands have, what they stand for, and what is said of a run's end."""
+"""Options that several commands share, their meaning, and the report of a run's end."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from fmus.kinds import FMI_VERSIONS, NATIVE
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.observers.observer import Ending
-from orchestrator.runs.loading import loaded
-from orchestrator.runs.request import Request, flag, options_of
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.request import Request, flag, option_fields
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -25,8 +25,8 @@ def add_system(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "scenario",
         metavar="SCENARIO|FILE|DIR",
-        help="a scenario of `auv-fmu list`, a scenario file, an SSP or the folder of one that is "
-        "unpacked, an FMU, or libcosim's OspSystemStructure.xml",
+        help="a scenario of `auv-fmu list`, a scenario file, an SSP or the folder of an unpacked "
+        "one, an FMU, or libcosim's OspSystemStructure.xml",
     )
     add_variant(parser)
 
@@ -43,21 +43,21 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
 def add_options(parser: argparse.ArgumentParser, declared: type[Any], *names: str) -> None:
     """Add the fields of a dataclass that are options: the named ones, or all."""
     defaults = declared()
-    for name, one in options_of(declared).items():
+    for name, one in option_fields(declared).items():
         if not names or name in names:
             default = getattr(defaults, name)
             parser.add_argument(flag(name), default=default, help=one.help, **one.how)
 
 
-def taken(declared: type[T], options: argparse.Namespace) -> T:
-    """A dataclass from the options that are its fields; what has none keeps its default."""
+def from_options(declared: type[T], options: argparse.Namespace) -> T:
+    """Make a dataclass from the options that are its fields; other fields keep their defaults."""
     given = vars(options)
-    return declared(**{name: given[name] for name in options_of(declared) if name in given})
+    return declared(**{name: given[name] for name in option_fields(declared) if name in given})
 
 
 def request(options: argparse.Namespace) -> Request:
     """What the user asks for."""
-    return replace(taken(Request, options), parameters=assignments(options))
+    return replace(from_options(Request, options), parameters=assignments(options))
 
 
 def add_fmi(parser: argparse.ArgumentParser) -> None:
@@ -88,17 +88,17 @@ def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
     parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
 
 
-def read(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
-    """What is run; what is not as it should be, and does no harm, becomes a warning."""
+def read_system(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
+    """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
-    found = loaded(options.scenario, options.kind, fmi, options.variant, findings)
+    found = load_scenario(options.scenario, options.kind, fmi, options.variant, findings)
     for note in findings.notes:
         say(f"warning: {note}")
     return found
 
 
 def status(name: str, ending: Ending) -> int:
-    """Exit status of a run, after saying what has happened, and what went wrong in it."""
+    """Exit status of a run, after saying what happened and what went wrong in it."""
     failure = ending.failure or ""
     for message in ending.messages:
         if not failure.endswith(f": {message}"):

@@ -16,10 +16,10 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     add_system,
-    read,
+    from_options,
+    read_system,
     request,
     status,
-    taken,
 )
 from orchestrator.commands.streams import say, show
 from orchestrator.machine.errors import Findings
@@ -42,7 +42,7 @@ def add_run(parser: argparse.ArgumentParser) -> None:
 
 def _run(options: argparse.Namespace) -> int:
     wanted = request(options)
-    runs = with_companion(prepare(*read(options), wanted), wanted)
+    runs = with_companion(prepare(*read_system(options), wanted), wanted)
     findings = Findings(options.strict)
     for prepared in runs:
         for doubt in prepared.doubts():
@@ -51,7 +51,7 @@ def _run(options: argparse.Namespace) -> int:
     for note in findings.notes:
         say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
-    files = taken(Files, options)
+    files = from_options(Files, options)
     # Until all is written: a user who stops a run several times wants to know where its rows are.
     with held_interrupts(_answer, is_last=True):
         finished = run_into(folder, runs, files, options.command, say)
@@ -61,7 +61,7 @@ def _run(options: argparse.Namespace) -> int:
                 show(f"  {note}")
         show(f"written to {finished[0].folder}{os.sep}")
         if finished[0].folder != folder:
-            say(f"{folder} keeps the whole result that was there before")
+            say(f"{folder} keeps the complete result from before")
     return max(status(run.name, run.ending) for run in finished)
 
 

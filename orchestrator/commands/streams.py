@@ -1,4 +1,4 @@
-"""What the command line says: lines, and its exit status; streams may be closed or full."""
+"""What the command line says: lines, and its exit status. Streams may be closed or full."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from contextlib import suppress
 from typing import TextIO
 
-from orchestrator.machine.errors import plain, shortened
+from orchestrator.machine.errors import escape_unprintable, shortened
 
 #: Exit status: done, a simulation failed, bad usage or input, ended by the user.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
@@ -17,10 +17,10 @@ _LONGEST = 4000
 
 
 class Unheard(Exception):
-    """Standard output cannot be written, which has been said."""
+    """Standard output cannot be written, and the user has been told."""
 
 
-def fill() -> None:
+def fill_streams() -> None:
     """Put the null device where a standard stream is closed.
 
     The next file that is opened would take its place, and get what is printed.
@@ -37,7 +37,9 @@ def fill() -> None:
 def say(text: str) -> None:
     """A line for the user beside the output."""
     with suppress(OSError):
-        print(shortened(f"auv-fmu: {plain(text)}", _LONGEST), file=sys.stderr, flush=True)
+        print(
+            shortened(f"auv-fmu: {escape_unprintable(text)}", _LONGEST), file=sys.stderr, flush=True
+        )
 
 
 def show(*lines: object) -> None:
@@ -49,7 +51,7 @@ def show(*lines: object) -> None:
     """
     try:
         for line in lines:
-            print(plain(str(line)))
+            print(escape_unprintable(str(line)))
     except OSError as error:
         _give_up(sys.stdout, error)
         raise Unheard from error

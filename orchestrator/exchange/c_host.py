@@ -15,17 +15,17 @@ from orchestrator.machine.children import COMPILERS, LIMIT_OF_ZIG, machines_comp
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import binary_of
-from orchestrator.master.plan import gathered, stages
+from orchestrator.master.plan import gathered_connections, stages
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.values import Value
 
 #: The program.
-SOURCE = Path(__file__).with_name("host.c")
+HOST_SOURCE = Path(__file__).with_name("host.c")
 
 #: What the host is compiled with, and what it writes.
-PLAN, TABLE = "plan.h", "table.csv"
+PLAN_FILE, TABLE_FILE = "plan.h", "table.csv"
 
 #: Where the library of an unpacked FMU is.
 LibraryOf = Callable[[Component], Path]
@@ -36,7 +36,7 @@ def _library_of(component: Component) -> Path:
     return binary_of(component, component.folder)
 
 
-def compiled(
+def compile_host(
     folder: Path,
     system: System,
     experiment: Experiment,
@@ -61,20 +61,20 @@ def compiled(
     found = command or (machines_compiler(),)
     if found[0] is None:
         raise InputError(f"there is no C compiler: neither {' nor '.join(COMPILERS)}")
-    (folder / PLAN).write_text(_plan(system, experiment, library), encoding="utf-8")
+    (folder / PLAN_FILE).write_text(_plan(system, experiment, library), encoding="utf-8")
     program = folder / name
     is_windows = program.suffix == ".exe"
     # For Windows as the libraries: ziglang makes a C library for every level, which takes minutes.
     options = ["-std=c99", "-ffp-contract=off", "-Os" if is_windows else "-O2", f"-I{folder}"]
-    options += ["-o", str(program), str(SOURCE)]
+    options += ["-o", str(program), str(HOST_SOURCE)]
     if not is_windows:
-        options.append("-ldl")  # until glibc 2.34, dlopen is in a library of its own
+        options.append("-ldl")  # until glibc 2.34, dlopen is in a separate library
     try:
         process = run_compiler([*found, *options], LIMIT_OF_ZIG if command else None)
     except OSError as error:
-        raise InputError(f"{SOURCE.name} does not compile: {reason(error)}") from error
+        raise InputError(f"{HOST_SOURCE.name} does not compile: {reason(error)}") from error
     if process.returncode != 0:
-        raise InputError(f"{SOURCE.name} does not compile: {last_line(process.stderr)}")
+        raise InputError(f"{HOST_SOURCE.name} does not compile: {last_line(process.stderr)}")
     return program
 
 
@@ -108,7 +108,7 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
             parameters.append(_setting(f"&fmus[{number}]", component.variable(parameter), value))
     copies: list[Connection] = []
     found, first = [], 0
-    takings = [system.connections, *gathered(system, parts)]
+    takings = [system.connections, *gathered_connections(system, parts)]
     for names, taken in zip([[], *parts], takings, strict=True):
         at = len(copies)
         copies += taken
@@ -120,7 +120,7 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     connections, *stepped = found
     return f"""\
 enum {{ FMUS = {len(fmus)}, COLUMNS = {len(columns)} }};
-static const double STEP = {experiment.step!r};
+static const double START = {experiment.start_time!r}, STEP = {experiment.step!r};
 static const char header[] = {_text(",".join(("time", *map(str, columns))))};
 static double row[COLUMNS];
 static const reference references[] = {_listed(references)};
@@ -161,14 +161,14 @@ def _setting(fmu: str, variable: ScalarVariable, value: Value) -> str:
             return f'set_integer({fmu}, "{name}", {variable.valueReference}, {int(value)});'
 
 
-def run(
+def run_host(
     command: Sequence[str | Path], folder: Path, steps: int, names: Sequence[str]
 ) -> tuple[np.ndarray, float]:
     """Run the host.
 
     Args:
         command: that starts it.
-        folder: where it is started, for :data:`TABLE`.
+        folder: where it is started, for :data:`TABLE_FILE`.
         steps: how many.
         names: of the columns that are wanted.
 
@@ -180,11 +180,11 @@ def run(
 
     """
     process = subprocess.run(
-        [*command, str(steps), TABLE],
+        [*command, str(steps), TABLE_FILE],
         cwd=folder, capture_output=True, text=True, errors="replace", check=False,
     )  # fmt: skip
     if process.returncode != 0:
         raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
-    columns = read_columns(folder / TABLE)
-    rows = np.vstack([*read_rows(folder / TABLE)])
+    columns = read_columns(folder / TABLE_FILE)
+    rows = np.vstack([*read_rows(folder / TABLE_FILE)])
     return rows[:, [1 + columns.index(name) for name in names]], float(process.stdout)

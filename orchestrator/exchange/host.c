@@ -133,7 +133,7 @@ static void initialise(double stop_time) {
     for (size_t i = 0; i < FMUS; i++) {
         const fmu *of = &fmus[i];
         CALL(of, "fmi2SetupExperiment", (void *, int, double, double, int, double), of->instance,
-             0, 0.0, 0.0, 1, stop_time);
+             0, 0.0, START, 1, stop_time);
         CALL(of, "fmi2EnterInitializationMode", (void *), of->instance);
         read_reals(of, &of->inputs);
     }
@@ -180,17 +180,18 @@ static void end(void) {
 }
 
 int main(int n, char **arguments) {
-    run all = {stages, row, sizeof stages / sizeof *stages, COLUMNS, 0.0, STEP, 0.0, 0, 0};
+    run all = {stages, row, sizeof stages / sizeof *stages, COLUMNS, START, STEP, 0.0, 0, 0};
     block table = {NULL, 0, 1};
     clock_t start;
     if (n != 3) fail("usage: host STEPS TABLE", "host");
     all.full_steps = all.steps = strtoul(arguments[1], NULL, 10);
-    all.stop_time = (double)all.steps * STEP;
+    all.stop_time = START + (double)all.steps * STEP;
     table.most = all.steps + 1;
     table.rows = calloc(table.most, (1 + COLUMNS) * sizeof *table.rows);
     if (table.rows == NULL) fail("too many rows", arguments[1]);
     initialise(all.stop_time);
-    memcpy(table.rows + 1, row, COLUMNS * sizeof *row); /* the first, at time 0 */
+    table.rows[0] = START;
+    memcpy(table.rows + 1, row, COLUMNS * sizeof *row);
     start = clock();
     make_steps(&all, &table);
     start = clock() - start;

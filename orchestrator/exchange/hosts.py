@@ -1,7 +1,7 @@
-"""Other co-simulation tools as hosts of the bundle, held against our own Jacobi master.
+"""Other co-simulation tools as hosts of the bundle, compared with our own Jacobi master.
 
-Every host runs in a process of its own, `python -m orchestrator.exchange.hosts HOST FOLDER STEPS
-STEP`: some leave threads behind or end the process when something is wrong.
+Every host runs in a separate process, `python -m orchestrator.exchange.hosts HOST FOLDER STEPS
+STEP`: some leave threads running or end the process when something is wrong.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.system.structure import System
 
 #: How long a host may take for a run before it is given up [s].
@@ -60,7 +60,7 @@ class Host:
 
     Attributes:
         package: that it comes from.
-        run: (system, folder of the export, steps, step) -> what came of it.
+        run: (system, folder of the export, experiment) -> what came of it.
         bound: largest deviation from our Jacobi master that is expected.
         compared: how the names of the ports begin that are compared.
         why: what makes it deviate, if more than rounding does.
@@ -68,7 +68,7 @@ class Host:
     """
 
     package: str
-    run: Callable[[System, Path, int, float], Ran]
+    run: Callable[[System, Path, Experiment], Ran]
     bound: float = 1e-9
     compared: tuple[str, ...] = ("",)
     why: str = ""
@@ -114,10 +114,12 @@ def _names(system: System, between: str = ".") -> list[str]:
     return [f"{component}{between}{port}" for component, port, _ in _real_outputs(system)]
 
 
-def _stepped(step: Callable[[], object], read: Callable[[], list[float]], steps: int) -> Ran:
+def _stepped(
+    step: Callable[[], object], read: Callable[[], list[float]], experiment: Experiment
+) -> Ran:
     """Step a tool that is read after each step."""
     rows, seconds, reading = [], 0.0, 0.0
-    for _ in range(steps):
+    for _ in range(experiment.rows - 1):
         start = perf_counter()
         step()
         stepped = perf_counter()
@@ -127,7 +129,7 @@ def _stepped(step: Callable[[], object], read: Callable[[], list[float]], steps:
     return Ran(np.array(rows), seconds, reading)
 
 
-def _libcosim(system: System, steps: int, opener: str, **path: str) -> Ran:
+def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) -> Ran:
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
     from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
@@ -152,55 +154,64 @@ def _libcosim(system: System, steps: int, opener: str, **path: str) -> Ran:
             for value in observer.last_real_values(index[name], wanted)
         ]
 
-    return _stepped(one, read, steps)
+    return _stepped(one, read, experiment)
 
 
-def _libcosim_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
+def _libcosim_ssp(system: System, folder: Path, experiment: Experiment) -> Ran:
     [path] = write_ssp(system, folder)
-    return _libcosim(system, steps, "from_ssp_file", ssp_path=str(path))
+    return _libcosim(system, experiment, "from_ssp_file", ssp_path=str(path))
 
 
-def _libcosim_osp(system: System, folder: Path, steps: int, step: float) -> Ran:
+def _libcosim_osp(system: System, folder: Path, experiment: Experiment) -> Ran:
     write_osp(system, folder)
-    return _libcosim(system, steps, "from_osp_config_file", osp_path=str(folder))
+    return _libcosim(system, experiment, "from_osp_config_file", osp_path=str(folder))
 
 
-def _ecos(system: System, folder: Path, steps: int, step: float) -> Ran:
+def _ecos(system: System, folder: Path, experiment: Experiment) -> Ran:
+    if experiment.start_time != 0.0:
+        # It tells the FMUs a start time, and then steps them from 0 s.
+        raise InputError(f"ecos runs from 0 s only, not from {experiment.start_time:g} s")
     # ecospy needs libtbb, which the wheel tbb puts where the loader does not look.
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy = importlib.import_module("ecospy")
     [path] = write_ssp(system, folder)
     names = _names(system, "::")
-    with ecospy.EcosSimulation(step_size=step, ssp_path=str(path)) as simulation:
+    with ecospy.EcosSimulation(step_size=experiment.step, ssp_path=str(path)) as simulation:
         simulation.init(**({"parameter_set": PARAMETER_SET} if system.parameters else {}))
-        return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], steps)
+        return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], experiment)
 
 
-def _fmpy_ssp(system: System, folder: Path, steps: int, step: float) -> Ran:
+def _fmpy_ssp(system: System, folder: Path, experiment: Experiment) -> Ran:
     # fmpy.ssp ignores parameter bindings and Boolean connectors without a start value.
     [path] = write_ssp(replace(system, parameters={}), folder)
+    start_time, step = experiment.start_time, experiment.step
     start = perf_counter()
     # It accumulates its time, so the last step may be there or not: ask for half a step more.
-    table = simulate_ssp(str(path), stop_time=(steps + 0.5) * step, step_size=step)
+    table = simulate_ssp(str(path), start_time, experiment.stop_time + 0.5 * step, step)
     seconds = perf_counter() - start
     # Its row at a time has the outputs of the step that begins there.
-    return Ran(np.column_stack([table[name] for name in _names(system)])[:steps], seconds)
+    rows = np.column_stack([table[name] for name in _names(system)])
+    return Ran(rows[: experiment.rows - 1], seconds)
 
 
-def _container(system: System, folder: Path, steps: int, step: float) -> Ran:
+def _container(system: System, folder: Path, experiment: Experiment) -> Ran:
     [path] = write_container(system, folder)
     start = perf_counter()
     table = fmpy.simulate_fmu(
-        str(path), stop_time=steps * step, step_size=step, output_interval=step
+        str(path),
+        start_time=experiment.start_time,
+        stop_time=experiment.stop_time,
+        step_size=experiment.step,
+        output_interval=experiment.step,
     )
     seconds = perf_counter() - start
     return Ran(np.column_stack([table[name] for name in _names(system)])[1:], seconds)
 
 
-def _c_program(system: System, folder: Path, steps: int, step: float) -> Ran:
-    program = c_host.compiled(folder, system, Experiment(steps * step, step, "jacobi"))
-    rows, seconds = c_host.run([program], folder, steps, _names(system))
+def _c_program(system: System, folder: Path, experiment: Experiment) -> Ran:
+    program = c_host.compile_host(folder, system, experiment)
+    rows, seconds = c_host.run_host([program], folder, experiment.rows - 1, _names(system))
     return Ran(rows[1:], seconds)
 
 
@@ -232,11 +243,15 @@ def compare(system: System, hosts: Sequence[str], steps: int, step: float) -> li
 
     """
     expected = Table()
-    start = system.start_time or 0.0
-    completed(planned(system, Experiment(start + steps * step, step, "jacobi", start)), [expected])
+    simulate_to_end(make_plan(system, _experiment(system, steps, step)), [expected])
     names = _names(system)
     table = expected.group(*names)[1:]
     return [_verdict(system, host, steps, step, names, table) for host in hosts]
+
+
+def _experiment(system: System, steps: int, step: float) -> Experiment:
+    start = system.start_time or 0.0
+    return Experiment(start + steps * step, step, "jacobi", start)
 
 
 def _verdict(
@@ -280,7 +295,8 @@ def _child(host: str, folder: Path, steps: int, step: float) -> None:
     system = read_ssp(folder / "given.ssp")
     export = folder / "export"
     export.mkdir()
-    ran = HOSTS[host].run(replace(system, name="auv"), export, steps, step)
+    experiment = _experiment(system, steps, step)
+    ran = HOSTS[host].run(replace(system, name="auv"), export, experiment)
     np.savez(folder / "rows.npz", **ran._asdict())
 
 

@@ -20,12 +20,12 @@ from orchestrator.master.experiment import (
     Exchange,
     Experiment,
     Order,
-    written_order,
+    format_order,
 )
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.plan import check_order, planned
-from orchestrator.master.simulation import completed
+from orchestrator.master.plan import check_order, make_plan
+from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
@@ -91,7 +91,7 @@ def verify(
 
     """
     if not 0.0 <= tolerance < 1.0:
-        raise InputError(f"tolerance {tolerance:g}: must not be negative, and less than 1")
+        raise InputError(f"tolerance {tolerance:g}: must be at least 0 and less than 1")
     if order is not None:
         check_order(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
     outputs = {
@@ -110,7 +110,7 @@ def verify(
         raise InputError(f"{path}: has no row after t = 0")
     if not table.columns:
         raise InputError(
-            f"{path}: no column is named after an output; they are named as {min(outputs)}"
+            f"{path}: no column is named after an output; outputs are named like {min(outputs)}"
         )
     complaints = []
     for way in _ways(system, order, at_start):
@@ -126,14 +126,14 @@ def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Algor
     start = "" if at_start else ", no values exchanged in initialisation mode"
     exchange = Exchange(at_start)
     if not (order is None or isinstance(order, str)):
-        words = f"in the order {written_order(order)}"
+        words = f"in the order {format_order(order)}"
         latest = exchange._replace(latest=True)
         yield Algorithm(order, None, latest, f"{words}, each with the latest outputs{start}")
     # Other tools solve rings, or delay them.
     for coupling in (None, DELAY) if rings(system) else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)
         for one in ORDERS if order is None else (order,):
-            named = written_order(one)
+            named = format_order(one)
             words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
             yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
 
@@ -145,7 +145,7 @@ def _complaint(table: ForeignTable, system: System, way: Algorithm, tolerance: f
     try:
         step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
         experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
-        completed(planned(system, experiment), [ours], way.exchange)
+        simulate_to_end(make_plan(system, experiment), [ours], way.exchange)
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)
@@ -197,7 +197,7 @@ def _first_difference(
         accepted = tolerance * max(1.0, float(np.abs(expected).max()))
         # What is shown before the first step depends on how a tool exchanges initial values.
         with np.errstate(over="ignore"):
-            # A value that is no number differs.
+            # A value that is not a number differs.
             wrong = np.flatnonzero(~(np.abs(column - expected) <= accepted) & (time > 0.0))
         if len(wrong) and (first is None or time[wrong[0]] < first[0]):
             k = wrong[0]
@@ -224,13 +224,13 @@ def _certificate(
     )
     if table.repeated:
         rows = "row that has" if table.repeated == 1 else "rows that have"
-        yield f"passed over: {table.repeated} {rows} the time of the row before"
+        yield f"skipped: {table.repeated} {rows} the time of the row before"
     if len(times) < len(table.time):
         yield "not compared: the row at t = 0, which tools fill in different ways"
     if system.stop_time is not None and times[-1] < system.stop_time:
-        yield f"not compared: what follows until the system's stop time of {system.stop_time:g} s"
+        yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are no outputs: {_listed(table.others, verbose)}"
+        yield f"not compared: columns that are not outputs: {_listed(table.others, verbose)}"
     if absent := [name for name in outputs if name not in table.columns]:
         yield f"not in the table: {_listed(absent, verbose)}"
 
@@ -306,7 +306,7 @@ def _table(
             raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
         if len(time) > 1 and time[-1] < time[-2]:
             raise ValueError(
-                f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; it must not fall"
+                f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; times must not decrease"
             )
         for port, place in places.items():
             columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))

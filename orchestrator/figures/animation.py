@@ -21,7 +21,7 @@ from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading, style
 from orchestrator.figures.view import PAINT, Z_UP, body
 from orchestrator.figures.visible import moving_mean
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle.signals import Loop, parameter, true_control_point
+from orchestrator.vehicle.signals import Loop, real_parameter, true_control_point
 
 FRAMES_PER_SECOND = 20
 
@@ -166,7 +166,7 @@ class _Scene:
         self._euler = table.group(*loop.attitude)
         self._y_d = None if table.missing(loop.y_d) else table.group(*loop.y_d) * self._turn
         self._body = body()
-        nearest = _NEAREST * parameter(table, loop.ell)
+        nearest = _NEAREST * real_parameter(table, loop.ell)
         middle, width = self._y, np.full(len(self._y), nearest)
         if self._y_d is not None:
             middle = 0.5 * (self._y + self._y_d)
@@ -197,7 +197,7 @@ class _Scene:
         ]  # fmt: skip
 
     def artists(self, row: int) -> list[Any]:
-        """What is to be drawn at a row, from back to front."""
+        """What to draw at a row, from back to front."""
         middle, width = self._middle[row], float(self._width[row, 0])
         camera = _Camera.at(middle, width)
         spacing = self._show_ground(camera, middle, width)

@@ -20,15 +20,15 @@ from matplotlib.transforms import Transform
 from fmus.ports.quantities import TAU
 from orchestrator.figures.style import (
     COLOURS,
+    FIGURE_WIDTH,
     REFERENCE,
     STYLES,
-    WIDTH,
     Drawn,
     earth_axes,
-    having,
+    escape_math,
     heading,
-    plain,
     printed_unit,
+    runs_with,
     styled,
 )
 from orchestrator.figures.visible import draw_signal, mean_window
@@ -137,7 +137,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
         return None, runs[0].lacks(panels[0].needs)
     heights = [max(panel.height for panel in row) for row in drawn]
     with styled():
-        figure = Figure(figsize=(WIDTH, sum(heights) + _HEADING * bool(title)))
+        figure = Figure(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
         if title:
             figure.suptitle(heading(title), wrap=True)
         columns = lcm(*map(len, drawn))
@@ -165,15 +165,15 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Paths of control points and their reference in three dimensions."""
     axes = cell.axes(projection="3d")
     paths = []
-    for run, _ in list(having(runs, Loop.for_reference))[:1]:
+    for run, _ in list(runs_with(runs, Loop.for_reference))[:1]:
         paths.append(run.result.group(*run.loop.y_d))
         axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
         axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="its start")
-    shown = list(having(runs, Loop.for_control_point))
+    shown = list(runs_with(runs, Loop.for_control_point))
     for i, (run, colour) in enumerate(shown):
         y = true_control_point(run.result, run.loop)
         paths.append(y)
-        label = plain(run.label) if len(shown) > 1 else "control point"
+        label = escape_math(run.label) if len(shown) > 1 else "control point"
         axes.plot(*y.T, color=colour, linewidth=_THIN if i else _THICK, label=label)
         # Rings around each other: vehicles that start together stay to be seen.
         axes.scatter(
@@ -228,13 +228,13 @@ def draw_lines(
         if twin is None:
             line: Any = {"color": COLOURS[i], "linestyle": STYLES[i], "label": label}
         else:
-            line = {"color": "black", "linewidth": 0.7, "label": None if i else plain(twin)}
+            line = {"color": "black", "linewidth": 0.7, "label": None if i else escape_math(twin)}
         axes.plot(time, column, **line)
 
 
 def draw_all_errors(axes: Axes, runs: Sequence[Drawn]) -> None:
     """The three tracking errors of some runs in one panel."""
-    for i, (run, _) in enumerate(having(runs, Loop.for_tracking)):
+    for i, (run, _) in enumerate(runs_with(runs, Loop.for_tracking)):
         errors, twin = tracking_error(run.result, run.loop), run.label if i else None
         draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
     axes.set_ylabel("error [m]")
@@ -278,7 +278,7 @@ def _mark_events(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
             axes.axvline(time, color="0.35", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
         is_late = time - start > _LATE * (end - start)
         panels[0].annotate(
-            plain(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
+            escape_math(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
             xytext=(-2 if is_late else 2, 2), textcoords="offset points",
             ha="right" if is_late else "left", va="bottom", fontsize="small",
             bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
@@ -297,7 +297,7 @@ def _make_room_below(axes: Axes) -> None:
 def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> None:
     """Tracking errors of some runs, an axis a panel."""
     panels = cell.stack(3)
-    for i, (run, colour) in enumerate(having(runs, Loop.for_tracking)):
+    for i, (run, colour) in enumerate(runs_with(runs, Loop.for_tracking)):
         errors = tracking_error(run.result, run.loop)
         for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
             axes.plot(run.result.time, error, **_line(i, run, colour))
@@ -314,15 +314,15 @@ def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> Non
 
 def _line(i: int, run: Drawn, colour: str) -> dict[str, Any]:
     """Of the run a figure is about, and, thin upon it, of those it is compared with."""
-    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": plain(run.label)}
+    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": escape_math(run.label)}
 
 
 def draw_commands(
     panels: Sequence[Axes], runs: Sequence[Drawn], name: str = "commanded control signals"
 ) -> None:
     """Commands of some runs and the limits of (3), an actuator a panel."""
-    shown = list(having(runs, Loop.for_commands))
-    limited = [run for run, _ in having(runs, Loop.for_limits)]
+    shown = list(runs_with(runs, Loop.for_commands))
+    limited = [run for run, _ in runs_with(runs, Loop.for_limits)]
     has_means = False
     for k, axes, unit in zip(range(3), panels, map(printed_unit, TAU.values()), strict=True):
         for i, (run, colour) in enumerate(shown):
@@ -359,7 +359,7 @@ def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit
     axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
     for label, peak in peaks.items():
         if peak > _BEYOND * max(upper, -lower):
-            who = f"peak of {plain(label)}" if len(runs) > 1 else "peak"
+            who = f"peak of {escape_math(label)}" if len(runs) > 1 else "peak"
             number = f"{peak:,.0f}" if peak < _MANY else f"{peak:.2g}"
             words += f", {who} {number} {unit}"
     _say(axes, words, upper, axes.get_yaxis_transform(), "bottom")

@@ -13,14 +13,22 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from orchestrator.figures.panels import over_time
-from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, plain, printed_unit, styled
+from orchestrator.figures.style import (
+    COLOURS,
+    FIGURE_WIDTH,
+    STYLES,
+    Drawn,
+    escape_math,
+    printed_unit,
+    styled,
+)
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table
 
 #: What is drawn where nothing is asked for, as far as it is there.
-DEFAULT = ("controller.e", "plant.tau", "controller.theta_hat")
+DEFAULT_PATTERNS = ("controller.e", "plant.tau", "controller.theta_hat")
 
 #: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
 _PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
@@ -33,7 +41,7 @@ _STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
 class Plot(Figure):
-    """A figure that a notebook shows by itself."""
+    """A figure that a notebook shows without a call."""
 
     def _repr_png_(self) -> bytes:
         image = BytesIO()
@@ -41,9 +49,9 @@ class Plot(Figure):
         return image.getvalue()
 
 
-def wanted(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
+def wanted_columns(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
     """The columns of a table that would be drawn."""
-    return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT)]
+    return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT_PATTERNS)]
 
 
 def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Figure:
@@ -62,7 +70,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
         raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
     names = list(dict.fromkeys(name for _, table in runs for name in table.columns))
     if not patterns:
-        patterns = [pattern for pattern in DEFAULT if wanted(names, [pattern])]
+        patterns = [pattern for pattern in DEFAULT_PATTERNS if wanted_columns(names, [pattern])]
     if not patterns:
         groups = dict.fromkeys(map(group_of, names))
         raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
@@ -73,7 +81,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
         unit = "" if name.endswith("]") else printed_unit(units.get(name, ""))
         panels.setdefault((group_of(name), unit), []).append(name)
     with styled():
-        figure = Plot(figsize=(WIDTH, _MARGIN + _PANEL * len(panels)))
+        figure = Plot(figsize=(FIGURE_WIDTH, _MARGIN + _PANEL * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         has_means = [
             _draw_panel(place, group, unit, members, runs)
@@ -125,7 +133,9 @@ def _draw_panel(
                 partial(_column, member),
                 color=COLOURS[colour],
                 linestyle=_style(i if len(runs) > 1 else j),
-                label=", ".join([parts[j]] * (len(members) > 1) + [plain(run)] * (len(runs) > 1)),
+                label=", ".join(
+                    [parts[j]] * (len(members) > 1) + [escape_math(run)] * (len(runs) > 1)
+                ),
             )
     name = group if len(members) > 1 else members[0]
     axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
@@ -142,7 +152,7 @@ def _draw_panel(
 
 def _line(label: str, colour: str, style: int) -> Line2D:
     """A line for a legend."""
-    return Line2D([], [], color=colour, linestyle=_style(style), label=plain(label))
+    return Line2D([], [], color=colour, linestyle=_style(style), label=escape_math(label))
 
 
 def _style(i: int) -> Any:

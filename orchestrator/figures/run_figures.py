@@ -30,11 +30,11 @@ from orchestrator.figures.panels import (
 )
 from orchestrator.figures.style import (
     COLOURS,
-    FORMATS,
+    FIGURE_FORMATS,
     Drawn,
     earth_axes,
-    having,
     printed_unit,
+    runs_with,
     save,
 )
 from orchestrator.figures.visible import draw_signal
@@ -55,7 +55,7 @@ def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
 def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes = cell.axes()
     labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in THETA.items()]
-    for i, (run, _) in enumerate(having(runs, Loop.for_parameter_estimates)):
+    for i, (run, _) in enumerate(runs_with(runs, Loop.for_parameter_estimates)):
         estimates = run.result.step_values(*run.loop.theta_hat)
         draw_lines(axes, run.result.step_start, estimates, labels, run.label if i else None)
     axes.set_ylabel("estimate")
@@ -65,7 +65,7 @@ def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
 
 def _estimated_velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
     """True and estimated velocity of the control point."""
-    run, _ = next(having(runs, Loop.for_velocity_estimates))
+    run, _ = next(runs_with(runs, Loop.for_velocity_estimates))
     time, true = run.result.step_start, run.result.start_values(*run.loop.dy)
     panels = cell.stack(3)
     has_means = False
@@ -80,7 +80,7 @@ def _estimated_velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
 
 def _velocity_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Estimated less true velocity of the control point."""
-    run, _ = next(having(runs, Loop.for_velocity_estimates))
+    run, _ = next(runs_with(runs, Loop.for_velocity_estimates))
     panels = cell.stack(3)
     has_means = False
     for k, axes, estimate, truth in zip(AXES, panels, run.loop.dy_hat, run.loop.dy, strict=True):
@@ -109,7 +109,7 @@ def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
 
     def draw(cell: Cell, runs: Sequence[Drawn]) -> None:
         axes = cell.axes(ylabel=f"acceleration [{unit}²]" if is_rate else f"velocity [{unit}]")
-        run, _ = next(having(runs, needs))
+        run, _ = next(runs_with(runs, needs))
         columns = run.loop.nu[directions]
         time, values = run.result.time, run.result.group(*columns)
         if is_rate:
@@ -128,7 +128,7 @@ def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes.set_aspect("equal", adjustable="datalim")
     if runs[0].z_up:
         axes.invert_xaxis()
-    for run, colour in having(runs, Loop.for_control_point):
+    for run, colour in runs_with(runs, Loop.for_control_point):
         path = true_control_point(run.result, run.loop)
         axes.plot(path[:, 1], path[:, 0], color=colour)
         axes.plot(path[0, 1], path[0, 0], "o", color=colour)
@@ -158,7 +158,7 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
     "comparison-errors": {"": ((ERRORS, LOGARITHMIC_ERRORS),)},
     # Fig. 7 in one: any number of runs.
     "overlay": {"": ((ERRORS, COMMANDS),)},
-    # Fig. 3(a): the vehicle alone.
+    # Fig. 3(a): only the vehicle.
     "open-loop-surge": {
         "": (
             (PATH,),
@@ -221,7 +221,7 @@ def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> l
         f"{stem}{vehicle}{suffix}.{ending}"
         for vehicle in suffixes(loops).values()
         for suffix in FIGURES[kind]
-        for ending in FORMATS
+        for ending in FIGURE_FORMATS
     ]
 
 
@@ -280,7 +280,7 @@ def _drawn(
         figure, left_out = compose(title, rows, runs)
         if figure is not None:
             try:
-                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FORMATS))
+                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
                 notes += left_out
             except InputError as error:
                 notes.append(f"{stem}{suffix} left out: {error}")

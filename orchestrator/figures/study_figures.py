@@ -1,6 +1,6 @@
 """Figures of a study from its runs: a study file says which.
 
-A new one is a function and an entry of :data:`KINDS`.
+A new one is a function and an entry of :data:`FIGURE_KINDS`.
 """
 
 from __future__ import annotations
@@ -26,7 +26,15 @@ from orchestrator.figures.study_values import (
     grouped,
     is_logarithmic,
 )
-from orchestrator.figures.style import COLOURS, FORMATS, STYLES, WIDTH, heading, save, styled
+from orchestrator.figures.style import (
+    COLOURS,
+    FIGURE_FORMATS,
+    FIGURE_WIDTH,
+    STYLES,
+    heading,
+    save,
+    styled,
+)
 from orchestrator.system.names import file_name
 
 #: Heights of a row of panels, of a panel by itself, and of a row of a matrix and what surrounds
@@ -37,8 +45,8 @@ _ROW, _SQUARE, _LINE, _AROUND = 2.3, 4.0, 0.27, 0.5
 #: the band lies, and panels in a row, where there is one x.
 _BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
 
-#: Maps: cells along each axis of runs that are no grid; the colours end where all but a share of
-#: the cells do, for a few that are far off shall dim no others.
+#: Maps: cells along each axis of runs that do not form a grid; the colours end where all but a
+#: share of the cells do, so that a few outliers do not dim the others.
 _CELLS, _FAR = 24, 0.01
 
 #: Colours that stay apart for colour-blind eyes and in print, the one of a cell without runs, and
@@ -60,7 +68,7 @@ _TICKS, _FEW = 6, 2.5
 
 @dataclass(frozen=True)
 class FigureEntry:
-    """A figure that is to be drawn, as a study file has it.
+    """A figure to draw, as a study file has it.
 
     Attributes:
         name: of its files.
@@ -78,8 +86,10 @@ class FigureEntry:
     labels: Mapping[str, str] = field(default_factory=dict)
 
 
-def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> tuple[Figure, Any]:
-    """A figure with panels.
+def make_panels(
+    title: str, rows: int, columns: int, height: float, **how: Any
+) -> tuple[Figure, Any]:
+    """Make a figure with panels.
 
     Args:
         title: heading; empty for none.
@@ -92,7 +102,7 @@ def paneled(title: str, rows: int, columns: int, height: float, **how: Any) -> t
         The figure, and its axes in rows and columns.
 
     """
-    figure = Figure(figsize=(WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
+    figure = Figure(figsize=(FIGURE_WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
     if title:
         figure.suptitle(heading(title), wrap=True)
     return figure, figure.subplots(rows, columns, squeeze=False, **how)
@@ -125,7 +135,7 @@ def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
     abreast = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
     shown = list(product(plan.show, plan.x))
     share = "row" if len(plan.x) > 1 else False
-    figure, panels = paneled(title, -(-len(shown) // abreast), abreast, _ROW, sharey=share)
+    figure, panels = make_panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=share)
     parts = list(runs.parts(plan.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
         bins = bins_of(runs[x], _BINS, are_full=True)
@@ -179,7 +189,7 @@ def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
     beside = [name for name, _ in runs.parts(plan.by[-1:])]
     below = list(runs.parts(plan.by[:-1]))
     rows = len(plan.show) * len(below)
-    figure, panels = paneled(title, rows, len(beside), _ROW, sharex=True, sharey=True)
+    figure, panels = make_panels(title, rows, len(beside), _ROW, sharex=True, sharey=True)
     for value, own in zip(plan.show, np.split(panels, len(plan.show)), strict=True):
         drawn: dict[Axes, np.ndarray] = {}
         for row, (name, part) in zip(own, below, strict=True):
@@ -233,7 +243,7 @@ def _norm(values: np.ndarray, is_verdict: bool) -> Any:
 
 def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """Every run a dot; a line through those than which no other is better in both values."""
-    figure, [[axes]] = paneled(title, 1, 1, _SQUARE)
+    figure, [[axes]] = make_panels(title, 1, 1, _SQUARE)
     [x] = plan.x
     for (name, part), colour, style in zip(
         runs.parts(plan.by), cycle(COLOURS), cycle(STYLES), strict=False
@@ -242,7 +252,7 @@ def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
         points = points[np.isfinite(points).all(axis=1)]
         axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
         line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
-        axes.plot(*best(points).T, **line)
+        axes.plot(*pareto_front(points).T, **line)
     spread(axes.xaxis, is_logarithmic(runs[x]))
     spread(axes.yaxis, is_logarithmic(runs[plan.y]))
     axes.set(xlabel=runs.label(x), ylabel=runs.label(plan.y))
@@ -250,7 +260,7 @@ def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
     return figure
 
 
-def best(points: np.ndarray) -> np.ndarray:
+def pareto_front(points: np.ndarray) -> np.ndarray:
     """The points than which no other is smaller in both coordinates, the Pareto front.
 
     Args:
@@ -271,7 +281,7 @@ def influence(plan: FigureEntry, title: str, runs: Values) -> Figure:
     """
     parts = list(runs.parts(plan.by))
     height = _LINE * len(plan.show) + _AROUND
-    figure, panels = paneled(title, len(parts), 1, height, sharex=True)
+    figure, panels = make_panels(title, len(parts), 1, height, sharex=True)
     for axes, (name, part) in zip(panels.flat, parts, strict=True):
         found = np.array([[_correlation(part[x], part[y]) for x in plan.x] for y in plan.show])
         image = axes.imshow(found, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
@@ -300,7 +310,7 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     return float(spearmanr(x[both], y[both]).statistic)
 
 
-class Kind(NamedTuple):
+class FigureKind(NamedTuple):
     """A kind of figure: what draws it, what it needs, and what it may have beside."""
 
     draw: Callable[[FigureEntry, str, Values], Figure]
@@ -309,17 +319,17 @@ class Kind(NamedTuple):
 
 
 #: The kinds of figures, by the names that study files have for them.
-KINDS: Mapping[str, Kind] = {
-    "bands": Kind(bands, ("x", "show"), ("by", "where", "limits")),
-    "maps": Kind(maps, ("x", "y", "show"), ("by", "where", "limits")),
-    "front": Kind(front, ("x", "y"), ("by", "where")),
-    "influence": Kind(influence, ("x", "show"), ("by", "where")),
+FIGURE_KINDS: Mapping[str, FigureKind] = {
+    "bands": FigureKind(bands, ("x", "show"), ("by", "where", "limits")),
+    "maps": FigureKind(maps, ("x", "y", "show"), ("by", "where", "limits")),
+    "front": FigureKind(front, ("x", "y"), ("by", "where")),
+    "influence": FigureKind(influence, ("x", "show"), ("by", "where")),
 }
 
 
 def figure_files(plans: Sequence[FigureEntry]) -> list[str]:
     """The files that :func:`draw_figures` may write."""
-    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in FORMATS]
+    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in FIGURE_FORMATS]
 
 
 def draw_figures(
@@ -332,7 +342,7 @@ def draw_figures(
     """Draw the figures of a study, as PNG and SVG.
 
     Args:
-        plans: what is to be drawn.
+        plans: the figures to draw.
         title: heading; empty where there is one beside the figures.
         columns: of runs.parquet.
         folder: to write into.
@@ -353,5 +363,5 @@ def draw_figures(
             yield f"figure {plan.name} left out: by tells {parts} parts of the runs apart"
             continue
         with styled():
-            figure = KINDS[plan.kind].draw(plan, title, runs)
-        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FORMATS))
+            figure = FIGURE_KINDS[plan.kind].draw(plan, title, runs)
+        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FIGURE_FORMATS))

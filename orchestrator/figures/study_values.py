@@ -232,7 +232,7 @@ def bins_of(values: np.ndarray, most: int, *, are_full: bool = False) -> Bins:
 
     Args:
         values: of a grid, or anywhere.
-        most: how many bins there are for values that are no grid.
+        most: how many bins there are for values that do not form a grid.
         are_full: whether these have as many values each, and not the same width.
 
     """

@@ -19,13 +19,13 @@ from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
-#: also has a style of its own, for print.
+#: also has its own style, for print.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 STYLES = ("-", "--", "-.", ":")
 REFERENCE = "#555555"
 
 #: Width of the page [in]: two columns of a journal, and a phone still shows its letters.
-WIDTH = 7.2
+FIGURE_WIDTH = 7.2
 
 SETTINGS: Any = {
     "axes.formatter.limits": (-3, 4),
@@ -64,7 +64,7 @@ _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
 
 #: What figures are written as.
-FORMATS = ("png", "svg")
+FIGURE_FORMATS = ("png", "svg")
 
 #: What a file would say of its time and tool, by its ending.
 _NO_DATE: dict[str, Any] = {
@@ -107,7 +107,7 @@ def earth_axes(z_up: bool) -> tuple[str, str, str]:
     return "x north [m]", "y east [m]", "z down [m]"
 
 
-def having(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator[tuple[Drawn, str]]:
+def runs_with(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator[tuple[Drawn, str]]:
     """The runs that have what is needed, each with its own colour whichever others have."""
     for run, colour in zip(runs, cycle(COLOURS), strict=False):
         if not run.lacks(needs):
@@ -120,14 +120,14 @@ def printed_unit(unit: str) -> str:
     return re.sub(r"(?<=[A-Za-z])\d+", lambda power: power[0].translate(_RAISED), text)
 
 
-def plain(text: str) -> str:
-    """A text that matplotlib takes for text, and not for a formula."""
+def escape_math(text: str) -> str:
+    """Escape what matplotlib would take for a formula."""
     return text.replace("$", r"\$")
 
 
 def heading(title: str) -> str:
     """A title whose symbols such as A_f and theta_hat are set as such, and the rest as it is."""
-    return _SYMBOL.sub(_set, plain(title))
+    return _SYMBOL.sub(_set, escape_math(title))
 
 
 def _set(symbol: re.Match[str]) -> str:

@@ -24,7 +24,7 @@ from orchestrator.vehicle.signals import (
     AXES,
     Loop,
     limits,
-    parameter,
+    real_parameter,
     tracking_error,
     true_control_point,
 )
@@ -118,7 +118,7 @@ class _Lines(NamedTuple):
     limits: Sequence[float] = ()
 
 
-def page(title: str, run: Drawn) -> str:
+def view_page(title: str, run: Drawn) -> str:
     """A page of a run that needs no other file.
 
     Args:
@@ -287,7 +287,7 @@ def _frames(run: Drawn) -> dict[str, Any]:
     if not table.missing(loop.y_d):
         paths.append(table.group(*loop.y_d))
     lower, upper = np.min(np.vstack(paths), axis=0), np.max(np.vstack(paths), axis=0)
-    length = max(_SHARE * float((upper - lower).max()), _LENGTH * parameter(table, loop.ell))
+    length = max(_SHARE * float((upper - lower).max()), _LENGTH * real_parameter(table, loop.ell))
     instants = np.linspace(time[0], time[-1], _FRAMES)
     rows = np.unique(np.searchsorted(time, instants).clip(0, len(time) - 1))
     frames: dict[str, Any] = {

@@ -38,7 +38,7 @@ _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
 _TOOLBOX = "fmu_manipulation_toolbox"
 
-#: The file that says what is in a container.
+#: The file that lists the contents of a container.
 _CONTENT = "system.json"
 
 
@@ -115,7 +115,9 @@ def read_osp(path: Path, findings: Findings | None = None) -> System:
     connections = tuple(_connections(archive, root, components))
     algorithm = root.findtext("Algorithm", _ALGORITHM).strip()
     if algorithm != _ALGORITHM:
-        archive.note(f"asks for the algorithm {algorithm!r}; steps of one length are made")
+        archive.note(
+            f"asks for the algorithm {algorithm!r}; steps of a fixed length are made instead"
+        )
     step = _number(archive, root, "BaseStepSize") or _STEP
     system = System(
         name=archive.folder.name,
@@ -271,7 +273,7 @@ def _parameters(
                 continue
             if stated.tag != type_of(variable):
                 archive.note(
-                    f"{port}: is given a {stated.tag}, and is a {variable.type} in its FMU"
+                    f"{port}: is given a {stated.tag}, but is a {variable.type} in its FMU"
                 )
             parameters[port] = value
     return parameters

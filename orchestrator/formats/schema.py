@@ -1,4 +1,4 @@
-"""Schemas of TOML files: what each entry may hold, what it means, and what is wrong with a file.
+"""Schemas of TOML files: what each entry may hold and means, and the flaws of a file.
 
 A table is a model of pydantic, from which `tools/pages.py` writes pages and editors' JSON schemas.
 Pydantic takes a moment to import, so a module of schemas is imported when there is a file to read.
@@ -196,7 +196,7 @@ def _problems(
             yield _where(path) + str(error["ctx"]["error"])
         elif error["type"] == "missing":
             missing.setdefault(place._replace(key=None), []).append(key)
-        # Where a value may be a table and is one, what is wrong within it says more.
+        # If a value may be a table and is one, a flaw within it says more.
         elif not any(other.path[: len(path) + 1] == (*path, key) for other in places):
             yield _where(path) + _problem(inner, key, _at(content, (*path, key)))
     for (inner, path, _), keys in missing.items():

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explained, lines_of
+from orchestrator.machine.user_files import explain_errors, open_lines
 
 #: Rows that are read at once, and that are written to Parquet at once.
-ROWS = 8192
+ROWS_AT_ONCE = 8192
 
 #: What separates the values of a row.
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -33,14 +33,14 @@ def read_columns(path: Path) -> tuple[str, ...]:
     """Return the names of the columns after the time.
 
     Raises:
-        InputError: the file is no table of a run.
+        InputError: the file is not the table of a run.
 
     """
-    with explained(path, _NO_RUN):
+    with explain_errors(path, _NO_RUN):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 return _after_time(file.schema_arrow.names)
-        with lines_of(path) as lines:
+        with open_lines(path) as lines:
             return _after_time(next(csv.reader(lines), ()))
 
 
@@ -52,25 +52,25 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
         strings: columns that hold texts, and are left out.
 
     Raises:
-        InputError: the file is no table of a run.
+        InputError: the file is not the table of a run.
 
     """
-    with explained(path, _NO_RUN):
+    with explain_errors(path, _NO_RUN):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 names = [name for name in file.schema_arrow.names if name not in strings]
-                for batch in file.iter_batches(ROWS, columns=names):
+                for batch in file.iter_batches(ROWS_AT_ONCE, columns=names):
                     columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
                     yield np.column_stack(columns).astype(float, copy=False)
             return
-        with lines_of(path) as lines:
+        with open_lines(path) as lines:
             header = ("time", *_after_time(next(csv.reader(lines), ())))
             texts = [place for place, name in enumerate(header) if name in strings]
             filled = (line for line in lines if line.strip())
             for first in filled:
                 rows = np.loadtxt(
                     chain([first], filled), delimiter=",", comments=None, quotechar='"', ndmin=2,
-                    max_rows=ROWS, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
+                    max_rows=ROWS_AT_ONCE, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
                 )  # fmt: skip
                 if rows.shape[1] != len(header):
                     raise ValueError(f"rows of {rows.shape[1]} values below {len(header)} names")
@@ -97,7 +97,7 @@ def records(
             raised while the table was read.
 
     """
-    with explained(path, what), lines_of(path, newline="") as lines:
+    with explain_errors(path, what), open_lines(path, newline="") as lines:
         first = next(lines, "")
         marks = [mark for mark in SEPARATORS if mark in first] or [","]
         mark = next((m for m in marks if are_names(next(_reader([first], m)))), marks[0])
@@ -131,7 +131,7 @@ def _records(reader: Any, width: int) -> Iterator[Record]:
         line += 1
         if reader.line_num != line:
             # A lone quote, and the next one some rows later: what is between would be one value.
-            raise ValueError(f"line {line}: a value in quotes goes on in the next line")
+            raise ValueError(f"line {line}: a value in quotes continues on the next line")
         if values and len(values) != width:
             raise ValueError(f"line {line} has {len(values)} values below {width} names")
         if values:

@@ -1,8 +1,8 @@
-"""What is made once and kept in the user's cache folder: libraries, machine code, FMUs.
+"""Libraries, machine code and FMUs, made once and kept in the user's cache folder.
 
 All of it is run, so it is taken only from folders and files that nobody but the user can write,
-and only as it was kept: the digests of its files are in a folder of their own. Nothing there is
-ever overwritten or removed. What is not as it was kept is made anew, under another name.
+and only if unchanged since it was kept: the digests of its files are in a separate folder. Nothing
+there is ever overwritten or removed. Anything that has changed is made anew, under another name.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from tempfile import mkdtemp, mkstemp
 
 from platformdirs import user_cache_path
 
-from orchestrator.machine.disk import process_folder, to_disk
+from orchestrator.machine.disk import process_folder, sync_to_disk
 
 #: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"
@@ -38,8 +38,8 @@ def users_folder() -> Path:
     return user_cache_path("auv-fmu", appauthor=False)
 
 
-def kept(category: str, key: str) -> dict[Path, bytes]:
-    """The files that were kept under a key, and what is in them; empty if they are not as then.
+def read_cached(category: str, key: str) -> dict[Path, bytes]:
+    """Read the files that were kept under a key; empty if they are not as they were kept.
 
     Args:
         category: of what is kept, a name of a folder.
@@ -60,8 +60,8 @@ def environment() -> dict[str, str]:
     return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
 
 
-def folder_of(category: str) -> Path:
-    """The folder of a category, made if it is not there.
+def category_folder(category: str) -> Path:
+    """Give the folder of a category, made if it is not there.
 
     Raises:
         OSError: it cannot be made.
@@ -70,8 +70,8 @@ def folder_of(category: str) -> Path:
     return _made(category) / category
 
 
-def keep(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
-    """Keep files, and say where they are.
+def write_cached(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
+    """Keep files, and give their paths.
 
     Args:
         category: of what is kept, a name of a folder.
@@ -88,7 +88,7 @@ def keep(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
         made.chmod(0o700)
         for name, content in files.items():
             _write(os.open(made / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), content)
-        to_disk(made)
+        sync_to_disk(made)
         digests = {name: sha256(content).hexdigest() for name, content in files.items()}
         descriptor, record = mkstemp(".json", f"{category}-{key}-", root / _DIGESTS)
         try:
@@ -216,7 +216,7 @@ def _keeps_others_out(status: os.stat_result, above: bool) -> bool:
     """
     mine = _is_mine(status, or_roots=above)
     open_to_others = status.st_mode & _OTHERS_WRITE and not (above and status.st_mode & S_ISVTX)
-    # What should be a folder and is none is said when it is written into.
+    # A file in place of a folder is reported when something is written into it.
     return mine and not open_to_others and (above or S_ISDIR(status.st_mode))
 
 

@@ -64,7 +64,7 @@ def run_module(
         module: as after `python -m`.
         arguments: of its command line.
         folder: that it runs in; None: the current one.
-        timeout: how long it may take [s]; None: as long as it wants.
+        timeout: how long it may take [s]; None: without limit.
 
     Raises:
         TimeoutExpired: it took longer, and was ended.
@@ -91,17 +91,17 @@ def run_module(
         os.close(end_of_ours)
 
 
-def compiler() -> Compiler | None:
-    """A C compiler: this machine's, or else the package ziglang's; None: there is none."""
-    if found := of_the_machine():
+def find_compiler() -> Compiler | None:
+    """Find a C compiler: this machine's, or else the package ziglang's; None: there is none."""
+    if found := find_fast_compiler():
         return found
     if find_spec("ziglang") is None:
         return None
     return lambda *arguments: run_module("ziglang", "cc", *arguments, timeout=LIMIT_OF_ZIG)
 
 
-def of_the_machine() -> Compiler | None:
-    """The C compiler of this machine, if it has one: it takes a tenth of a second, zig some."""
+def find_fast_compiler() -> Compiler | None:
+    """Find this machine's C compiler, if it has one: it takes a tenth of a second, zig some."""
     command = machines_compiler()
     return None if command is None else lambda *arguments: run_compiler([command, *arguments])
 
@@ -111,8 +111,8 @@ def machines_compiler() -> str | None:
     return next(filter(None, map(shutil.which, COMPILERS)), None)
 
 
-def made_library(compiler: Compiler, *arguments: str) -> bytes:
-    """A library that a compiler makes, of sources and options.
+def compile_library(compiler: Compiler, *arguments: str) -> bytes:
+    """Compile a library of sources and options, and give its bytes.
 
     Raises:
         OSError: it does not; the text is its first error.
@@ -132,7 +132,7 @@ def run_compiler(command: Sequence[str], limit: float | None = None) -> Complete
 
     Args:
         command: with its arguments.
-        limit: how long it may take [s]; None: as long as this machine's.
+        limit: how long it may take [s]; None: the limit of this machine's.
 
     Raises:
         OSError: it does, or it cannot be started.

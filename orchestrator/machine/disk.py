@@ -45,12 +45,12 @@ def unsealed(text: str) -> dict[str, Any]:
     """The content of a record that is as it was written.
 
     Raises:
-        ValueError: it is not, or is no such record.
+        ValueError: it is not, or is not such a record.
 
     """
     content = json.loads(text)
     if not isinstance(content, dict) or _SEAL not in content:
-        raise ValueError("it has no checksum of its own")
+        raise ValueError("it has no checksum")
     if content.pop(_SEAL) != _checksum(content) or sealed(content) != text:
         raise ValueError("it is damaged: its checksum differs")
     return content
@@ -85,12 +85,12 @@ def write_whole(path: Path, text: str, partial: Path) -> None:
     """
     partial.unlink(missing_ok=True)
     write_new(partial, text)
-    to_disk(partial)
+    sync_to_disk(partial)
     partial.replace(path)
-    to_disk(path.parent)
+    sync_to_disk(path.parent)
 
 
-def to_disk(path: Path) -> None:
+def sync_to_disk(path: Path) -> None:
     """Have a file, or the names in a folder, outlast a power cut.
 
     Raises:
@@ -117,7 +117,7 @@ def is_still(descriptor: int, status: os.stat_result) -> bool:
 
 
 @contextmanager
-def claimed(path: Path, wait: bool = False) -> Iterator[None]:
+def hold_lock(path: Path, wait: bool = False) -> Iterator[None]:
     """Keep other processes from a file or folder.
 
     Args:

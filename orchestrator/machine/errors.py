@@ -25,7 +25,7 @@ def reason(error: BaseException) -> str:
     if isinstance(error, MemoryError):
         return "memory is short"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
-    more = [f"and {len(lines) - _MOST_LINES} lines more"] * (len(lines) > _MOST_LINES)
+    more = [f"and {len(lines) - _MOST_LINES} more lines"] * (len(lines) > _MOST_LINES)
     said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
     return "; ".join(said).replace(":; ", ": ") or repr(error)
 
@@ -42,7 +42,7 @@ def unforeseen(error: Exception) -> str:
         return reason(error)
     return (
         f"{type(error).__name__}: {reason(error)}; if an FMU has changed this process, --isolate "
-        "gives it one of its own"
+        "gives it a separate one"
     )
 
 
@@ -51,16 +51,17 @@ def shortened(text: str, most: int = 80) -> str:
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
-def plain(text: str, kept: str = "") -> str:
-    """A text in which nothing of a name speaks to the terminal.
+def escape_unprintable(text: str, allowed: str = "") -> str:
+    """Escape what would speak to the terminal, in names as well.
 
     Args:
         text: to be shown.
-        kept: letters that may stay, though they are not printed.
+        allowed: letters that may stay, though they are not printed.
 
     """
     return "".join(
-        letter if letter.isprintable() or letter in kept else repr(letter)[1:-1] for letter in text
+        letter if letter.isprintable() or letter in allowed else repr(letter)[1:-1]
+        for letter in text
     )
 
 

@@ -68,7 +68,7 @@ class Interrupts:
         return len(self.signals) > 1 or any(number != signal.SIGINT for number in self.signals)
 
     def __str__(self) -> str:
-        """Which signal has come first, where it is none that a user sends."""
+        """The first signal, if it is not one that a user sends."""
         first = self.signals[0] if self.signals else 0
         if first not in _ENDS:
             return ""
@@ -93,7 +93,7 @@ class Interrupts:
         os.set_blocking(end_of_signals, False)
         before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
         leaving = threading.Lock()
-        # A thread, because Python answers no signal as long as an FMU computes.
+        # A thread, because Python answers no signal while an FMU computes.
         arguments = (end_of_thread, give_up, leaving)
         with suppress(RuntimeError):
             # Where none can be had, insistence is not heard.
@@ -167,7 +167,7 @@ def _leave(number: int, _frame: Any) -> None:
 def held_interrupts(
     announce: Callable[[Interrupts], None] | None = None, *, is_last: bool = False
 ) -> Iterator[Interrupts]:
-    """Collect signals to stop as long as the context lasts.
+    """Collect signals to stop while the context lasts.
 
     Within another such context the signals go to the outer one. Signals reach the main
     thread only: elsewhere nothing is held.

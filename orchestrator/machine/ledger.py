@@ -26,7 +26,7 @@ from stat import S_ISREG
 from typing import NamedTuple
 from uuid import uuid4
 
-from orchestrator.machine.disk import sealed, to_disk, unsealed, write_new, write_whole
+from orchestrator.machine.disk import sealed, sync_to_disk, unsealed, write_new, write_whole
 from orchestrator.machine.errors import InputError
 
 #: The ledger of a folder; what is being written there begins with the same letters.
@@ -43,7 +43,7 @@ Digests = dict[str, str]
 
 
 class Taken(InputError):
-    """A name that is to be written belongs to a file of the user's."""
+    """A file to be written has the name of a file of the user's."""
 
 
 class Ledger:
@@ -110,7 +110,7 @@ class Ledger:
                         f"{taken} is not a file that auv-fmu wrote, or was changed since: move it, "
                         "choose another place (--out), or let --force move it aside"
                     )
-                moved_aside(taken)
+                move_aside(taken)
 
     @contextmanager
     def writing(self) -> Iterator[Path]:
@@ -143,10 +143,10 @@ class Ledger:
         """
         new: Digests = {}
         for path in sorted(self.unfinished.rglob("*")):
-            to_disk(path)
+            sync_to_disk(path)
             if path.is_file():
                 new[path.relative_to(self.unfinished).as_posix()] = sha256_of(path)
-        to_disk(self.unfinished)
+        sync_to_disk(self.unfinished)
         leaving = sorted(set(old) & self._files.keys() - new.keys())
         if not new and not leaving:
             return
@@ -187,7 +187,7 @@ class Ledger:
         return {self._files.get(name), self._moving.get(name)} - {None}
 
     def _taken(self, name: str) -> Path | None:
-        """What belongs to the user where a file is to be written."""
+        """The user's files that are in the way of files to be written."""
         path = self.folder
         for part in Path(name).parts[:-1]:
             path /= part
@@ -206,7 +206,7 @@ class Ledger:
             (self.folder / RECORD).unlink(missing_ok=True)
         for name in sorted(waiting, key=lambda name: (name == RECORD, name)):
             if name == RECORD:
-                to_disk(self.folder)
+                sync_to_disk(self.folder)
             (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
             (self.unfinished / name).replace(self.folder / name)
         leaving, self._leaving = self._leaving, []
@@ -219,7 +219,7 @@ class Ledger:
         }
         self.remove(leaving)
         self._discard()
-        to_disk(self.folder)
+        sync_to_disk(self.folder)
 
     def _read(self) -> _Content | None:
         path = self.folder / LEDGER
@@ -228,10 +228,10 @@ class Ledger:
         if found is None and os.path.lexists(path) and path.lstat().st_size:
             if not self._force:
                 raise Taken(
-                    f"{path} is damaged, or not by auv-fmu: which files it wrote cannot be told; "
+                    f"{path} is damaged, or not by auv-fmu: its own files are unknown; "
                     "choose another place (--out), or let --force move it aside"
                 )
-            moved_aside(path)
+            move_aside(path)
         return found
 
     def _write(self) -> None:
@@ -243,7 +243,7 @@ class Ledger:
         else:
             # Nobody knows the identity yet under which the first one could be written.
             write_new(path, text)
-            to_disk(self.folder)
+            sync_to_disk(self.folder)
         self._is_there = True
 
     def _remove(self) -> None:
@@ -296,8 +296,8 @@ def _naming(path: Path) -> Iterator[tuple[Path, str, _Content | None]]:
             yield folder, path.relative_to(folder).as_posix(), _content(folder / LEDGER)
 
 
-def located(path: Path) -> Path:
-    """Where a file is that may be about to take its place."""
+def locate(path: Path) -> Path:
+    """Find a file that may be about to take its place."""
     for folder, name, content in _naming(path):
         if content is not None and name in content.moving:
             waiting = folder / f"{_UNFINISHED}{content.identity}" / name
@@ -312,7 +312,7 @@ def is_changed(path: Path) -> bool:
         if content is None:
             return True
         if digests := {part[name] for part in content[1:3] if name in part}:
-            return sha256_of(located(path)) not in digests
+            return sha256_of(locate(path)) not in digests
     return False
 
 
@@ -337,7 +337,7 @@ def _is_plain(folder: Path, name: str) -> bool:
     return path.is_file()
 
 
-def moved_aside(path: Path) -> Path:
+def move_aside(path: Path) -> Path:
     """Give a file or folder of the user's a name beside its own, which is given back.
 
     Raises:

@@ -43,7 +43,7 @@ _MOST_OF_A_PROCESS = 2**33
 #: Files of an archive that are read into memory, and how long they may be [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
-#: How a file begins that Git has left in the place of another one.
+#: The beginning of a file that Git has left in place of another one.
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
 #: Runs in several threads share what is unpacked.
@@ -71,7 +71,7 @@ _folders: dict[str, Path] = {}
 
 
 @contextmanager
-def explained(path: Path, what: str) -> Iterator[None]:
+def explain_errors(path: Path, what: str) -> Iterator[None]:
     """Say of a mistake in a file which file it is.
 
     Args:
@@ -92,7 +92,7 @@ def explained(path: Path, what: str) -> Iterator[None]:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is such a folder; what cannot be the name of one is none."""
+    """Whether there is such a folder; False also for an impossible name."""
     with suppress(OSError, ValueError):
         return path.is_dir()
     return False
@@ -105,7 +105,7 @@ def check_file(path: Path) -> None:
         InputError: there is none, or it is a folder, a pipe or a device.
 
     """
-    with explained(path, "not the name of a file"):
+    with explain_errors(path, "not the name of a file"):
         try:
             mode = path.stat().st_mode
         except FileNotFoundError:
@@ -114,8 +114,8 @@ def check_file(path: Path) -> None:
         raise InputError(f"{path}: {'a folder' if S_ISDIR(mode) else 'a pipe or device'}, no file")
 
 
-def text_of(path: Path, what: str) -> str:
-    """The text of a short file.
+def read_text(path: Path, what: str) -> str:
+    """Read a short file as text.
 
     Args:
         path: of the file.
@@ -126,7 +126,7 @@ def text_of(path: Path, what: str) -> str:
 
     """
     check_file(path)
-    with explained(path, what), path.open(encoding="utf-8-sig") as file:
+    with explain_errors(path, what), path.open(encoding="utf-8-sig") as file:
         text = file.read(_LONGEST + 1)
         if len(text) > _LONGEST:
             raise ValueError(f"longer than {_LONGEST:,} characters")
@@ -134,8 +134,8 @@ def text_of(path: Path, what: str) -> str:
 
 
 @contextmanager
-def lines_of(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
-    """The lines of a text in UTF-8, one by one.
+def open_lines(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
+    """Open a text in UTF-8, to take its lines one by one.
 
     Args:
         path: of the file.
@@ -143,7 +143,7 @@ def lines_of(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
 
     Raises:
         InputError: there is no such file.
-        ValueError: while lines are taken, if it is no text, or a line has no end.
+        ValueError: while lines are taken, if it is not text, or a line has no end.
 
     """
     check_file(path)
@@ -163,8 +163,8 @@ def names_in(folder: Path) -> list[str]:
     return sorted(path.stem for path in folder.glob("*.toml"))
 
 
-def path_of(name: str, folder: Path, what: str, files: str) -> Path:
-    """The path of a file that comes with the program, by its name, or of any file of the user's.
+def find_toml(name: str, folder: Path, what: str, files: str) -> Path:
+    """Find a file that comes with the program by its name, or any file of the user's by its path.
 
     Args:
         name: of the file, or its path, which ends in .toml.
@@ -194,8 +194,8 @@ class Unpacked(NamedTuple):
     digest: str
 
 
-def unpacked(archive: Path) -> Unpacked:
-    """An FMU or SSP as it is now, unpacked.
+def unpack(archive: Path) -> Unpacked:
+    """Unpack an FMU or SSP as it is now.
 
     Raises:
         InputError: it cannot be unpacked.
@@ -212,13 +212,13 @@ def unpacked(archive: Path) -> Unpacked:
             return _unpacked(archive, file)
     except InputError:
         raise
-    # What is wrong with an archive, each of Python's decompressors says in exceptions of its own.
+    # Each of Python's decompressors has its own exceptions for a broken archive.
     except Exception as error:
         raise InputError(f"{archive}: cannot be opened: {reason(error)}") from error
 
 
-def folder_of(archive: Path, digest: str) -> Path:
-    """The folder of an archive as it was read, in this process or in another one.
+def unpacked_folder(archive: Path, digest: str) -> Path:
+    """Give the folder of an archive as it was read, in this process or in another one.
 
     Raises:
         InputError: this process has not read it, and the file is another one now.
@@ -226,13 +226,13 @@ def folder_of(archive: Path, digest: str) -> Path:
     """
     folder = _folders.get(digest)
     if folder is None:
-        folder, now = unpacked(archive)
+        folder, now = unpack(archive)
         _check_same(archive, now, digest)
     return folder
 
 
-def archive_of(archive: Path, digest: str) -> bytes:
-    """The bytes of an archive as it was read.
+def read_archive(archive: Path, digest: str) -> bytes:
+    """Read the bytes of an archive as it was read before.
 
     Raises:
         InputError: the file is another one now.
@@ -246,7 +246,7 @@ def archive_of(archive: Path, digest: str) -> bytes:
 
 def _check_same(archive: Path, now: str, digest: str) -> None:
     if now != digest:
-        raise InputError(f"{archive}: has changed since it was read; begin anew")
+        raise InputError(f"{archive}: has changed since it was read; start over")
 
 
 def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
@@ -315,7 +315,7 @@ def _check_room(whole: _Whole, files: int, size: int) -> None:
     if (together := sum(others.values()) + size) > _MOST_OF_A_PROCESS:
         raise ValueError(
             f"it unpacks to {size:,} bytes, and all archives of this process to {together:,}, more "
-            f"than {_MOST_OF_A_PROCESS:,}: run them in processes of their own"
+            f"than {_MOST_OF_A_PROCESS:,}: run them in separate processes"
         )
 
 

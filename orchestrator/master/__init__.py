@@ -1,6 +1,6 @@
-"""How a system is stepped: `simulate` runs the loop, observers take what it computes.
+"""How a system is stepped: `simulation` runs the loop, observers take its rows.
 
-The loop, in :func:`.simulation.simulate`::
+The loop, in :func:`.simulation.simulate_plan`::
 
     exchange initial values until they rest
     tell the observers the first row

@@ -10,11 +10,12 @@ from numpy.lib.stride_tricks import sliding_window_view
 from orchestrator.machine.errors import InputError, StartError, shortened
 from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, OURS, SOLVE, Exchange, Order
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
+from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
-from orchestrator.master.schedule import Stage, StageCall, member, schedule, step
+from orchestrator.master.schedule import Stage, StageCall, member, schedule, step_members
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -30,28 +31,33 @@ _INTERVALS, _DOUBLINGS, _IN_ALL = 8, 1.0, 24.0
 _LENGTHS = tuple(2**i for i in range(9))
 
 
+#: Steps between two looks at what has been observed: a run ends at the same one on each machine.
+_LOOK = 512
+
+
 class Growth:
-    """An observer that ends a run in which values of delayed rings grow without bound."""
+    """An observer, and a hook, that ends a run in which values of delayed rings grow without bound.
+
+    Attributes:
+        ports: that are watched.
+        found: what has been found, in words, or nothing.
+
+    """
 
     def __init__(self, ports: Collection[PortName]) -> None:
         """Watch some ports."""
-        self._names = list(map(str, ports))
+        self.found, self.ports = "", list(map(str, ports))
         self._columns: list[int] = []
         self._rows = 0
-        self._last = {length: np.empty((0, len(self._names))) for length in _LENGTHS}
+        self._last = {length: np.empty((0, len(self.ports))) for length in _LENGTHS}
 
     def begin(self, header: Header) -> None:
         """Find the ports."""
         places = {name: i for i, name in enumerate(header.columns, start=1)}
-        self._columns = [places[name] for name in self._names]
+        self._columns = [places[name] for name in self.ports]
 
     def take(self, rows: np.ndarray) -> None:
-        """Look at some rows.
-
-        Raises:
-            InputError: a value grows without bound.
-
-        """
+        """Look at some rows."""
         sizes = np.log2(np.abs(rows[:, self._columns]))
         # From zero, everything is infinitely far.
         sizes[np.isinf(sizes)] = np.nan
@@ -63,9 +69,9 @@ class Growth:
                 doublings = sliding_window_view(np.diff(known, axis=0), _INTERVALS, axis=0)
                 grows = doublings.min(axis=-1) >= _DOUBLINGS
                 grows &= doublings.sum(axis=-1) >= _IN_ALL
-                if found := np.flatnonzero(grows.any(axis=0)).tolist():
-                    raise InputError(
-                        f"{self._names[found[0]]} grows without bound, in a ring of direct "
+                if not self.found and (places := np.flatnonzero(grows.any(axis=0)).tolist()):
+                    self.found = (
+                        f"{self.ports[places[0]]} grows without bound, in a ring of direct "
                         "feedthroughs that is delayed by a step; --coupling solve, if its FMUs "
                         "allow it, or another --order may help"
                     )
@@ -73,6 +79,19 @@ class Growth:
 
     def end(self, ending: Ending) -> None:
         """Nothing is kept."""
+
+    def act(self, run: Run) -> int:
+        """End the run if a value grows.
+
+        Raises:
+            ComponentFailed: one does.
+
+        """
+        run.blocks.hand_over()
+        if self.found:
+            raise ComponentFailed(self.found)
+        last = run.experiment.rows - 1
+        return min(run.made - run.made % _LOOK + _LOOK, last) if run.made < last else NEVER
 
 
 class _Single:
@@ -179,14 +198,14 @@ class _LinearSteps:
         begin = values.copy()
         for instance in self._fed:
             instance.keep()
-        step(self._all, t, h, is_final=False)
+        step_members(self._all, t, h, is_final=False)
         self._settling.settle()
         slopes = (values - begin) / h
         values[self._inputs] = begin[self._inputs]
         for instance, (references, columns) in zip(self._fed, self._changing, strict=True):
             instance.go_back()
             instance.let_change(references, slopes[columns].tolist())
-        step(self._again, t, h)
+        step_members(self._again, t, h)
         for instance, (references, _) in zip(self._fed, self._changing, strict=True):
             instance.let_change(references, [0.0] * len(references))
         self._settling.settle()
@@ -211,7 +230,7 @@ class Coupling:
         """Find the rings.
 
         Args:
-            plan: what is run, and how rings are closed.
+            plan: the system, and how rings are closed.
             instances: of its components.
             row: that they are tied to.
             log: takes where a ring is delayed.
@@ -271,7 +290,7 @@ class Coupling:
         return found, [stage.gather for stage in found] + own
 
     def delayed_ports(self) -> list[PortName]:
-        """The inputs that a ring feeds by itself, of rings that are not solved as a whole."""
+        """The inputs that a ring feeds itself, for rings that are not solved as a whole."""
         solved = [set(ring.names) for ring in self._solved]
         left = [ring.names for ring in self._rings if set(ring.names) not in solved]
         ring_of = {name: i for i, names in enumerate(left) for name in names}
@@ -334,7 +353,7 @@ class Coupling:
             self._enter(name, list(ports))
 
     def _enter(self, name: str, ports: Sequence[str]) -> None:
-        """Enter into the row what an FMU holds."""
+        """Enter the values that an FMU holds into the row."""
         held = self._instances[name].read(ports)
         self._row.enter({PortName(name, port): value for port, value in held.items()})
 

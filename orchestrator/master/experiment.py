@@ -33,13 +33,13 @@ MOST_STEPS = 1_000_000_000
 _MOST_PARTS = 1000
 
 
-def order_of(text: str) -> Order:
-    """An order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+def read_order(text: str) -> Order:
+    """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
     return tuple(name.strip() for name in text.split(",")) if "," in text else text
 
 
-def written_order(order: Order) -> str:
-    """An order as a command line has it."""
+def format_order(order: Order) -> str:
+    """Write an order as a command line has it."""
     return order if isinstance(order, str) else ",".join(order)
 
 
@@ -68,7 +68,7 @@ class Experiment:
     """What to run a system for.
 
     Attributes:
-        stop_time: end [s]; the last step is shorter if the run is no multiple of the step.
+        stop_time: end [s]; the last step is shorter if the run is not a multiple of the step.
         step: communication step [s].
         order: in which components are stepped, one of :data:`ORDERS` or the names of all of them.
         start_time: begin [s].
@@ -106,7 +106,7 @@ class Experiment:
         if self.coupling not in (None, *COUPLINGS):
             raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
         if self.coupling == LINEAR and not isinstance(self.order, str):
-            raise InputError("coupling linear steps all components at once: leave the order out")
+            raise InputError("coupling linear steps all components at once: leave out the order")
         if not isinstance(self.order, str):
             object.__setattr__(self, "order", tuple(self.order))
         elif self.order not in ORDERS:
@@ -181,14 +181,14 @@ def _rounded(n: float) -> float:
 
 
 def decimations(system: System, step: float) -> dict[str, int]:
-    """How many communication steps each component takes in one of its own.
+    """How many communication steps one step of each component spans.
 
     Args:
         system: that says which steps its components want.
         step: the communication step [s].
 
     Raises:
-        InputError: a component's step is no multiple of it.
+        InputError: a component's step is not a multiple of it.
 
     """
     found = dict.fromkeys(system.components, 1)
@@ -200,7 +200,7 @@ def decimations(system: System, step: float) -> dict[str, int]:
         n = max(round(min(own / step, MOST_STEPS + 1.0)), 1)
         if abs(own / step - n) > ROUNDING * n:
             raise InputError(
-                f"{name} wants steps of {own:g} s, which are no multiple of the communication "
+                f"{name} wants steps of {own:g} s, which are not a multiple of the communication "
                 f"step of {step:g} s"
             )
         found[name] = n
@@ -237,7 +237,7 @@ def _common_measure(steps: Iterable[float]) -> float:
     if min(exact) > _MOST_PARTS * common:
         listed = ", ".join(f"{float(step):g}" for step in sorted(set(exact)))
         raise InputError(
-            f"the components want steps of {listed} s, which have no step in common; say which "
-            "communication step to take, of which theirs are multiples"
+            f"the components want steps of {listed} s, which have no common divisor; give a "
+            "communication step of which all of them are multiples"
         )
     return float(common)

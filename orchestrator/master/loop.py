@@ -20,8 +20,8 @@ from orchestrator.master.experiment import ROUNDING, Experiment
 from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.schedule import Stage, step
-from orchestrator.master.stepper import kept, made, stepped
+from orchestrator.master.schedule import Stage, step_members
+from orchestrator.master.stepper import compile_stepper, load_stepper, step_compiled
 
 #: Loops that can be asked for; the first is the default.
 LOOPS = ("auto", "python", "compiled")
@@ -53,7 +53,7 @@ class Stepping(NamedTuple):
     steps: Steps
 
 
-def interpreted(run: Run) -> Iterator[None]:
+def step_interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
     values, shown, append = run.row.values, run.row.shown, run.blocks.append
     experiment, stages, steps = run.experiment, run.stages, run.experiment.rows - 1
@@ -67,10 +67,10 @@ def interpreted(run: Run) -> Iterator[None]:
                     values[gather.targets] = values[gather.sources]
                 else:
                     gather(values)
-                step(members, t, h)
+                step_members(members, t, h)
             elif decimation.is_due(k - 1, steps):
                 gather(values)
-                step(members, t, experiment.length(k - 1, decimation.every))
+                step_members(members, t, experiment.length(k - 1, decimation.every))
         if is_not_finite():
             return
         append(end, shown)
@@ -79,11 +79,13 @@ def interpreted(run: Run) -> Iterator[None]:
 
 
 #: The loop that is always there.
-PYTHON_LOOP = Stepping("python", interpreted)
+PYTHON_LOOP = Stepping("python", step_interpreted)
 
 
-def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = None) -> Stepping:
-    """The loop for a run.
+def choose_loop(
+    wanted: str, experiment: Experiment, isolation: Isolation | None = None
+) -> Stepping:
+    """Choose the loop for a run.
 
     Args:
         wanted: one of :data:`LOOPS`.
@@ -98,22 +100,24 @@ def chosen(wanted: str, experiment: Experiment, isolation: Isolation | None = No
         raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
     if wanted == "compiled":
         if isolation:
-            raise InputError("the compiled loop steps no isolated FMUs: leave one of the two out")
-        return _compiled(kept() or made())
+            raise InputError(
+                "the compiled loop cannot step isolated FMUs: leave one of the two out"
+            )
+        return _compiled(load_stepper() or compile_stepper())
     if wanted == "auto" and not isolation and experiment.rows > _SET_UP:
-        if library := kept():
+        if library := load_stepper():
             return _compiled(library)
         if experiment.rows > _COMPILED:
             with suppress(InputError):
-                return _compiled(made(in_no_time=True))
+                return _compiled(compile_stepper(in_no_time=True))
     return PYTHON_LOOP
 
 
 def _compiled(library: CDLL) -> Stepping:
-    return Stepping("compiled", partial(stepped, library))
+    return Stepping("compiled", partial(step_compiled, library))
 
 
-def to_its_end(steps: Steps, run: Run) -> Iterator[None]:
+def make_steps(steps: Steps, run: Run) -> Iterator[None]:
     """Make the steps of a run, and its last row where a component ends it within a step.
 
     Yields:
@@ -129,7 +133,7 @@ def to_its_end(steps: Steps, run: Run) -> Iterator[None]:
     except Ended as end:
         if not end.time > run.time:
             raise
-        yield from to_its_end(partial(_finished, end=end), run)
+        yield from make_steps(partial(_finished, end=end), run)
 
 
 def _finished(run: Run, end: Ended) -> Iterator[None]:
@@ -176,7 +180,9 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
             for name in filter(None, (one.instance.name for one in stage.members)):
                 takes = is_whole or run.system.components[name].takes_any_step
                 reached[name] = cut.time(min(n - 1 + every, cut.rows - 1)) if takes else t
-            step([one for one in stage.members if reached.get(one.instance.name, after) > t], t, h)
+            step_members(
+                [one for one in stage.members if reached.get(one.instance.name, after) > t], t, h
+            )
         if not np.isfinite(run.row.shown).all():
             return
         run.blocks.append(after, run.row.shown)
@@ -210,10 +216,10 @@ def _stepped_on(stage: Stage, end: Ended, t: float, h: float) -> Ended:
     for i, member in enumerate(stage.members):
         idle = member._replace(set_inputs=[], do_step=_nothing)
         try:
-            step([idle if i < begun else member], t, h)
+            step_members([idle if i < begun else member], t, h)
         except Ended as other:
             end = min(end, other, key=lambda one: one.time)
-            step([idle], t, h)
+            step_members([idle], t, h)
     return end
 
 

@@ -29,7 +29,7 @@ from platform import python_version
 
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.master.experiment import JACOBI, LINEAR, ORDERS, Experiment, Order, decimations
-from orchestrator.system.graph import delayed, derived_order, has_feedthrough, in_stages
+from orchestrator.system.graph import delayed_connections, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
@@ -45,7 +45,7 @@ _ROOMS = ("system", "master")
 
 @dataclass(frozen=True)
 class Plan:
-    """What :func:`planned` makes of a system, for :func:`.simulation.simulate` to run.
+    """What :func:`make_plan` makes of a system, for :func:`.simulation.simulate_plan` to run.
 
     Attributes:
         system: that is run.
@@ -61,7 +61,7 @@ class Plan:
     remarks: Sequence[str] = ()
 
 
-def planned(system: System, experiment: Experiment) -> Plan:
+def make_plan(system: System, experiment: Experiment) -> Plan:
     """Check what can be checked before an FMU is loaded.
 
     Where an FMU takes steps of one length only, a last, shorter step is left out.
@@ -80,7 +80,7 @@ def planned(system: System, experiment: Experiment) -> Plan:
     whole = experiment.full_steps // period * period
     if not rigid or whole == experiment.rows - 1:
         return Plan(system, experiment, found)
-    why = f"{', '.join(rigid)}: takes steps of one length only, so"
+    why = f"{', '.join(rigid)}: takes only steps of a fixed length, so"
     if whole == 0:
         shortest = period * experiment.step
         raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
@@ -105,7 +105,7 @@ def _check_linear(system: System) -> None:
             )
     if system.steps:
         raise InputError(
-            f"coupling linear: {', '.join(system.steps)}: takes steps of its own; leave them out"
+            f"coupling linear: {', '.join(system.steps)}: takes longer steps; leave them out"
         )
 
 
@@ -147,7 +147,7 @@ def check_order(system: System, order: Order) -> None:
     for names, what in ((twice, "twice"), (missing, "not at all")):
         if names:
             raise InputError(
-                f"order {','.join(order)}: names {', '.join(names)} {what}; it takes every "
+                f"order {','.join(order)}: names {', '.join(names)} {what}; it must name every "
                 "component once"
             )
 
@@ -170,7 +170,7 @@ def delays(
     if not isinstance(order, str) or order == JACOBI:
         return []
     late: dict[str, list[PortName]] = {}
-    for connection in delayed(system, derived_order(system, solved), solved):
+    for connection in delayed_connections(system, derived_order(system, solved), solved):
         late.setdefault(connection.target.component, []).append(connection.source)
     found = []
     for name, sources in late.items():
@@ -181,7 +181,7 @@ def delays(
     return found
 
 
-def gathered(
+def gathered_connections(
     system: System,
     sequence: Sequence[Sequence[str]],
     solved: Sequence[Sequence[str]] = (),
@@ -207,7 +207,7 @@ def gathered(
         if start in ring_of and ring_of[start] == ring_of.get(end):
             continue
         source, target = stage_of[start], stage_of[end]
-        # What is no feedthrough is a state, and must be taken before any component advances.
+        # An output without feedthrough is a state, and must be read before any component advances.
         at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
         late = at_once and source < target
         found[target if late else 0].append(connection)

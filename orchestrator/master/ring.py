@@ -257,7 +257,7 @@ class Ring:
             ports = ", ".join(str(self._ports[i]) for i in np.flatnonzero(moving))
             raise ComponentFailed(
                 f"values do not come to rest: {shortened(ports)} in an algebraic loop; start "
-                "values nearer to a solution may help"
+                "values closer to a solution may help"
             )
 
     def _exchange(self) -> None:

@@ -1,4 +1,4 @@
-"""The row of all values, and what is done to them on their way from outputs to inputs."""
+"""The row of all values, and their changes on the way from outputs to inputs."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ class Row:
         return [port for port, causality, _ in self._ports[component] if causality == "output"]
 
     def enter(self, values: Mapping[PortName, Value]) -> None:
-        """Take values of ports, except the ones that are no finite numbers."""
+        """Take values of ports, except any that are not finite numbers."""
         for port, value in values.items():
             if port in self.columns and isfinite(number := self.number(value)):
                 self.values[self.columns[port]] = number
@@ -113,7 +113,7 @@ class Row:
         return self.strings.number(value) if isinstance(value, str) else float(value)
 
     def wrong(self, components: Iterable[str]) -> str | None:
-        """The first value that is no number, infinite, or none of an input's type, in words.
+        """The first value that is not finite or not of an input's type, in words.
 
         Args:
             components: in the order in which they are stepped: others may have passed it on.
@@ -131,13 +131,13 @@ class Row:
             if not isfinite(value):
                 text = f"{port} is {value:g}"
             elif causality == "input" and fmi_type != "Real" and not are_integers(value):
-                text = f"{port} is {value:.16g}, which no {fmi_type} of FMI can be"
+                text = f"{port} is {value:.16g}, which FMI type {fmi_type} cannot hold"
             else:
                 continue
             if causality == "output":
                 return text
             source = self._sources.get(port)
-            text += f", fed by {source}" if source else ", as a table or an event has it"
+            text += f", fed by {source}" if source else ", from a table or an event"
             if source is None or isfinite(self.values[self.columns[source]]):
                 return text
             passed_on = passed_on or text
@@ -164,7 +164,7 @@ class Row:
         )
 
     def show(self, component: str) -> None:
-        """Copy what is hidden of a component into its columns."""
+        """Copy the hidden values of a component into its columns."""
         if component in self._hiding:
             targets, sources = self._hiding[component]
             self.values[targets] = self.values[sources]
@@ -227,14 +227,14 @@ class Gathering:
         values[self.targets[place]] = self.factors[place] * taken + self.offsets[place]
 
     def set(self, place: int, factor: float, offset: float) -> None:
-        """Say what is done to one of the values."""
+        """Set the change to one of the values."""
         self.factors[place], self.offsets[place] = factor, offset
         plain = (self.factors == FACTOR) & (self.offsets == OFFSET) & np.signbit(self.offsets)
         self.is_plain = bool(plain.all()) and not self.mapped
 
 
 class Overrides:
-    """All that is gathered in a step, and what is done to it for some time."""
+    """Everything that is gathered in a step, and temporary changes to it."""
 
     def __init__(
         self, row: Row, gatherings: Iterable[Gathering], connections: Sequence[Connection]

@@ -4,7 +4,7 @@ Rings of feedthroughs that are solved have stages of their own. Each is closed b
 are stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds
 it, and again when all have been stepped: every row shows its solution.
 
-A component may take n communication steps in one of its own. It is stepped at every n-th t_k, with
+A component may span n communication steps in one step. It is stepped at every n-th t_k, with
 the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
 there outputs with direct feedthrough, which hold from t_k on, are shown at once, unless the order
 is `jacobi`; all others when the time has come that they belong to.
@@ -21,9 +21,9 @@ from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
 from orchestrator.master.experiment import JACOBI, Order
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
-from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, put_back
+from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, restore_mode
 from orchestrator.master.fmi.transfer import CMember, CMove, DoStepCallback, address_of
-from orchestrator.master.plan import Plan, gathered
+from orchestrator.master.plan import Plan, gathered_connections
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
@@ -41,7 +41,7 @@ class Member(NamedTuple):
 
 
 class StageCall:
-    """What is in the place of an instance where a stage acts, and steps no component."""
+    """Takes the place of an instance in a stage that acts but steps no component."""
 
     name, is_here = "", True
 
@@ -86,10 +86,10 @@ class StageCall:
 
 
 class Decimation(NamedTuple):
-    """When a slow component is stepped, or what it has computed is shown.
+    """When a slow component is stepped, or its outputs are shown.
 
     Attributes:
-        every: how many communication steps one of its own takes.
+        every: how many communication steps one of its steps spans.
         at_end: whether in the last of them, not in the first.
 
     """
@@ -146,7 +146,7 @@ def schedule(
     shown: list[Stage] = []
     nothing = Gathering.along(row, ())
     solved = [ring.names for ring in rings]
-    gathers = gathered(system, sequence, solved, order, latest=latest)
+    gathers = gathered_connections(system, sequence, solved, order, latest=latest)
     for names, connections in zip(sequence, gathers, strict=True):
         taken: dict[int, list[Connection]] = {1: []}
         for connection in connections:
@@ -201,7 +201,7 @@ def member(instance: Instance) -> Member:
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
-def step(members: Sequence[Member], t: float, h: float, is_final: bool = True) -> None:
+def step_members(members: Sequence[Member], t: float, h: float, is_final: bool = True) -> None:
     """Step the components of a stage, which may run side by side until their outputs are asked.
 
     Args:
@@ -220,10 +220,10 @@ def step(members: Sequence[Member], t: float, h: float, is_final: bool = True) -
             raise instance.failed(status, DO_STEP)
         # To call a function that looks costs more than to look.
         if A * B * C != PRODUCT:
-            put_back()
+            restore_mode()
     for _, _, get_outputs, instance in members:
         for call in get_outputs:
             if (status := call()) != fmi2OK and status != fmi2Warning:
                 raise instance.failed(status, GET_OUTPUTS)
         if A * B * C != PRODUCT:
-            put_back()
+            restore_mode()

@@ -14,10 +14,10 @@ from orchestrator.master.coupling import Coupling, Growth
 from orchestrator.master.experiment import OURS, Exchange
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.fmi.placement import placed
+from orchestrator.master.fmi.placement import place_instances
 from orchestrator.master.fmi.surroundings import Surroundings, default_mode
 from orchestrator.master.hooks.hook import Hook, Hooks, Run
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, to_its_end
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, make_steps
 from orchestrator.master.observers.observer import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.master.plan import Plan
 from orchestrator.master.row import Overrides, Row
@@ -29,7 +29,7 @@ from orchestrator.system.values import literal, same, unit_of
 # What overflows on its way is named as the value of a port.
 @np.errstate(all="ignore")
 @default_mode()
-def simulate(
+def simulate_plan(
     plan: Plan,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
@@ -40,9 +40,9 @@ def simulate(
     """Run a system.
 
     Args:
-        plan: what to run, as :func:`.plan.planned` gives it.
+        plan: what to run, as :func:`.plan.make_plan` gives it.
         observers: take the rows.
-        isolation: run each FMU in a process of its own; None: all in this one.
+        isolation: run each FMU in a separate process; None: all in this one.
         loop: makes the steps.
         hooks: act between them, in this order.
         exchange: of values.
@@ -62,7 +62,9 @@ def simulate(
         log.remark(line)
     with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
         with _explained():
-            instances = stack.enter_context(placed(system.components, log, isolation, interrupts))
+            instances = stack.enter_context(
+                place_instances(system.components, log, isolation, interrupts)
+            )
             # Before their processes are ended: a copy must not do that for the process itself.
             stack.enter_context(surroundings)
             loop = _possible_loop(loop, instances, log)
@@ -78,8 +80,9 @@ def simulate(
                 _units(system, row.columns),
             )
         scheduled, gatherings = coupling.schedule()
-        if watched := coupling.delayed_ports():
-            observers = [*observers, Growth(watched)]
+        growth = Growth(coupling.delayed_ports())
+        if growth.ports:
+            observers, hooks = [*observers, growth], [*hooks, growth]
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours)
             interrupts.hand_over = blocks.hand_over
@@ -93,6 +96,8 @@ def simulate(
             remark = None
             try:
                 failure = _advance(run, loop, Hooks(run), order, surroundings)
+                if failure and growth.found not in failure:
+                    failure += f"; {growth.found}"
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -110,7 +115,9 @@ def simulate(
         return ending
 
 
-def completed(plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange = OURS) -> None:
+def simulate_to_end(
+    plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange = OURS
+) -> None:
     """Run a system of which nothing less than all rows will do.
 
     Raises:
@@ -118,7 +125,7 @@ def completed(plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange
         KeyboardInterrupt: a signal has come to stop it.
 
     """
-    ending = simulate(plan, observers, exchange=exchange)
+    ending = simulate_plan(plan, observers, exchange=exchange)
     if ending.signals:
         raise KeyboardInterrupt
     if ending.failure is not None:
@@ -131,8 +138,8 @@ def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) 
     if not apart or loop == PYTHON_LOOP:
         return loop
     log.remark(
-        f"{', '.join(apart)}: runs in a process of its own, for the FMU allows one instance a "
-        "process; steps are made in Python"
+        f"{', '.join(apart)}: runs in a separate process, since the FMU allows one instance "
+        "per process; steps are made in Python"
     )
     return PYTHON_LOOP
 
@@ -140,7 +147,7 @@ def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) 
 def _parameters(
     system: System, instances: Mapping[str, Instance], log: Log
 ) -> dict[PortName, object]:
-    """Values of all parameters as the FMUs hold them; where one is not what was set, the log says.
+    """Values of all parameters as the FMUs hold them; the log names any that were not kept.
 
     Some FMUs overwrite values without a word.
     """
@@ -180,7 +187,7 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         hooks.act()
-        for _ in to_its_end(loop.steps, run):
+        for _ in make_steps(loop.steps, run):
             if run.made >= run.due:
                 hooks.act()
             if monotonic() > blocks.due:

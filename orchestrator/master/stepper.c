@@ -18,7 +18,7 @@
 #include <stddef.h>
 #include <string.h>
 
-/* The worst of FMI's statuses that is no failure, and one that is. */
+/* The worst of FMI's statuses that is not a failure, and one that is. */
 enum { FMI2_WARNING = 1, FMI2_ERROR = 3 };
 
 /* Steps of which so many take no time to speak of are timed so many together. */
@@ -66,7 +66,7 @@ typedef struct {
     const mapping *mappings;
     const member *members;
     size_t n_connections, n_mappings, n_members;
-    size_t every; /* how many steps one of its components takes in one of its own */
+    size_t every; /* how many steps one step of its components spans */
     int at_end;   /* whether it belongs to the last of these steps, not to the first */
 } stage;
 
@@ -135,7 +135,7 @@ static int set(const move *inputs, void *component) {
     }
     for (i = 0; i < inputs->n; i++) {
         const double value = inputs->values[i];
-        /* What is none of FMI's Integers is named where the row is looked at. */
+        /* The check of the row names values that FMI's Integer cannot hold. */
         if (!(value >= INT_MIN && value <= INT_MAX && value == (int)value)) return FMI2_ERROR;
         inputs->integers[i] = (int)value;
     }

@@ -12,8 +12,8 @@ from hashlib import sha256
 from pathlib import Path
 
 from orchestrator.machine import cache as user_cache
-from orchestrator.machine.children import compiler, made_library, of_the_machine
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.children import compile_library, find_compiler, find_fast_compiler
+from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import CALLS
 from orchestrator.master.fmi.transfer import CMember
@@ -90,7 +90,7 @@ class CFailure(Structure):
     _fields_ = (("stage", c_size_t), ("member", c_size_t), ("call", c_int), ("status", c_int))
 
 
-def stepped(library: CDLL, run: Run) -> Iterator[None]:
+def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
     """Make the steps of a run by stepper.c, compiled: see :class:`.loop.Steps`."""
     advance = library.advance
     advance.restype = c_int
@@ -145,18 +145,20 @@ def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:
     return CMapping(place, n, (c_double * n)(*pairs), (c_double * n)(*pairs.values()))
 
 
-def kept() -> CDLL | None:
-    """The library that was compiled earlier; None: there is none."""
+def load_stepper() -> CDLL | None:
+    """Load the library that was compiled earlier; None: there is none."""
     folder = user_cache.users_folder()
     if folder not in _in_use:
         # What is loaded needs no second look: short runs would take longer for it.
         with suppress(OSError):
-            _in_use.update((folder, _loaded(path)) for path in user_cache.kept(_CATEGORY, _key()))
+            _in_use.update(
+                (folder, _loaded(path)) for path in user_cache.read_cached(_CATEGORY, _key())
+            )
     return _in_use.get(folder)
 
 
-def made(in_no_time: bool = False) -> CDLL:
-    """The library, compiled now.
+def compile_stepper(in_no_time: bool = False) -> CDLL:
+    """Compile the library, and load it.
 
     Args:
         in_no_time: only by a compiler that takes a tenth of a second.
@@ -165,19 +167,19 @@ def made(in_no_time: bool = False) -> CDLL:
         InputError: it cannot be; the text says what to do.
 
     """
-    found = of_the_machine() if in_no_time else compiler()
+    found = find_fast_compiler() if in_no_time else find_compiler()
     if found is None:
         raise InputError(
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     try:
-        with claimed(user_cache.folder_of(_CATEGORY), wait=True):
-            if library := kept():
+        with hold_lock(user_cache.category_folder(_CATEGORY), wait=True):
+            if library := load_stepper():
                 # Another process was first.
                 return library
-            content = made_library(found, *_FLAGS, str(_SOURCE))
+            content = compile_library(found, *_FLAGS, str(_SOURCE))
             name = "stepper" + (".dll" if sys.platform == "win32" else ".so")
-            [place] = user_cache.keep(_CATEGORY, _key(), {name: content})
+            [place] = user_cache.write_cached(_CATEGORY, _key(), {name: content})
         return _loaded(place)
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error

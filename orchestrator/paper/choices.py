@@ -1,4 +1,4 @@
-"""What the paper leaves open of the runs behind its printed table, and how it can be filled in.
+"""What the paper leaves open about the runs of its printed table, and the possible choices.
 
 Section 4.2 prints twelve numbers. What made them is not all said: each :class:`Choice` is one thing
 that is not, or that is printed so that another meaning can be thought of. Where an option
@@ -84,7 +84,7 @@ _WAVES, _SIGN = Disturbance(), "(2): the minus of tau_w"
 _UNDER_WAY = TAU_D[0] / Vehicle().d11
 
 #: Name of the choice that runs with five degrees of freedom have one option of.
-VEHICLE = "vehicle"
+VEHICLE_CHOICE = "vehicle"
 
 #: Choices that a run depends on.
 OF_RUNS = (
@@ -126,7 +126,7 @@ OF_RUNS = (
         ),
     ),
     Choice(
-        VEHICLE,
+        VEHICLE_CHOICE,
         (
             Option("six degrees of freedom, 5 N·m rights the roll"),
             Option("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
@@ -186,7 +186,7 @@ FIVE_DEGREES, AGAINST_FIVE = Option("five degrees of freedom", {"plant.roll": Fa
 #: What a run of five depends on, of what contradicts nothing else.
 OF_RUNS_OF_FIVE = tuple(
     choice._replace(options=(FIVE_DEGREES,))
-    if choice.name == VEHICLE
+    if choice.name == VEHICLE_CHOICE
     else choice._replace(options=tuple(each for each in choice.options if not each.against))
     for choice in OF_RUNS
 )
@@ -232,7 +232,7 @@ OF_READING = (
 )
 
 
-def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
+def choice_options(choice: Choice, scenario: str) -> tuple[Option, ...]:
     """The options of a choice in a scenario: one where it has none."""
     if choice.of_proposed and scenario != PROPOSED:
         return (choice.options[choice.ours],)
@@ -241,7 +241,7 @@ def options_of(choice: Choice, scenario: str) -> tuple[Option, ...]:
 
 def runs(scenario: str, of_runs: Sequence[Choice] = OF_RUNS) -> Iterator[Point]:
     """A run for each combination, in the order of the choices; the last varies fastest."""
-    combinations = product(*(options_of(choice, scenario) for choice in of_runs))
+    combinations = product(*(choice_options(choice, scenario) for choice in of_runs))
     for number, combination in enumerate(combinations):
         yield run_of(scenario, combination, number)
 
@@ -257,7 +257,7 @@ def run_of(scenario: str, combination: Sequence[Option], number: int = 0) -> Poi
 
 def contradicts_nothing(scenario: str, choices: Sequence[Choice]) -> np.ndarray:
     """Whether a combination of options contradicts nothing that is printed, an axis a choice."""
-    flags = [[not option.against for option in options_of(each, scenario)] for each in choices]
+    flags = [[not option.against for option in choice_options(each, scenario)] for each in choices]
     found: np.ndarray = reduce(np.logical_and, np.meshgrid(*flags, indexing="ij", sparse=True))
     return found
 

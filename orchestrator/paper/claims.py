@@ -1,4 +1,4 @@
-"""Every printed number and claim of section 4 that a simulation can be held against.
+"""Every printed number and claim of section 4 that a simulation can check.
 
 A claim is a function of the kept runs that are named beside it. The report makes these
 runs, calls every claim, and prints what it finds in the order of this file.
@@ -226,6 +226,7 @@ def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
     if len(approaches) < len(published):
         return Finding(f"|e| does not come to {REACHED:g} m", "none")
     least = [found.least_effort for found in approaches]
+    pairs = list(zip(approaches, published, strict=True))
     pairs = list(zip(approaches, published, strict=True))
     soonest = [found.soonest(effort) for found, effort in pairs]
     took = ", and ".join(

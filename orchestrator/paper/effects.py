@@ -17,11 +17,11 @@ from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
 from orchestrator.figures.panels import draw_commands
 from orchestrator.figures.run_figures import overlay
-from orchestrator.figures.style import COLOURS, STYLES, WIDTH, Drawn, save, styled
+from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn, save, styled
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
-from orchestrator.paper.page import actuator_values, numbers, picture, plain
+from orchestrator.paper.page import actuator_values, escape_markdown, numbers, picture
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates
 from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
@@ -110,7 +110,7 @@ def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
     """
     for kept_run in kept_runs:
         if kept_run.failure is not None:
-            return f"A run ended early: {plain(kept_run.failure)}"
+            return f"A run ended early: {escape_markdown(kept_run.failure)}"
     [found] = [effect for effect in EFFECTS if effect.name == name]
     with styled():
         shown = found.show(*kept_runs)
@@ -163,7 +163,7 @@ def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
 def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Shown:
     """What a delay of one step does to the two controllers."""
     variation = [sum(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)]
-    figure = Figure(figsize=(WIDTH, 4.5))
+    figure = Figure(figsize=(FIGURE_WIDTH, 4.5))
     panels = figure.subplots(3, 2, sharex=True, width_ratios=(1, 2))
     for column, (title, runs) in enumerate(
         (
@@ -187,7 +187,7 @@ def step(*runs: KeptRun) -> Shown:
     """What of the efforts is the scheme's doing, and not the controller's."""
     *stepped, exact = (run.metrics["l2_effort"] for run in runs)
     proposed, pd = np.reshape(stepped, (2, len(STEPS), len(ACTUATORS)))
-    figure = Figure(figsize=(WIDTH, 3.2))
+    figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
     for axes, title, ours, published in zip(
         figure.subplots(1, 2),
         ("proposed controller, Fig. 5", "PD controller, Fig. 5"),
@@ -223,7 +223,7 @@ def step(*runs: KeptRun) -> Shown:
 def noise(*runs: KeptRun) -> Shown:
     """Why the level of the noise, which is not given, matters."""
     one_mm, one_cm = (runs[NOISE_LEVELS.index(level)].metrics for level in (1e-3, 1e-2))
-    figure = Figure(figsize=(WIDTH, 3.2))
+    figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
     effort, peak = figure.subplots(1, 2)
     # A logarithmic axis that begins at zero: the first level is none at all.
     levels = np.array(NOISE_LEVELS) * 1e3
@@ -254,7 +254,7 @@ def noise(*runs: KeptRun) -> Shown:
 @effect("effect-lambda", "Condition (30) against the limits of (3)", *_QUICK)
 def condition_30(*runs: KeptRun) -> Shown:
     """What the gains that Theorem 1 asks for command."""
-    figure = Figure(figsize=(WIDTH, 3.2))
+    figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
     peak, error = figure.subplots(1, 2)
     for axes, key, names, title, unit in (
         (peak, "peak_command", _SIGNALS, "peak commands", "N, N·m"),
@@ -294,7 +294,7 @@ def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
 def certificates_along_a_run(quiet: KeptRun) -> Shown:
     """What the proof speaks of, along Fig. 4."""
     column = dict(zip(CERTIFICATE_COLUMNS, certificates(quiet.table).T, strict=True))
-    figure = Figure(figsize=(WIDTH, 5.5))
+    figure = Figure(figsize=(FIGURE_WIDTH, 5.5))
     panels = figure.subplots(3, 1, sharex=True)
     panels[0].semilogy(column["time"], column["V_without_theta"], color=COLOURS[0])
     panels[0].set_ylabel("V of (34) [J],\nwithout its term in θ")

@@ -18,8 +18,8 @@ from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
-from orchestrator.runs.folder import opened
-from orchestrator.runs.preparation import Prepared, prepared_of
+from orchestrator.runs.folder import open_ledger
+from orchestrator.runs.preparation import Prepared, prepare_request
 from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.indices import Metrics
@@ -93,7 +93,7 @@ class KeptRuns:
             KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
 
         """
-        with opened(self._folder, self._force) as ledger:
+        with open_ledger(self._folder, self._force) as ledger:
             self._make(runs, workers, ledger)
 
     def _make(self, runs: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
@@ -101,7 +101,7 @@ class KeptRuns:
         for run in dict.fromkeys(runs):
             wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
             try:
-                prepared = prepared_of(wanted)
+                prepared = prepare_request(wanted)
             except InputError as error:
                 self._keys[run] = self._labels[run.command_line] = key = run.command_line
                 self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
@@ -124,7 +124,7 @@ class KeptRuns:
 
     def forget_others(self) -> None:
         """Remove from the folder what belongs to no run of this report."""
-        with opened(self._folder) as ledger:
+        with open_ledger(self._folder) as ledger:
             ledger.remove(set(ledger.files) - set(map(_file, self._keys.values())))
 
 
@@ -144,7 +144,7 @@ def key_of(prepared: Prepared) -> str:
 def _make(run: Request, key: str) -> KeptRun:
     """Make a run; a task for a worker."""
     try:
-        prepared = prepared_of(run)
+        prepared = prepare_request(run)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
         metrics = Metrics(prepared.loops)

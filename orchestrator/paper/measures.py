@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD, parameter
+from orchestrator.vehicle.signals import STANDARD, real_parameter
 
 #: Control efforts of section 4.2, in the order u, q, r.
 EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
@@ -68,7 +68,9 @@ def errors(table: Table) -> np.ndarray:
     """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
     _, theta, psi = table.group(*STANDARD.attitude).T
     ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
-    y = table.group(*STANDARD.position) + parameter(table, STANDARD.ell) * np.column_stack(ahead)
+    y = table.group(*STANDARD.position) + real_parameter(table, STANDARD.ell) * np.column_stack(
+        ahead
+    )
     error: np.ndarray = y - table.group(*STANDARD.y_d)
     return error
 

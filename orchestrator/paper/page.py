@@ -60,9 +60,9 @@ def values_with_units(values: Sequence[float], units: Iterable[str]) -> str:
     return "; ".join(" ".join(filter(None, part)) for part in parts)
 
 
-def plain(text: str) -> str:
-    """A text of one line in which Markdown sees no mark."""
-    # An underscore within a name is none.
+def escape_markdown(text: str) -> str:
+    """Escape the marks of Markdown in a text, and make one line of it."""
+    # An underscore within a name is not emphasis.
     marks = r"[\\`*{}\[\]<>#|&]|(?<![^\W_])_|_(?![^\W_])"
     return re.sub(marks, r"\\\g<0>", " ".join(text.split()))
 

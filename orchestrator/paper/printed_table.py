@@ -18,11 +18,11 @@ from orchestrator.paper.choices import (
     PD,
     PROPOSED,
     PUBLISHED,
-    VEHICLE,
+    VEHICLE_CHOICE,
 )
-from orchestrator.paper.page import numbers, plain, table
+from orchestrator.paper.page import escape_markdown, numbers, table
 from orchestrator.paper.variants import (
-    FARTHEST,
+    FARTHEST_START,
     QUANTILES,
     SAME,
     SEARCHED,
@@ -33,8 +33,8 @@ from orchestrator.paper.variants import (
     Variant,
     all_variants,
 )
-from orchestrator.runs.folder import replaced
-from orchestrator.runs.record import RECORDED, Stopwatch, write_content
+from orchestrator.runs.folder import replace_files
+from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 
@@ -148,7 +148,7 @@ def _described(found: Sensitivity, variant: Variant) -> str:
     scores = found.scores[variant.options[:-1]]
     around = [i for i in (last - _AROUND, last + _AROUND) if 0 <= i < len(END_TIMES)]
     beside = " and ".join(f"{scores[i]:.2f} at {END_TIMES[i]:g} s" for i in around)
-    text = plain("; ".join((*words, f"{choice.name} = {option.text}")))
+    text = escape_markdown("; ".join((*words, f"{choice.name} = {option.text}")))
     return f"{text}; the score is {beside}"
 
 
@@ -158,7 +158,7 @@ def _starts(variants: Sequence[Variant]) -> str:
     still = [title for title in _TITLES if title not in told]
     text = (
         f"Each of these was made from {len(SHOWN)} more starts, moved by at most "
-        f"{1e6 * FARTHEST:g}e-6 m along each axis."
+        f"{1e6 * FARTHEST_START:g}e-6 m along each axis."
     )
     if told:
         low, _, high = (100 * quantile for quantile in QUANTILES)
@@ -178,7 +178,7 @@ def _reached(found: Found) -> str:
     texts = []
     for formula, name in enumerate(_FORMULAS):
         missed = [
-            plain(NUMBERS[scenario][i])
+            escape_markdown(NUMBERS[scenario][i])
             for scenario, published in PUBLISHED.items()
             for span in [found.six.span(scenario, True, formula)]
             for i in np.flatnonzero((published < span.low) | (published > span.high))
@@ -245,10 +245,11 @@ def _options(found: Found) -> Iterator[list[str]]:
         best = [six.best_with_each(axis, consistent) for consistent in (True, False)]
         for option, *scores in zip(choice.options, *best, strict=True):
             written = [f"{score:.2f}" if np.isfinite(score) else "" for score in scores]
-            yield [plain(choice.name), plain(option.text), *written, plain(option.against)]
-        if choice.name == VEHICLE:
+            yield [*map(escape_markdown, (choice.name, option.text, *written, option.against))]
+        if choice.name == VEHICLE_CHOICE:
             score = f"{found.printed[-1].score:.2f}, of medians"
-            yield [plain(choice.name), plain(FIVE_DEGREES.text), "", score, plain(AGAINST_FIVE)]
+            row = (choice.name, FIVE_DEGREES.text, "", score, AGAINST_FIVE)
+            yield [*map(escape_markdown, row)]
 
 
 def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tuple[Path, Path]:
@@ -268,14 +269,14 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
 
     """
     clock = Stopwatch()
-    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
+    with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             found = all_variants(crew)
         text = f"# The printed table of section 4.2\n\n{section(found)}\n"
         (unfinished / _TEXT).write_text(text, encoding="utf-8")
         write_variants(unfinished / _VARIANTS, found)
         content = {"command": list(command), **clock.times()}
-        write_content(unfinished, content, (*RECORDED, "numba"))
+        write_content(unfinished, content, (*RECORDED_PACKAGES, "numba"))
     return folder / _TEXT, folder / _VARIANTS
 
 

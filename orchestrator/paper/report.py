@@ -22,14 +22,14 @@ from orchestrator.paper.sections import (
     Section,
     draw_section,
     make_studies,
+    section_text,
     sections,
     study_sections,
-    written,
 )
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import inner, replaced
-from orchestrator.runs.record import RECORDED, Stopwatch, write_content
+from orchestrator.runs.folder import inner_folder, replace_files
+from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 
@@ -43,13 +43,13 @@ _TITLE = "# The paper's section 4, run again"
 
 _INTRODUCTION = """\
 *Three-dimensional tracking control of autonomous underwater vehicles with limited torque and \
-without velocity sensors*, simulated from FMI 2.0 components. Where results differ from the paper \
-it is said so; no parameter was chosen to bring them closer. The paper gives neither the level of \
-its measurement noise nor the end times of its figures: those of the scenarios are ours, and all \
-but Fig. 4 run without noise, so that roughness in a signal is the controller's own doing. Ours in \
-every run are further the righting moment of roll, 5 N·m (reading 1), and, where there is noise, \
-its seed. The readings, points where the paper is silent or contradicts itself, are explained \
-[at the end](#readings)."""
+without velocity sensors*, simulated from FMI 2.0 components. Differences from the paper are \
+stated; no parameter was chosen to bring the results closer. The paper gives neither the level of \
+its measurement noise nor the end times of its figures: the scenarios have ours, and all but Fig. \
+4 run without noise, so that roughness in a signal comes from the controller itself. In every run \
+the righting moment of roll, 5 N·m (reading 1), and the seed of any noise are ours as well. The \
+readings, points where the paper is silent or contradicts itself, are explained [at the \
+end](#readings)."""
 
 _WHY_NUMBERS_DIFFER = """\
 Why the numbers differ: efforts and final errors depend on the end time and the noise, which are \
@@ -96,9 +96,9 @@ def write_report(
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    kept_runs = KeptRuns(inner(folder, _RUNS), stop_time, kind, force)
-    made = make_studies(ready, inner(folder, _STUDIES), kind, command, force)
-    with replaced(folder, (*_NAMES, RECORD), force=force) as unfinished:
+    kept_runs = KeptRuns(inner_folder(folder, _RUNS), stop_time, kind, force)
+    made = make_studies(ready, inner_folder(folder, _STUDIES), kind, command, force)
+    with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
             kept_runs.make(
                 [
@@ -165,7 +165,7 @@ def _text(
     yield held
     yield "## Figures"
     for section in chapters:
-        yield from written(section, kept_runs, notes[section.name], folder)
+        yield from section_text(section, kept_runs, notes[section.name], folder)
     yield "## Effects that the paper does not show"
     for effect in EFFECTS:
         yield f"### {effect.title}"
@@ -180,7 +180,7 @@ def _text(
     yield "## Readings"
     yield readings()
     yield "## Versions and commands"
-    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED)
+    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
     yield "Each of these commands makes a run of this report:"
     yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"

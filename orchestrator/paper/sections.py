@@ -18,14 +18,14 @@ from orchestrator.figures.run_figures import FIGURES, draw
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
-from orchestrator.paper.page import picture, plain, table, values_with_units
-from orchestrator.runs.folder import inner
-from orchestrator.runs.preparation import Prepared, prepared_of, with_companion
+from orchestrator.paper.page import escape_markdown, picture, table, values_with_units
+from orchestrator.runs.folder import inner_folder
+from orchestrator.runs.preparation import Prepared, prepare_request, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import read_study
-from orchestrator.studies.sweep import Means, swept
+from orchestrator.studies.sweep import Means, complete_study
 from orchestrator.system.names import file_name, port_name
 from orchestrator.vehicle.indices import metrics, of_vehicles
 
@@ -57,7 +57,7 @@ class Section:
     @property
     def title(self) -> str:
         """Heading."""
-        return plain(self.scenario.title or self.scenario.name)
+        return escape_markdown(self.scenario.title or self.scenario.name)
 
 
 def sections(references: Sequence[str], kind: str = PYTHON) -> list[Section]:
@@ -86,7 +86,7 @@ def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
     request = Request(reference, kind=kind)
     try:
-        prepared = prepared_of(request)
+        prepared = prepare_request(request)
     except InputError:
         # The report says why it cannot be made.
         return {scenario.legend: request}
@@ -112,7 +112,7 @@ def as_request(prepared: Prepared, compared: Prepared, request: Request) -> Requ
 
     """
     standard = Request(compared.scenario.compare, kind=request.kind)
-    own = prepared_of(standard)
+    own = prepare_request(standard)
     experiment, table = prepared.experiment, prepared.input_table
     played = table.targets if table else ()
     inputs = prepared.scenario.inputs
@@ -163,7 +163,7 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
     return draw(kind, "", runs, folder, section.name)
 
 
-def written(
+def section_text(
     section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
 ) -> Iterator[str]:
     """A section in Markdown.
@@ -181,26 +181,27 @@ def written(
     files = Path(folder, "figures", section.name).glob("*.png")
     for file in sorted(files, key=attrgetter("stem")):
         yield picture(section.title, file.relative_to(folder).as_posix())
-    yield from (f"Note: {plain(note)}." for note in notes)
+    yield from (f"Note: {escape_markdown(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
     made = {label: kept_runs[run] for label, run in section.runs.items()}
     for label, kept_run in made.items():
         if kept_run.failure is not None:
-            yield f"**The run {plain(label)} ended early:** {plain(kept_run.failure)}"
+            why = escape_markdown(kept_run.failure)
+            yield f"**The run {escape_markdown(label)} ended early:** {why}"
     of = {
         ", ".join(filter(None, (label, vehicle))): found
         for label, kept_run in made.items()
         for vehicle, found in of_vehicles(kept_run.metrics).items()
     }
     if rows := list(_indices(list(of.values()))):
-        yield table(["index", *map(plain, of)], rows)
+        yield table(["index", *map(escape_markdown, of)], rows)
     reaching = own.metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {plain(label)}: `auv-fmu run {kept_runs.label(run)}`"
+        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(run)}`"
         + (f", until {time:g} s" if (time := kept_runs[run].metrics.get("stop_time")) else "")
         for label, run in section.runs.items()
     )
@@ -230,7 +231,7 @@ def _ours(scenario: Scenario) -> Iterator[str]:
         value = values.get(name, vars(scenario).get(name))
         is_short = value is not None and not isinstance(value, Mapping)
         stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
-        yield f"- `{stated}`: {plain(why)}"
+        yield f"- `{stated}`: {escape_markdown(why)}"
 
 
 def make_studies(
@@ -252,8 +253,8 @@ def make_studies(
     """
     studies = [read_study(name) for name in names]
     for study in studies:
-        place = inner(folder, study.stem)
-        swept(study, Means(kind=kind, force=force), place, command, progress=True)
+        place = inner_folder(folder, study.stem)
+        complete_study(study, Means(kind=kind, force=force), place, command, progress=True)
     return studies
 
 
@@ -269,7 +270,7 @@ def study_sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterat
     if not studies:
         yield _WITHOUT
     for study in studies:
-        title = plain(study.title or study.name)
+        title = escape_markdown(study.title or study.name)
         yield f"### {title}"
         figures = Path("figures", "studies", study.stem)
         (folder / figures).mkdir(parents=True)

@@ -22,13 +22,13 @@ from orchestrator.paper.choices import (
     PUBLISHED,
     Choice,
     as_read,
+    choice_options,
     contradicts_nothing,
-    options_of,
     run_of,
     runs,
 )
 from orchestrator.paper.measures import Approach, approach_of, numbers_of
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed
@@ -36,7 +36,7 @@ from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import AXES
 
 #: How far a start is moved along each axis, at most [m].
-FARTHEST = 1e-6
+FARTHEST_START = 1e-6
 
 #: Numbers of the starts that variants of five degrees of freedom are compared by, and of others
 #: from which every variant is made that is printed.
@@ -280,7 +280,7 @@ def all_variants(
 
     """
     check_installed()
-    engine = BatchEngine({scenario: loaded(scenario)[1] for scenario in PUBLISHED})
+    engine = BatchEngine({scenario: load_scenario(scenario)[1] for scenario in PUBLISHED})
     made = _made(crew, of_runs, partial(_numbers_and_ways, engine), _BLOCK, "block of runs")
     numbers, ways = (
         {scenario: [each[i] for each in found] for scenario, found in made.items()} for i in (0, 1)
@@ -335,7 +335,7 @@ def _by_choice(
     """With an axis for each choice in place of one for the runs."""
     return {
         scenario: np.reshape(
-            found, (*(len(options_of(each, scenario)) for each in of_runs), *np.shape(found[0]))
+            found, (*(len(choice_options(each, scenario)) for each in of_runs), *np.shape(found[0]))
         )
         for scenario, found in made.items()
     }
@@ -343,7 +343,7 @@ def _by_choice(
 
 def _run(found: Sensitivity, variant: Variant, scenario: str) -> Point:
     """The run of a variant in a scenario."""
-    open_there = (options_of(choice, scenario) for choice in found.of_runs)
+    open_there = (choice_options(choice, scenario) for choice in found.of_runs)
     chosen = zip(open_there, variant.options, strict=False)
     return run_of(scenario, [options[min(i, len(options) - 1)] for options, i in chosen])
 
@@ -376,10 +376,10 @@ def quantiles_of(engine: BatchEngine, run: Point, starts: Sequence[int]) -> np.n
 
 
 def moved(engine: BatchEngine, run: Point, starts: Sequence[int]) -> Iterator[Point]:
-    """A run from starts that are moved by :data:`FARTHEST` at most, each by its number."""
+    """A run from starts that are moved by :data:`FARTHEST_START` at most, each by its number."""
     start = engine.setting(run).plant.eta0[: len(AXES)]
     for number in starts:
-        away = np.random.default_rng(number).uniform(-FARTHEST, FARTHEST, len(AXES))
+        away = np.random.default_rng(number).uniform(-FARTHEST_START, FARTHEST_START, len(AXES))
         values = zip(AXES, np.add(start, away).tolist(), strict=True)
         yield run._replace(
             parameters={**run.parameters, **{f"plant.eta0.{axis}": x for axis, x in values}}

@@ -23,12 +23,12 @@ from typing import Any
 from fmus.discovery import fingerprint
 from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.formats.ssp.writer import ssp_bytes
-from orchestrator.machine.cache import folder_of, keep, kept, users_folder
+from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
 from orchestrator.machine.children import run_module
-from orchestrator.machine.disk import claimed, process_folder
+from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
-from orchestrator.runs.folder import replaced
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import WRITABLE
 
@@ -45,13 +45,13 @@ _CATEGORY = "fmus"
 _TEMPLATES = Path(__file__).with_name("templates")
 
 #: What a script can stand on: plain PythonFMU, or the base that the bundle's components have.
-BASES = ("plain", "hardened")
+CONTROLLER_BASES = ("plain", "hardened")
 
 #: Names in the templates that give way to the user's own.
 _CLASS, _MODULE = "OwnController", "own_controller"
 
 
-def build(
+def build_bundle(
     folder: Path,
     loader: str | None = None,
     *,
@@ -78,7 +78,7 @@ def build(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replaced(folder, (_ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
+    with replace_files(folder, (_ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
         # What is up to date is taken along, and not written anew.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
@@ -158,7 +158,7 @@ def settings_of(folder: Path) -> dict[str, str]:
 def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
     """Run a module of the package fmus that writes into a folder.
 
-    In a process of its own: what PythonFMU imports to build must not stay in this one.
+    In a separate process: modules that PythonFMU imports to build must not stay in this one.
 
     Returns:
         The files written.
@@ -195,19 +195,19 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
     if found := _kept(key):
         return found
     try:
-        with claimed(folder_of(_CATEGORY), wait=True):
+        with hold_lock(category_folder(_CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
         raise InputError(
             f"cannot keep FMUs in {users_folder()}: {reason(error)}; set XDG_CACHE_HOME to a "
-            "folder that can be written"
+            "writable folder"
         ) from error
 
 
 def _kept(key: str) -> Path | None:
     """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in kept(_CATEGORY, key)), None)
+    return next((path.parent for path in read_cached(_CATEGORY, key)), None)
 
 
 def _built(key: str, *options: str) -> Path:
@@ -215,16 +215,18 @@ def _built(key: str, *options: str) -> Path:
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return keep(_CATEGORY, key, files)[0].parent
+    return write_cached(_CATEGORY, key, files)[0].parent
 
 
-def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) -> list[Path]:
+def new_controller(
+    name: str, folder: Path | None = None, base: str = CONTROLLER_BASES[0]
+) -> list[Path]:
     """Make a folder with a controller that runs in the closed loop.
 
     Args:
         name: of the controller, `MyLaw` or `my_law`.
         folder: made if it does not exist; None: one with the name, in the current folder.
-        base: one of :data:`BASES`.
+        base: one of :data:`CONTROLLER_BASES`.
 
     Returns:
         The script, the scenario, the README and the FMU.
@@ -241,8 +243,8 @@ def new_controller(name: str, folder: Path | None = None, base: str = BASES[0]) 
         "README.md": "README.md",
     }
     if folder.is_dir() and any(folder.iterdir()):
-        raise InputError(f"{folder}: is not empty, and nothing in it is replaced")
-    with replaced(folder, contents) as unfinished:
+        raise InputError(f"{folder}: is not empty; choose a new or empty folder")
+    with replace_files(folder, contents) as unfinished:
         for target, template in contents.items():
             text = (_TEMPLATES / template).read_text(encoding="utf-8")
             text = text.replace(_CLASS, class_name).replace(_MODULE, module)
@@ -275,7 +277,7 @@ def build_own(
     with TemporaryDirectory(dir=process_folder()) as temporary:
         [built] = run_fmus("python.own", Path(temporary), *options)
         place = script.parent if folder is None else folder
-        with replaced(place, [built.name], force=force) as unfinished:
+        with replace_files(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)
     return place / built.name
 
@@ -296,5 +298,5 @@ def _names(name: str) -> tuple[str, str]:
     words = [word for word in module.split("_") if word]
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
     if keyword.iskeyword(module) or keyword.iskeyword(class_name) or find_spec(module):
-        raise InputError(f"{name!r}: {module} is taken in Python; choose another name")
+        raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name

@@ -16,9 +16,9 @@ from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.ledger import RECORD, Ledger, Taken, located
+from orchestrator.machine.ledger import RECORD, Ledger, Taken, locate
 
 #: Where a run that came to no end goes, if there is a whole result already.
 INCOMPLETE = "incomplete"
@@ -28,14 +28,14 @@ VIEW = "view.html"
 
 
 @contextmanager
-def replaced(
+def replace_files(
     folder: Path,
     names: Iterable[str] = (),
     *,
     force: bool = False,
     keep: Callable[[], bool] = lambda: False,
 ) -> Iterator[Path]:
-    """A folder to write files into; at the end they take the place of what was there before.
+    """Give a folder to write files into; at the end they replace the earlier ones.
 
     An exception in the context leaves the folder as it was.
 
@@ -43,14 +43,14 @@ def replaced(
         folder: of the files, made if it does not exist.
         names: that will be written, as far as they are known: they are checked first.
         force: move aside files of the user's that have names of these.
-        keep: asked, when they cannot take their places, whether what was written is to be kept.
+        keep: asked, when they cannot take their places, whether to keep the written files.
 
     Raises:
         InputError: the folder cannot be written, a name in it is taken by a file of the user's, or
             another run is writing into it.
 
     """
-    with opened(folder, force) as ledger:
+    with open_ledger(folder, force) as ledger:
         ledger.check(names)
         with ledger.writing() as unfinished:
             try:
@@ -62,12 +62,12 @@ def replaced(
 
 
 @contextmanager
-def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
-    """The ledger of a folder, which is made if it does not exist, and kept from other runs.
+def open_ledger(folder: Path, force: bool = False) -> Iterator[Ledger]:
+    """Open the ledger of a folder, which is made if it does not exist, and keep other runs out.
 
     Args:
         folder: to write into.
-        force: move aside what has the name of the ledger and is none.
+        force: move aside a file that has the ledger's name but is not one.
 
     Raises:
         InputError: the folder cannot be written, or another run is writing into it.
@@ -76,7 +76,7 @@ def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
     made = not os.path.exists(folder)  # noqa: PTH110  # Path.exists raises without permission
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with locked(folder):
+        with lock_folder(folder):
             yield Ledger(folder, force)
     except OSError as error:
         raise InputError(_cannot_write(folder, error)) from error
@@ -87,8 +87,8 @@ def opened(folder: Path, force: bool = False) -> Iterator[Ledger]:
                 folder.rmdir()
 
 
-def inner(folder: Path, *names: str) -> Path:
-    """A folder in another one.
+def inner_folder(folder: Path, *names: str) -> Path:
+    """Give a folder in another one.
 
     Raises:
         InputError: a link leads to it, which could lead anywhere.
@@ -104,7 +104,7 @@ def inner(folder: Path, *names: str) -> Path:
 
 
 def publish(ledger: Ledger) -> Path:
-    """Have what was written into a folder take its place, which is given back."""
+    """Move the files written into a folder to their place, and return it."""
     unfinished, folder = ledger.unfinished, ledger.folder
     if (place := place_of(unfinished, folder)) != folder:
         place.mkdir(exist_ok=True)
@@ -132,16 +132,16 @@ def publish(ledger: Ledger) -> Path:
 
 
 def _publish(ledger: Ledger) -> None:
-    # What is no result of a run, such as an export, takes no run's place.
+    # Anything but the result of a run, such as an export, replaces no run.
     is_result = (ledger.unfinished / RECORD).is_file()
     ledger.publish([*files_of(ledger.folder), VIEW] if is_result else ())
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
+def lock_folder(folder: Path) -> Iterator[None]:
     """Keep other runs out; the lock ends with the process, however it ends."""
     try:
-        with claimed(folder):
+        with hold_lock(folder):
             yield
     except BlockingIOError:
         raise InputError(
@@ -158,7 +158,7 @@ def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
 
 
 def _rest(unfinished: Path, folder: Path) -> str:
-    """Give what was written a name that can be seen; where it is, in words."""
+    """Give the written files a visible name; returns where they are, in words."""
     if not unfinished.is_dir():
         return ""
     kept = next(place for place in _beside(folder) if not os.path.lexists(place))
@@ -167,12 +167,12 @@ def _rest(unfinished: Path, folder: Path) -> str:
         (unfinished / RECORD).unlink(missing_ok=True)
         unfinished.rename(kept)
     except OSError as error:
-        return f"; nor can what was written be kept: {reason(error)}"
+        return f"; nor can the files be kept: {reason(error)}"
     return f"; what was written is in {kept}"
 
 
 def _beside(folder: Path) -> Iterator[Path]:
-    """Where a result may go that does not take the place of another."""
+    """Where a result may go that does not replace another."""
     return (folder / name for name in chain([INCOMPLETE], (f"{INCOMPLETE}-{n}" for n in count(2))))
 
 
@@ -184,7 +184,7 @@ def place_of(unfinished: Path, folder: Path) -> Path:
 
 
 def _has_room(place: Path, unfinished: Path) -> bool:
-    """Whether a result can go into a folder in which there are no files of the user's for it."""
+    """Whether a result can go into a folder without touching files of the user's."""
     if not os.path.lexists(place):
         return True
     if place.is_symlink() or not place.is_dir():
@@ -212,9 +212,9 @@ def files_of(folder: Path) -> set[str]:
 
 
 def _record(path: Path) -> dict[str, Any]:
-    """A record; empty if there is none, or none of ours."""
+    """A record; empty if there is none, or it is not ours."""
     try:
-        record = json.loads(located(path).read_text(encoding="utf-8"))
+        record = json.loads(locate(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     return record if isinstance(record, dict) else {}

@@ -47,8 +47,8 @@ def load(
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
-    with warned(strict) as findings:
-        scenario, system = loaded(str(name), kind, variant=variant, findings=findings)
+    with notes_as_warnings(strict) as findings:
+        scenario, system = load_scenario(str(name), kind, variant=variant, findings=findings)
         left = left_behind(scenario)
         for note in [left] if left else doubts_of(system):
             findings.note(note)
@@ -62,22 +62,22 @@ def load(
 
 
 @contextmanager
-def warned(strict: bool = False) -> Iterator[Findings]:
-    """Findings whose notes become warnings, as Python has them."""
+def notes_as_warnings(strict: bool = False) -> Iterator[Findings]:
+    """Collect findings whose notes become warnings, as Python has them."""
     findings = Findings(strict)
     yield findings
     for note in findings.notes:
         warnings.warn(note, stacklevel=4)
 
 
-def loaded(
+def load_scenario(
     name: str,
     kind: str = PYTHON,
     fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
 ) -> tuple[Scenario, System]:
-    """A scenario and its system.
+    """Load a scenario and its system.
 
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
@@ -85,7 +85,7 @@ def loaded(
         kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
         fmi: their version of FMI. The master can step FMUs of the first only.
         variant: which of the descriptions in an SSP; None: the default.
-        findings: takes what is wrong with it; None: what does no harm is not asked for.
+        findings: takes what is wrong with it; None: harmless flaws are ignored.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -94,7 +94,7 @@ def loaded(
     path = Path(name)
     read = _reader(path)
     if variant is not None and read is not read_ssp:
-        raise InputError(f"{name}: has no variants; an SSP may have")
+        raise InputError(f"{name}: has no variants; only an SSP can have them")
     if read is not None:
         check_brings_its_own(name, kind, fmi)
         system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
@@ -126,7 +126,7 @@ def read_fmu(path: Path, findings: Findings | None = None) -> System:
     )
 
 
-#: What reads a file that is no scenario, by its ending.
+#: Readers of files other than scenarios, by ending.
 _READERS: Mapping[str, Callable[..., System]] = {
     ".ssp": read_ssp,
     ".ssd": read_ssp,
@@ -136,7 +136,7 @@ _READERS: Mapping[str, Callable[..., System]] = {
 
 
 def is_path(name: str) -> bool:
-    """Whether what is run is named by a path: all else is the name of a scenario."""
+    """Whether a name is a path: anything else is the name of a scenario."""
     return name.endswith((".toml", *_READERS))
 
 
@@ -149,7 +149,7 @@ def _reader(path: Path) -> Callable[..., System] | None:
 
 
 def left_behind(scenario: Scenario) -> str | None:
-    """What of a scenario a system by itself does not have, in words."""
+    """The parts of a scenario that are lost when only its system is kept, in words."""
     has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
     names = " and ".join(name for name, there in has.items() if there)
     return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
@@ -163,7 +163,7 @@ def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> No
 
     """
     if (kind, fmi) != (PYTHON, FMI_VERSIONS[0]):
-        raise InputError(f"{name}: comes with its FMUs; kind and fmi are for the bundle's own")
+        raise InputError(f"{name}: brings its own FMUs; kind and fmi apply only to the bundle's")
 
 
 def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:

@@ -1,4 +1,4 @@
-"""A run that is ready to be made, with the changes of the user, and what it is compared with."""
+"""A run that is ready to be made, with the user's changes, and its companion."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from orchestrator.master.fmi.isolated import Isolation, isolation_of
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import InputTable, Playback, check_factor
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, chosen
+from orchestrator.master.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.master.observers.observer import Ending, Observer
-from orchestrator.master.plan import Identity, Plan, identity, planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import Identity, Plan, identity, make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.loading import doubts_of, first_given, loaded
+from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
@@ -35,7 +35,7 @@ CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
 DEFAULT_STEP = STEP
 
 #: Stop time of a system that names none, where it is only checked or exported [s].
-SOME_TIME = 1.0
+FALLBACK_STOP_TIME = 1.0
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,9 @@ class Prepared:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
 
         """
-        return simulate(self.plan, observers, self.isolation, self.loop, [*hooks, *self._hooks()])
+        return simulate_plan(
+            self.plan, observers, self.isolation, self.loop, [*hooks, *self._hooks()]
+        )
 
     def doubts(self) -> list[str]:
         """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
@@ -113,14 +115,14 @@ class Prepared:
         return [event for i, event in enumerate(self.events) if i not in happened]
 
 
-def prepared_of(request: Request) -> Prepared:
-    """What a request asks for.
+def prepare_request(request: Request) -> Prepared:
+    """Prepare what a request asks for.
 
     Raises:
         InputError: there is no such scenario, or something about the request cannot be done.
 
     """
-    return prepare(*loaded(request.scenario, request.kind), request)
+    return prepare(*load_scenario(request.scenario, request.kind), request)
 
 
 def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
@@ -157,12 +159,14 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     if request.strict and coupling is None and order == GAUSS_SEIDEL:
         coupling = SOLVE
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
-    plan = planned(system, experiment)
+    plan = make_plan(system, experiment)
     with findings.collecting():
-        events = read_events(scenario.name, scenario.events, replace(system, step=step))
+        events = read_events(
+            scenario.name, scenario.events, replace(system, step=step), input_table
+        )
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
-    loop = chosen(request.loop, experiment, isolation)
+    loop = choose_loop(request.loop, experiment, isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
     return Prepared(scenario, plan, isolation, loop, request.real_time, events, input_table)
@@ -181,7 +185,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     scenario = prepared.scenario
     if not scenario.compare:
         return [prepared]
-    companion, system = loaded(scenario.compare, request.kind)
+    companion, system = load_scenario(scenario.compare, request.kind)
     if scenario.digest and companion.digest:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
     played = prepared.input_table.targets if prepared.input_table else ()

@@ -21,12 +21,12 @@ from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.ledger import RECORD, is_changed, located
-from orchestrator.machine.user_files import explained, text_of
+from orchestrator.machine.ledger import RECORD, is_changed, locate
+from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import runs_python
 from orchestrator.master.hooks.checkpoint import Checkpoints, check_gives_states, interval_in
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
@@ -37,17 +37,17 @@ from orchestrator.vehicle.signals import STANDARD, Loop
 METRICS = "metrics.json"
 
 #: The table of a run, in one format or the other, and all files that every run writes.
-TABLES = tuple(f"result.{ending}" for ending in FORMATS)
+TABLES = tuple(f"result.{ending}" for ending in TABLE_FORMATS)
 FILES = (*TABLES, METRICS, RECORD)
 
 #: The folder of checkpoints, within the folder of the result.
 CHECKPOINTS = "checkpoint"
 
 #: Packages whose versions a result depends on.
-RECORDED = (*PACKAGES, "matplotlib")
+RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
 
 #: What a file is not that cannot be read.
-_WHAT = "not the record of a run"
+_NOT_A_RECORD = "not the record of a run"
 
 
 class Stopwatch:
@@ -132,7 +132,7 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
 
 
 def write_content(
-    folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED
+    folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED_PACKAGES
 ) -> None:
     """Write a record, with versions, the platform, and the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
@@ -193,7 +193,7 @@ def read_result(
     file = table_in(path)
     record = read_record(file)
     texts = record.get("texts", [])
-    place = located(file)
+    place = locate(file)
     columns = tuple(name for name in read_columns(place) if name not in texts)
     blocks = read_rows(place, texts)
     first = next(blocks, None)
@@ -218,9 +218,9 @@ def table_in(path: Path) -> Path:
         InputError: there is none.
 
     """
-    with explained(path, "not the name of a result"):
+    with explain_errors(path, "not the name of a result"):
         for file in (path, *(path / name for name in TABLES)):
-            if located(file).is_file():
+            if locate(file).is_file():
                 return file
     raise InputError(f"{path}: holds no result.csv or result.parquet")
 
@@ -237,11 +237,11 @@ def read_record(table: Path) -> dict[str, Any]:
         InputError: it is broken.
 
     """
-    file = located(table.with_name(RECORD))
+    file = locate(table.with_name(RECORD))
     if not file.exists():
         return {}
-    with explained(file, _WHAT):
-        record = json.loads(text_of(file, _WHAT))
+    with explain_errors(file, _NOT_A_RECORD):
+        record = json.loads(read_text(file, _NOT_A_RECORD))
         try:
             if table.name not in record["files"]:
                 return {}

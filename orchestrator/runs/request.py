@@ -13,23 +13,23 @@ from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 from fmus.kinds import KINDS, PYTHON
-from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, order_of, written_order
+from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, format_order, read_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
 
 class CliOption:
-    """What the command line says of a field that is an option there, and how it reads it."""
+    """How the command line describes and reads a field that is an option there."""
 
     def __init__(self, help: str, **how: Any) -> None:  # noqa: A002
-        """Take the help, and what else `argparse` needs."""
+        """Take the help, and whatever else `argparse` needs."""
         self.help, self.how = help, how
 
 
-def options_of(declared: type[Any]) -> dict[str, CliOption]:
+def option_fields(declared: type[Any]) -> dict[str, CliOption]:
     """The fields of a dataclass that are options."""
     hints = get_type_hints(declared, include_extras=True)
     return {
@@ -49,7 +49,7 @@ def flag(name: str) -> str:
 Kind = Annotated[
     str,
     CliOption(
-        "of the bundle's FMUs: Python sources, or their translation to C, with the same numbers; "
+        "kind of the bundle's FMUs: Python source, or its translation to C, with the same numbers; "
         f"default: {PYTHON}",
         choices=KINDS,
     ),
@@ -59,18 +59,18 @@ Kind = Annotated[
 LoopName = Annotated[
     str,
     CliOption(
-        "what makes the steps: Python, or a loop in C; the rows are the same; default: auto, the "
-        "compiled one where it is to be had",
+        "what makes the steps: Python, or a loop in C, with the same rows; default: auto, the "
+        "compiled loop where it is available",
         choices=LOOPS,
     ),
 ]
 
-#: What becomes of files of the user's that are in the way.
+#: Whether the user's files that are in the way are moved.
 Force = Annotated[
     bool,
     CliOption(
-        "move files of yours aside that have names of files that are written, to NAME.~1~; "
-        "otherwise they stay, and nothing is written",
+        "rename your files that are in the way to NAME.~1~; without it they stay, and nothing is "
+        "written",
         action="store_true",
     ),
 ]
@@ -83,8 +83,8 @@ class Request:
     Attributes:
         scenario: its name, or the path of a file; empty where a system is given instead.
         parameters: values that win over the scenario's, by `component.parameter`.
-        events: another scenario that has them, or tables as a scenario file has them.
-        steps: of components that take longer ones of their own [s]; they win over the scenario's.
+        events: another scenario that has them, or tables as in a scenario file.
+        steps: of components with longer steps [s]; they win over the scenario's.
 
     """
 
@@ -105,7 +105,7 @@ class Request:
         CliOption(
             "order in which the components are stepped, or the names of all of them; default: "
             f"the scenario's, else {ORDERS[0]}",
-            type=order_of,
+            type=read_order,
             metavar=f"{'|'.join(ORDERS)}|NAME,...",
         ),
     ] = None
@@ -122,14 +122,14 @@ class Request:
     events: Annotated[
         str | Sequence[Mapping[str, Any]] | None,
         CliOption(
-            "what happens during the run: the events of another scenario, for this one or an SSP",
+            "take the events of another scenario, for this one or an SSP",
             metavar="SCENARIO|FILE.toml",
         ),
     ] = field(default=None, hash=False)
     inputs: Annotated[
         str | Path | None,
         CliOption(
-            "a table in CSV or Parquet of inputs that nothing feeds, over time",
+            "table of inputs over time, in CSV or Parquet, for inputs that nothing feeds",
             type=Path,
             metavar="FILE",
         ),
@@ -138,7 +138,7 @@ class Request:
     isolate: Annotated[
         bool,
         CliOption(
-            "run each FMU in a process of its own, where it can crash or hang",
+            "run each FMU in a separate process, where it may crash or hang",
             action="store_true",
         ),
     ] = False
@@ -154,11 +154,11 @@ class Request:
     real_time: Annotated[
         float | None,
         CliOption(
-            "go no faster than FACTOR simulated seconds in a second", type=float, metavar="FACTOR"
+            "go no faster than FACTOR simulated seconds per second", type=float, metavar="FACTOR"
         ),
     ] = None
     strict: Annotated[
-        bool, CliOption("refuse what otherwise is a warning", action="store_true")
+        bool, CliOption("refuse anything that would be a warning", action="store_true")
     ] = False
     steps: Mapping[str, float] = field(default_factory=dict, hash=False)
 
@@ -171,13 +171,13 @@ class Request:
     def command_line(self) -> str:
         """What a user types after `auv-fmu run`."""
         words, untouched = [self.scenario], Request()
-        for name, one in options_of(Request).items():
+        for name, one in option_fields(Request).items():
             value = getattr(self, name)
             if value == getattr(untouched, name):
                 continue
             words.append(flag(name))
             if one.how.get("action") != "store_true":
-                words.append(written_order(value) if name == "order" else _text(value))
+                words.append(format_order(value) if name == "order" else _text(value))
         for name, value in self.parameters.items():
             words += ["--set", f"{name}={_text(value)}"]
         # There is no option for these.
@@ -187,12 +187,12 @@ class Request:
 
 @dataclass(frozen=True)
 class Files:
-    """What is kept of a run."""
+    """What a run leaves in its folder."""
 
     interval: Annotated[
         float | None,
         CliOption(
-            "rows kept in the table, one for each interval [s]; default: one a step",
+            "keep one row in the table for each interval [s]; default: one for each step",
             type=float,
             metavar="S",
         ),
@@ -200,16 +200,19 @@ class Files:
     columns: Annotated[
         str,
         CliOption(
-            "columns kept in the table, for example plant.y.*,controller.tau; default: all",
+            "keep only these columns in the table, for example plant.y.*,controller.tau; "
+            "default: all",
             metavar="outputs|all|PATTERN,...",
         ),
     ] = "all"
-    format: Annotated[str, CliOption("of the table; default: csv", choices=tuple(FORMATS))] = "csv"
-    no_figures: Annotated[bool, CliOption("draw none; default: draw", action="store_true")] = False
+    format: Annotated[
+        str, CliOption("format of the table; default: csv", choices=tuple(TABLE_FORMATS))
+    ] = "csv"
+    no_figures: Annotated[bool, CliOption("draw no figures", action="store_true")] = False
     checkpoint_every: Annotated[
         float | None,
         CliOption(
-            "keep what it takes to go on, every so many simulated seconds, in DIR/checkpoint",
+            "save a checkpoint in DIR/checkpoint, every S simulated seconds",
             type=float,
             metavar="S",
         ),
@@ -221,7 +224,7 @@ class Files:
 
 
 def _text(value: Any) -> str:
-    """A value that is read back as the same, and no longer than it must be."""
+    """The shortest text that is read back as the same value."""
     if isinstance(value, str | Path):
         return str(value)
     return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, Any
 from fmus.kinds import PYTHON
 from orchestrator.figures.plot import plot
 from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.master.experiment import Order, written_order
+from orchestrator.master.experiment import Order, format_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.folder import locked, replaced
-from orchestrator.runs.loading import check_brings_its_own, loaded, warned
+from orchestrator.runs.folder import lock_folder, replace_files
+from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import (
     FILES,
@@ -86,19 +86,19 @@ class Result(Table):
     """
 
     def __init__(self, prepared: Prepared) -> None:
-        """Take the rows of what is run."""
+        """Take the rows of a run."""
         super().__init__()
         self._prepared = prepared
         self._clock = Stopwatch()
         self.resumed_at: float | None = None
 
     def __repr__(self) -> str:
-        """One line: what was run, and how far it came."""
+        """One line: the scenario, and how far it came."""
         end = f", {self.failure}" if self.failure else ""
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
             f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
-            f"columns, {first:g} to {last:g} s, {written_order(self.header.experiment.order)}{end}>"
+            f"columns, {first:g} to {last:g} s, {format_order(self.header.experiment.order)}{end}>"
         )
 
     @cached_property
@@ -170,11 +170,11 @@ class Result(Table):
             ValueError: the folder cannot be written, or there is no such format.
 
         """
-        if format not in FORMATS:
-            raise InputError(f"format {format!r}: use one of {', '.join(FORMATS)}")
+        if format not in TABLE_FORMATS:
+            raise InputError(f"format {format!r}: use one of {', '.join(TABLE_FORMATS)}")
         folder = Path(folder)
-        with replaced(folder, FILES, force=force) as unfinished:
-            table = FORMATS[format](unfinished / f"result.{format}")
+        with replace_files(folder, FILES, force=force) as unfinished:
+            table = TABLE_FORMATS[format](unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)
@@ -233,9 +233,9 @@ def simulate(
         strict: refuse what otherwise is a warning.
         steps: of components that take longer ones of their own [s], multiples of the communication
             step; they win over the scenario's.
-        events: what happens during the run, in the place of the scenario's own: tables as a
+        events: what happens during the run, instead of the scenario's own: tables as a
             scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
-        inputs: a table of inputs over time, in the place of the scenario's own: a .csv or .parquet
+        inputs: a table of inputs over time, instead of the scenario's own: a .csv or .parquet
             file.
         coupling: how rings of direct feedthroughs are closed: `solve`, at every communication
             point, `delay`, by a delay of one step, or `linear`, solved, with inputs that change
@@ -263,8 +263,8 @@ def simulate(
             raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        with warned(strict) as findings:
-            scenario, system = loaded(str(system), kind, variant=variant, findings=findings)
+        with notes_as_warnings(strict) as findings:
+            scenario, system = load_scenario(str(system), kind, variant=variant, findings=findings)
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     request = Request(
@@ -284,7 +284,7 @@ def simulate(
     )
     prepared = prepare(scenario, system, request)
     if is_named:
-        with warned(strict) as findings:
+        with notes_as_warnings(strict) as findings:
             for doubt in prepared.doubts():
                 findings.note(doubt)
             findings.refuse()
@@ -295,7 +295,7 @@ def simulate(
         ending = prepared.run([*observers, *kept], kept)
         leave_checkpoints(kept, ending.failure is None)
     for number in ending.signals:
-        # Held back while the FMUs computed; now it does what it does elsewhere.
+        # Held back while the FMUs computed; now it acts as usual.
         signal.raise_signal(number)
     return result
 
@@ -313,7 +313,7 @@ def _checkpoints(
     place = Path(folder)
     try:
         place.mkdir(parents=True, exist_ok=True)
-        with locked(place):
+        with lock_folder(place):
             yield checkpoints_of([prepared], [place], every, resume)
     except OSError as error:
         raise InputError(f"cannot write into {place}: {reason(error)}") from error

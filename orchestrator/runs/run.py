@@ -24,7 +24,7 @@ from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import RealTime
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import (
     Ending,
     Observer,
@@ -34,7 +34,7 @@ from orchestrator.master.observers.observer import (
     matches,
     matching,
 )
-from orchestrator.runs.folder import INCOMPLETE, inner, place_of, publish, replaced
+from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import (
     CHECKPOINTS,
@@ -49,12 +49,12 @@ from orchestrator.runs.request import Files
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched
+from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched_columns
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import Loop, suffixes
 
-#: A file that keeps room for what is written last, so that a full disk does not cost the record.
+#: A file that keeps room for the files written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
 
 #: Exit status of a process that a run has to end with.
@@ -123,11 +123,11 @@ def run_into(
     ]
     with (
         held_interrupts() as interrupts,
-        replaced(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
+        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as unfinished,
     ):
         kept = checkpoints_of(
             runs,
-            [inner(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
+            [inner_folder(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
             files.checkpoint_every,
             files.resume,
             files.force,
@@ -170,7 +170,7 @@ def run_into(
             first.ending = replace(first.ending, failure=first.ending.failure or failure)
         if not unfinished.is_dir():
             raise InputError(
-                f"{folder} was moved or deleted while it was written, and what was computed went "
+                f"{folder} was moved or deleted while it was written, and the results went "
                 f"with it, in {unfinished.name}"
             )
         spare.unlink()
@@ -185,7 +185,7 @@ def run_into(
 
 
 class _Running:
-    """A run and the observers of its rows, and what has come of it once it has ended."""
+    """A run, the observers of its rows, and its results once it has ended."""
 
     def __init__(
         self,
@@ -200,9 +200,9 @@ class _Running:
         loops = prepared.loops
         self._metrics = Metrics(loops)
         # Without figures only the cautions look at what was seen.
-        seen = watched if files.no_figures else Loop.drawn
+        seen = watched_columns if files.no_figures else Loop.drawn
         self.seen = VisibleRows({name for loop in loops for name in seen(loop)})
-        self._table = FORMATS[files.format](folder / f"result.{files.format}")
+        self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
             *(
@@ -260,7 +260,7 @@ def _give_up(
     clock: Stopwatch,
     say: Callable[[str], None],
 ) -> None:
-    """Keep what is there and end the process; the thread that steps the FMUs never will."""
+    """Keep what is there and end the process; the thread that steps the FMUs never returns."""
     try:
         (unfinished / _SPARE).unlink()
         run.give_up()
@@ -275,7 +275,7 @@ def _give_up(
 
 
 def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwatch) -> None:
-    """Write what is written last; the record of the first names the files of all."""
+    """Write the last files; the record of the first run names the files of all."""
     for run in reversed(done):
         write_metrics(run.folder, run.metrics)
         header = run.seen.header
@@ -285,7 +285,7 @@ def _write_ends(done: Sequence[_Running], command: Sequence[str], clock: Stopwat
 def _draw(
     scenario: Scenario, done: Sequence[_Running], folder: Path, interrupts: Interrupts
 ) -> list[str]:
-    """Draw all figures or, where one of them cannot be written, none; notes on what is left out."""
+    """Draw all figures or, if one cannot be written, none; returns notes on omissions."""
     drawn = [
         Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
         for run in done

@@ -18,19 +18,19 @@ from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.vehicle import Vehicle
 from orchestrator.formats.tables import read_columns, read_rows, records
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explained, names_in, path_of, text_of
+from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
-from orchestrator.system.names import PortName, file_name, flattened, port_name
+from orchestrator.system.names import PortName, file_name, flatten, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
-_WHAT = "not a scenario"
+_NOT_A_SCENARIO = "not a scenario"
 
 #: Scenarios that come with the bundle.
-FOLDER = Path(__file__).parent / "scenarios"
+SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
 
 #: What is run besides the scenarios that come with the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
@@ -116,7 +116,7 @@ class Scenario:
 
 def names() -> list[str]:
     """Scenarios that come with the bundle."""
-    return names_in(FOLDER)
+    return names_in(SCENARIOS_FOLDER)
 
 
 def read_scenario(name: str) -> Scenario:
@@ -126,9 +126,9 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "scenario", _OTHERS)
-    text = text_of(path, _WHAT)
-    with explained(path, _WHAT):
+    path = find_toml(name, SCENARIOS_FOLDER, "scenario", _OTHERS)
+    text = read_text(path, _NOT_A_SCENARIO)
+    with explain_errors(path, _NOT_A_SCENARIO):
         return _scenario(path, text)
 
 
@@ -150,7 +150,7 @@ def _scenario(path: Path, text: str) -> Scenario:
     content = tomllib.loads(text)
     ScenarioFile.check(path, content)
     content["parameters"] = {
-        port_name(key): value for key, value in flattened(content.get("parameters", {}))
+        port_name(key): value for key, value in flatten(content.get("parameters", {}))
     }
     if "path" in content:
         said, others = content.pop("path"), content["parameters"]
@@ -161,7 +161,7 @@ def _scenario(path: Path, text: str) -> Scenario:
     if "inputs" in content:
         said = content["inputs"]
         content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
-    content["ours"] = {key: str(why) for key, why in flattened(content.get("ours", {}))}
+    content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
@@ -182,7 +182,7 @@ def read_inputs(
         given: ports that have values from where the table is named: it must not name them, too.
 
     Raises:
-        InputError: the table cannot be read, or a column is no input that is to be had.
+        InputError: the table cannot be read, or a column is not an available input.
 
     """
     file = inputs.file
@@ -192,7 +192,7 @@ def read_inputs(
         _check_rows(rows, targets)
         for target, column in zip(targets, rows[:, 1:].T, strict=True):
             if target in map(system.named, given):
-                raise InputError(f"{target} is given a value of its own beside the table")
+                raise InputError(f"{target} is given both a value and a column of the table")
             _check_column(system, target, column)
         linear = [_is_linear(system, target, inputs.between) for target in targets]
         input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
@@ -211,9 +211,9 @@ def _check_rows(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
     if not np.isfinite(rows).all():
         raise InputError("all times and values must be finite")
     if (rows[1:, 0] < rows[:-1, 0]).any():
-        raise InputError("times must not fall")
+        raise InputError("times must not decrease")
     if rows[-1, 0] / 2 - rows[0, 0] / 2 > _FARTHEST / 2:
-        raise InputError(f"times must lie less than {_FARTHEST:g} s apart")
+        raise InputError(f"times must be less than {_FARTHEST:g} s apart")
 
 
 def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
@@ -222,7 +222,7 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
     if variable.causality != "input":
         raise InputError(f"{target} is of causality {variable.causality}, not input")
     if type_of(variable) == "String":
-        raise InputError(f"{target} is a String: a table has numbers")
+        raise InputError(f"{target} is a String: a table holds only numbers")
     for connection in system.connections:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
@@ -238,7 +238,7 @@ def _number(value: float) -> str:
 
 def _is_linear(system: System, target: PortName, between: str) -> bool:
     variable = system.component(target.component).variable(target.port)
-    # FMI has it that what is discrete changes at events only.
+    # In FMI, discrete variables change only at events.
     return (type_of(variable), variable.variability, between) == ("Real", "continuous", "linear")
 
 

@@ -20,7 +20,8 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.system.names import PortName, flattened, port_name, splits
+from orchestrator.master.hooks.timing import InputTable
+from orchestrator.system.names import PortName, flatten, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
 from orchestrator.system.values import INTEGERS, finite, is_finite, literal, type_of, typed
@@ -32,7 +33,10 @@ _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
 
 def read_events(
-    where: object, tables: Sequence[Mapping[str, Any]], system: System
+    where: object,
+    tables: Sequence[Mapping[str, Any]],
+    system: System,
+    input_table: InputTable | None = None,
 ) -> tuple[Event, ...]:
     """The events of a run.
 
@@ -40,15 +44,21 @@ def read_events(
         where: they are written, for messages.
         tables: as :func:`.scenario.check_events` has found them good.
         system: that they happen to.
+        input_table: that some of its inputs follow.
 
     Raises:
         InputError: an event cannot happen to this system.
 
     """
     findings, events = Findings(), []
+    followed = input_table.targets if input_table else ()
     for number, table in enumerate(tables, start=1):
         try:
-            events.append(_event(table, system))
+            event = _event(table, system)
+            for port, _ in event.action.inputs if isinstance(event.action, Set) else ():
+                if port in followed:
+                    raise InputError(f"{port} follows a table of inputs: override it")
+            events.append(event)
         except InputError as error:
             findings.problem(f"{where}: event {number}: {error}")
     findings.refuse()
@@ -90,7 +100,7 @@ def _event(table: Mapping[str, Any], system: System) -> Event:
 def _things(value: Any) -> Iterator[str]:
     """What an event acts on, in words."""
     if isinstance(value, Mapping):
-        yield from (f"{name} = {_shown(one)}" for name, one in flattened(value))
+        yield from (f"{name} = {_shown(one)}" for name, one in flatten(value))
     else:
         yield from [value] if isinstance(value, str) else value
 
@@ -150,7 +160,7 @@ def _ports(
             f"{port} is of causality {variable.causality}, not {' or '.join(causalities)}"
         )
     if type_of(variable) == "String" and "parameter" not in causalities:
-        raise InputError(f"{port} is a String: events act on numbers and truth values")
+        raise InputError(f"{port} is a String: events act only on numbers and Booleans")
     return [port]
 
 
@@ -160,7 +170,7 @@ def _routes(system: System, port: PortName) -> list[Connection | None]:
         return [None]
     found: list[Connection | None] = [c for c in system.connections if c.source == port]
     if not found:
-        raise InputError(f"{port} feeds nothing here: no event can alter what others take of it")
+        raise InputError(f"{port} feeds nothing here: an event would change nothing")
     return found
 
 
@@ -193,7 +203,7 @@ def _altered(
     """The inputs that some signals reach, with what arrives there of their values."""
     return tuple(
         (route.target if route else port, arriving(system, port, route, one))
-        for name, value in flattened(values)
+        for name, value in flatten(values)
         for port, one in _members(name, value, _ports(system, name, ("input", "output")))
         for route in _routes(system, port)
     )
@@ -240,7 +250,7 @@ def _text(value: Any) -> Any:
 def _set(values: Mapping[str, Any], system: System) -> Action:
     fed = {connection.target: connection.source for connection in system.connections}
     parameters, inputs = [], []
-    for name, value in flattened(values):
+    for name, value in flatten(values):
         for port, one in _members(name, value, _ports(system, name, ("parameter", "input"))):
             variable = system.component(port.component).variable(port.port)
             if port in fed:
@@ -259,7 +269,7 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
 def _reset(names: Any, system: System) -> Action:
     for name in _things(names):
         if system.steps.get(system.component(name).name, system.step) != system.step:
-            raise InputError(f"{name} takes longer steps of its own: it cannot begin in one")
+            raise InputError(f"{name} takes longer steps: it cannot be reset within one")
     return Reset(tuple(_things(names)))
 
 

@@ -12,7 +12,7 @@ from orchestrator.runs.scenario_events import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
 
 #: What an input does between two rows of its table; the first is the default.
-WAYS = ("linear", "hold")
+INTERPOLATIONS = ("linear", "hold")
 
 #: Actions of an event after which there is nothing left that could end.
 _AT_ONCE = ("release", "reset", "stop")
@@ -40,10 +40,10 @@ class InputsTable(TomlTable):
         "that nothing feeds, as `component.port`.",
         '"inputs.csv"',
     )
-    between: Annotated[str, OneOf(WAYS)] = entry(
-        "What a Real input does between two rows: `linear`, or `hold`, as all others do, and Real "
-        "inputs of variability `discrete`.",
-        f"`{WAYS[0]}`",
+    between: Annotated[str, OneOf(INTERPOLATIONS)] = entry(
+        "What a Real input does between two rows. All other inputs hold, and so do Real inputs of "
+        "variability `discrete`.",
+        f"`{INTERPOLATIONS[0]}`",
     )
 
 
@@ -52,12 +52,12 @@ class EventTable(TomlTable):
 
     at: float = entry("When it happens [s].", "at `when`")
     when: str = entry(
-        "The condition that it happens at: a signal, one of `< > <= >=`, and a number, such as "
+        "The condition at which it happens: a signal, one of `< > <= >=`, and a number, such as "
         '`"plant.eta.z > 5"`. It must have been false before.',
         "at `at`",
     )
     repeat: bool = entry(
-        "Whether it happens each time that `when` becomes true, or only the first time.", "`false`"
+        "Whether it happens each time that `when` becomes true, not only the first time.", "`false`"
     )
     duration: Annotated[float, Field(gt=0.0), "positive number"] = entry(
         "How long it lasts [s].", "for good", key="for"
@@ -68,16 +68,16 @@ class EventTable(TomlTable):
     )
     override: dict[str, Any] = entry("Values that signals have from now on.")
     bias: dict[str, Any] = entry("What is added to signals from now on.")
-    freeze: Names = entry("Signals that keep what they were last.")
+    freeze: Names = entry("Signals that keep their last value.")
     drop: Names = entry(
         "Sensors that fail: inputs that they feed keep the last value, as with `freeze`."
     )
     lose: Names = entry("Actuators that fail: overridden with zero.")
-    release: Names = entry("Signals that are what they are without events again.")
+    release: Names = entry("Signals that return to their values without events.")
     reset: Names = entry(
-        "Components that begin anew, with their parameters as they are at that time."
+        "Components that start over, with their parameters as they are at that time."
     )
-    stop: Literal[True] = entry("`true`: the run ends here, and has not failed.")
+    stop: Literal[True] = entry("`true`: the run ends here, successfully.")
 
     @model_validator(mode="after")
     def _happens_once_and_does_one_thing(self) -> Self:
@@ -101,31 +101,32 @@ class ScenarioFile(TomlTable):
         "Heading of the figures and of the section in the report.", "the name of the file"
     )
     label: str = entry(
-        "Name of its lines where two runs are drawn together.", "the name of the file"
+        "Name of its lines when two runs are drawn together.", "the name of the file"
     )
     figure: str = entry("Which figure to draw.", "`tracking`")
     z_up: bool = entry(
-        "Whether z is up and y west where the path is drawn, as in the paper's words (reading 16).",
+        "Whether the path is drawn with z up and y west, as in the paper's words (reading 16).",
         "`false`: z is down and y east",
     )
     compare: str = entry(
         "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
         "file, relative to this one. It keeps its controller. Other components, the wires between "
         "them, `[path]` and the parameters of the planner are this scenario's, so that both follow "
-        "one reference; what else this scenario and the command line set goes for both, as far as "
-        "both have it. Where both have the same controller, it keeps all components but the "
-        "planner.",
+        "one reference; everything else that this scenario and the command line set applies to "
+        "both, as far as both have it. If both have the same controller, it keeps all components "
+        "but the planner.",
         "none",
     )
     stop_time: float = entry("End of the run [s].", "100 s")
     step: float = entry("Communication step [s].", "0.02 s")
     steps: dict[str, float] = entry(
-        "Components that take longer steps of their own, as `component = step` [s], a multiple of "
+        "Components that take longer steps, as `component = step` [s], a multiple of "
         "the communication step. Meanwhile they hold their inputs.",
         "none",
     )
     order: Names = entry(
-        "In which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of them.",
+        "Order in which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of "
+        "them.",
         "`gauss-seidel`",
     )
     coupling: Annotated[str, OneOf(COUPLINGS)] = entry(
@@ -137,15 +138,15 @@ class ScenarioFile(TomlTable):
     )
     remark: str = entry("What the report says below the figure, in Markdown.", "none")
     components: dict[str, Name] = entry(
-        "FMUs that take the place of the closed loop's own, or stand beside them, as "
+        "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
         "this file.",
         "none",
     )
     wires: dict[str, Name | Literal[False]] = entry(
         'Further wires, as `"component.group" = "component.group"`: every input of the group on '
-        "the left takes the output of the same name in the group on the right. Where both sides "
-        'name a port, that one is wired, as `"g.u[1]" = "t.y"`. `false` removes a wire.',
+        "the left takes the output of the same name in the group on the right. If both sides "
+        'name a port, only that one is wired, as `"g.u[1]" = "t.y"`. `false` removes a wire.',
         "none",
     )
     parameters: dict[str, Any] = entry(

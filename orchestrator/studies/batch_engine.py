@@ -284,7 +284,7 @@ def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
     }
     for name, state in states.items():
         if not is_bounded(state):
-            return f"{name}: the state is not finite, or beyond {LARGEST_STATE:g}"
+            return f"{name}: the state is not finite, or exceeds {LARGEST_STATE:g}"
     return "an output is not finite"
 
 
@@ -299,9 +299,9 @@ def _run(
     """Call the kernel."""
     # Not installed where no studies are made.
     imported_apart("numba", ".numba_config.yaml")
-    from orchestrator.studies.batch.compilation import compiled  # noqa: PLC0415
+    from orchestrator.studies.batch.compilation import compile_run  # noqa: PLC0415
 
-    run = compiled(type(job.setting.controller))  # type: ignore[arg-type]
+    run = compile_run(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
     return run(job.setting, plan, uniform, ends, accumulators, rows, progress)
 

@@ -78,7 +78,7 @@ class Crew(Protocol):
 
 
 @contextmanager
-def local(n: int | None, engine: Engine) -> Iterator[Crew]:
+def local_workers(n: int | None, engine: Engine) -> Iterator[Crew]:
     """Processes of this machine, for the time of the context.
 
     Args:

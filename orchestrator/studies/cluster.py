@@ -48,7 +48,7 @@ def cluster(address: str, engine: Engine) -> Iterator[Crew]:
 
     """
     with silence_logging_cmgr(CRITICAL), _connected(address) as client:
-        # Under a name of its own: another client may be at the same study.
+        # Under a unique name: another client may be at the same study.
         name = f"auv-fmu-{client.id}"
         try:
             client.register_plugin(_Share(engine), name)
@@ -68,7 +68,7 @@ def _connected(address: str) -> Iterator[Client]:
     try:
         host, port = get_address_host_port(address)
         if not re.fullmatch(r"[^\s/]+", host) or not 0 < port < 2**16:
-            raise ValueError("that is no host, or no port")
+            raise ValueError("not a host, or not a port")
     except (ValueError, NotImplementedError) as error:
         raise InputError(
             f"no scheduler answers at {address or repr(address)}: {reason(error)}; an address is "
@@ -125,8 +125,8 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
     def answer(self, runs: list[Point], limit: float) -> Answer:
         if __version__ != self._version:
             raise InputError(
-                f"the worker at {self._address} has auv-fmu {__version__}, and who sends the study "
-                f"{self._version}: install the same version everywhere"
+                f"the worker at {self._address} has auv-fmu {__version__}, and the sender of the "
+                f"study {self._version}: install the same version everywhere"
             )
         with self._lock:
             return answer(self._engine, runs, limit)
@@ -203,4 +203,4 @@ class _Cluster:
 
 
 def _gone(what: str) -> InputError:
-    return InputError(f"the {what} is gone; what is done is kept: start the study again to go on")
+    return InputError(f"the {what} is gone; finished runs are kept: start the study again to go on")

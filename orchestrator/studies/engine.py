@@ -14,10 +14,10 @@ from typing import Any, NamedTuple, Protocol
 
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import archive_of
+from orchestrator.machine.user_files import read_archive
 from orchestrator.master.experiment import ORDERS, Order
-from orchestrator.master.loop import LOOPS, PYTHON_LOOP, chosen
-from orchestrator.master.plan import code_of, planned
+from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
+from orchestrator.master.plan import code_of, make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.indices import Indices
@@ -128,7 +128,7 @@ class FmuEngine:
             prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
         )
         indices = Indices(loops_of(system))
-        plan, loop = planned(system, experiment), chosen(self._loop, experiment)
+        plan, loop = make_plan(system, experiment), choose_loop(self._loop, experiment)
         ending = replace(prepared, plan=plan, loop=loop).run([indices])
         if ending.signals:
             raise KeyboardInterrupt
@@ -144,7 +144,7 @@ class FmuEngine:
 
         """
         archives = {
-            part.digest: archive_of(part.fmu, part.digest)
+            part.digest: read_archive(part.fmu, part.digest)
             for prepared in self._prepared.values()
             for part in prepared.system.components.values()
         }

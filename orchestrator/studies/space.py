@@ -19,14 +19,14 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.study import (
     LATIN_HYPERCUBE,
-    LOG,
+    LOG_SPACING,
     MOST_RUNS,
     SOBOL,
     STEP,
     Range,
     Sample,
     Study,
-    members,
+    norm_members,
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
@@ -75,20 +75,20 @@ class Space:
         self._limits = {
             name: limits[:2] if key == name else (-max(limits[:2]), max(limits[:2]))
             for key, limits in self._ranges.items()
-            for name in members(key)
+            for name in norm_members(key)
         }
         for name, ends in self._limits.items():
             if self.columns[name] not in (float, int):
                 raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
             if self.columns[name] is int and name not in self._ranges:
-                raise InputError(f"{name}: a whole number is drawn by itself, in no norm")
+                raise InputError(f"{name}: a whole number cannot be drawn in a norm")
             for end in ends:
                 known.typed(name, end)
         samples = study.sample.n if study.sample else 1
         self._n = prod(map(len, self._grid.values())) * samples * len(self._scenarios)
         if self._n > MOST_RUNS:
             raise InputError(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
-        self._points = drawn(study.sample) if study.sample else np.empty((1, 0))
+        self._points = draw_shares(study.sample) if study.sample else np.empty((1, 0))
         self._constants = {
             name: known.typed(name, value) for name, value in study.parameters.items()
         }
@@ -159,8 +159,8 @@ class Space:
             point[name] = values[i]
         shares = iter(self._points[sample].tolist())
         for key, limits in self._ranges.items():
-            size = between(limits, next(shares), self.columns[members(key)[0]] is int)
-            point |= zip(members(key), _directed(key, size, shares), strict=True)
+            size = between(limits, next(shares), self.columns[norm_members(key)[0]] is int)
+            point |= zip(norm_members(key), _directed(key, size, shares), strict=True)
         return self._scenarios[scenario], point
 
     @property
@@ -199,13 +199,13 @@ def between(limits: Range, share: float, whole: bool) -> float | int:
     low, high, spacing = limits
     if whole:
         low, high = min(low, high), max(low, high) + 1
-    value = low * (high / low) ** share if spacing == LOG else low + (high - low) * share
+    value = low * (high / low) ** share if spacing == LOG_SPACING else low + (high - low) * share
     return min(floor(value), int(high) - 1) if whole else value
 
 
 def _directed(key: str, size: float, shares: Iterator[float]) -> tuple[float, ...]:
     """The members of a norm, in a direction that the next shares make: each is as likely."""
-    if (n := len(members(key))) == 1:
+    if (n := len(norm_members(key))) == 1:
         return (size,)
     angle = 2.0 * pi * next(shares)
     z = 2.0 * next(shares) - 1.0 if n == 3 else 0.0
@@ -213,7 +213,7 @@ def _directed(key: str, size: float, shares: Iterator[float]) -> tuple[float, ..
     return (across * cos(angle), across * sin(angle), size * z)[:n]
 
 
-def drawn(sample: Sample) -> np.ndarray:
+def draw_shares(sample: Sample) -> np.ndarray:
     """Shares of the ranges, (samples, values); a sample is what seed and method make it.
 
     Raises:

@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.machine.ledger import Ledger, is_changed, located, moved_aside
+from orchestrator.machine.ledger import Ledger, is_changed, locate, move_aside
 from orchestrator.master.plan import differences
-from orchestrator.runs.folder import opened
+from orchestrator.runs.folder import open_ledger
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space
 
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 #: The table of all runs, the record beside it, and what there is until all runs are done.
-TABLE, RECORD, _DATABASE = "runs.parquet", "study.json", "unfinished.sqlite"
+STUDY_TABLE, STUDY_RECORD, _DATABASE = "runs.parquet", "study.json", "unfinished.sqlite"
 
 #: Columns of the table before and after what varies and the indices.
 RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
@@ -74,9 +74,9 @@ class Store:
         self.ledger, self._folder, self._indices = ledger, ledger.folder, indices
         self._path = self._folder / _DATABASE
         _check_same(ledger, record)
-        if not (self._folder / RECORD).exists():
+        if not (self._folder / STUDY_RECORD).exists():
             self.write_record(record)
-        self.is_done = (self._folder / TABLE).exists()
+        self.is_done = (self._folder / STUDY_TABLE).exists()
         if self.is_done:
             self._remove_database()
             return
@@ -103,7 +103,7 @@ class Store:
     def add(self, outcomes: Sequence[Outcome]) -> None:
         """Keep a block of outcomes: all of them, or none."""
         rows = ((*row, self._checksum(*row)) for row in map(self._row, outcomes))
-        with written(self._folder), self._database:
+        with explain_write_errors(self._folder), self._database:
             self._database.executemany("INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?, ?)", rows)
 
     def __len__(self) -> int:
@@ -119,9 +119,9 @@ class Store:
         rows = self._rows()
         schema = _schema(arrow, space, self._indices)
         with (
-            written(self._folder),
+            explain_write_errors(self._folder),
             self.ledger.changing() as unfinished,
-            parquet.ParquetWriter(unfinished / TABLE, schema) as writer,
+            parquet.ParquetWriter(unfinished / STUDY_TABLE, schema) as writer,
         ):
             while block := list(islice(rows, _ROWS)):
                 writer.write_batch(_batch(arrow, schema, space, block))
@@ -131,11 +131,11 @@ class Store:
 
     def write_record(self, record: Mapping[str, Any]) -> None:
         """Write the record of the study, if it is another than before."""
-        path, text = self._folder / RECORD, _json(record) + "\n"
+        path, text = self._folder / STUDY_RECORD, _json(record) + "\n"
         if path.exists() and path.read_text(encoding="utf-8") == text:
             return
         with self.ledger.changing() as unfinished:
-            (unfinished / RECORD).write_text(text, encoding="utf-8")
+            (unfinished / STUDY_RECORD).write_text(text, encoding="utf-8")
 
     def _rows(self) -> Iterator[tuple[int, bytes, str | None]]:
         """All outcomes, by their numbers.
@@ -144,12 +144,12 @@ class Store:
             InputError: one is not as it was written.
 
         """
-        with written(self._folder):
+        with explain_write_errors(self._folder):
             for *row, checksum in self._database.execute("SELECT * FROM outcomes ORDER BY number"):
                 if checksum != self._checksum(*row):
                     raise InputError(
-                        f"{self._path}: damaged: run {row[0]} is not as it was written; move it, "
-                        "or let --force move the study aside and begin anew"
+                        f"{self._path}: damaged: run {row[0]} was changed since it was written; "
+                        "move it, or let --force move the study aside and start over"
                     )
                 yield row[0], row[1], row[2]
 
@@ -188,38 +188,38 @@ def _is_ours(path: Path, identity: str) -> bool:
 
 
 @contextmanager
-def store(
+def open_store(
     folder: Path, record: Mapping[str, Any], indices: Sequence[str], force: bool = False
 ) -> Iterator[Store]:
-    """The outcomes of a study in a folder.
+    """Open the outcomes of a study in a folder.
 
     Args:
         folder: of the study, made if it does not exist.
         record: of the study; what it says under `made_of` must be what was done there before.
         indices: the columns of what comes out of a run.
-        force: move aside what is there otherwise, and begin anew.
+        force: move aside anything else that is there, and start over.
 
     Raises:
         InputError: the folder holds another study, cannot be written, or is being written into.
 
     """
-    with opened(folder, force) as ledger:
-        with written(folder):
+    with open_ledger(folder, force) as ledger:
+        with explain_write_errors(folder):
             try:
                 found = Store(ledger, record, indices)
             except (InputError, sqlite3.Error):
                 if not force:
                     raise
-                for name in (RECORD, TABLE, *(f"{_DATABASE}{end}" for end in _ENDS)):
+                for name in (STUDY_RECORD, STUDY_TABLE, *(f"{_DATABASE}{end}" for end in _ENDS)):
                     if os.path.lexists(folder / name):
-                        moved_aside(folder / name)
+                        move_aside(folder / name)
                 found = Store(ledger, record, indices)
         with closing(found):
             yield found
 
 
 @contextmanager
-def written(folder: Path) -> Iterator[None]:
+def explain_write_errors(folder: Path) -> Iterator[None]:
     """Say of what cannot be written where it should have gone."""
     try:
         yield
@@ -234,32 +234,32 @@ def _json(content: Mapping[str, Any]) -> str:
     return json.dumps(content, indent=2, default=str)
 
 
-def read_record(folder: Path) -> dict[str, Any]:
-    """The record of a study.
+def read_study_record(folder: Path) -> dict[str, Any]:
+    """Read the record of a study.
 
     Raises:
         InputError: there is none.
 
     """
-    path = folder / RECORD
+    path = folder / STUDY_RECORD
     try:
-        return dict(json.loads(located(path).read_text(encoding="utf-8")))
+        return dict(json.loads(locate(path).read_text(encoding="utf-8")))
     except (OSError, ValueError, TypeError, RecursionError) as error:
         raise InputError(f"{path}: not the record of a study: {reason(error)}") from error
 
 
 def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
     folder = ledger.folder
-    ledger.check((RECORD, TABLE))
+    ledger.check((STUDY_RECORD, STUDY_TABLE))
     if not _is_ours(folder / _DATABASE, ledger.identity):
         ledger.check(f"{_DATABASE}{end}" for end in _ENDS)
-    if not (folder / RECORD).exists():
-        if (folder / TABLE).exists() or (folder / _DATABASE).exists():
-            raise InputError(f"{folder}: has runs, but no {RECORD}; choose another folder")
+    if not (folder / STUDY_RECORD).exists():
+        if (folder / STUDY_TABLE).exists() or (folder / _DATABASE).exists():
+            raise InputError(f"{folder}: has runs, but no {STUDY_RECORD}; choose another folder")
         return
     # As it is read again: JSON knows no tuples.
     now = json.loads(_json(record["made_of"]))
-    if different := _differences(read_record(folder)["made_of"], now):
+    if different := _differences(read_study_record(folder)["made_of"], now):
         raise InputError(
             f"{folder} holds another study, which differs in {', '.join(different)}; choose "
             "another folder (--out DIR), or let --force move that one aside"
@@ -330,17 +330,17 @@ class StudyResult(Mapping[str, np.ndarray]):
 
         """
         self.folder = folder
-        for path in (folder / TABLE, folder / RECORD):
-            if not located(path).is_file():
-                raise InputError(f"{folder}: holds no study that is done: no {path.name}")
+        for path in (folder / STUDY_TABLE, folder / STUDY_RECORD):
+            if not locate(path).is_file():
+                raise InputError(f"{folder}: holds no finished study: no {path.name}")
             if is_changed(path):
                 raise InputError(f"{path}: damaged, or changed since the study wrote it")
 
     @cached_property
     def _table(self) -> Any:
-        path = self.folder / TABLE
+        path = self.folder / STUDY_TABLE
         try:
-            table = import_module("pyarrow.parquet").read_table(located(path))
+            table = import_module("pyarrow.parquet").read_table(locate(path))
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: not the table of a study: {reason(error)}") from error
         if table.num_rows != (n := self.record.get("runs")):
@@ -350,7 +350,7 @@ class StudyResult(Mapping[str, np.ndarray]):
     @cached_property
     def record(self) -> dict[str, Any]:
         """What study.json holds."""
-        return read_record(self.folder)
+        return read_study_record(self.folder)
 
     @property
     def runs(self) -> int:

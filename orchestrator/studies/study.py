@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import names_in, text_of
+from orchestrator.machine.user_files import names_in, read_text
 from orchestrator.system.names import file_name
 
 #: What makes the runs; the first is the default.
 ENGINES = FMU, BATCH = "fmu", "batch"
 
 #: How values that are not listed are spread between two ends.
-SPACINGS = LINEAR, LOG = "linear", "log"
+SPACINGS = LINEAR_SPACING, LOG_SPACING = "linear", "log"
 
 #: How samples are drawn; the first is the default.
 METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
@@ -26,7 +26,7 @@ METHODS = SOBOL, LATIN_HYPERCUBE, RANDOM = "sobol", "latin-hypercube", "random"
 MOST_RUNS = 1_000_000_000
 
 #: Studies that come with the program.
-FOLDER = Path(__file__).parent / "ready"
+STUDIES_FOLDER = Path(__file__).parent / "ready"
 
 #: What may vary beside parameters.
 STEP = "step"
@@ -35,7 +35,7 @@ STEP = "step"
 _OWN = {"scenario", "vary", "sample"}
 
 #: What a message calls a file that cannot be read.
-WHAT = "not a study"
+NOT_A_STUDY = "not a study"
 
 
 class Range(NamedTuple):
@@ -43,7 +43,7 @@ class Range(NamedTuple):
 
     low: float
     high: float
-    spacing: str = LINEAR
+    spacing: str = LINEAR_SPACING
 
 
 class Sample(NamedTuple):
@@ -65,10 +65,10 @@ class Sample(NamedTuple):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the values, the ones in a norm one by one."""
-        return tuple(name for key in self.ranges for name in members(key))
+        return tuple(name for key in self.ranges for name in norm_members(key))
 
 
-def members(key: str) -> list[str]:
+def norm_members(key: str) -> list[str]:
     """The names in a norm `|a, b, c|`, or the one name."""
     return [name.strip() for name in key.strip("|").split(",")] if key.startswith("|") else [key]
 
@@ -126,7 +126,7 @@ class Study:
 
 def ready_studies() -> list[str]:
     """The studies that come with the program."""
-    return names_in(FOLDER)
+    return names_in(STUDIES_FOLDER)
 
 
 def is_study(path: str) -> bool:
@@ -134,5 +134,5 @@ def is_study(path: str) -> bool:
     if not path.endswith(".toml"):
         return False
     with suppress(InputError, ValueError, RecursionError):
-        return bool(_OWN & tomllib.loads(text_of(Path(path), WHAT)).keys())
+        return bool(_OWN & tomllib.loads(read_text(Path(path), NOT_A_STUDY)).keys())
     return False

@@ -14,37 +14,37 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_figures import KINDS, FigureEntry
+from orchestrator.figures.study_figures import FIGURE_KINDS, FigureEntry
 from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.machine.user_files import explained, path_of, text_of
+from orchestrator.machine.user_files import explain_errors, find_toml, read_text
 from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (
     ENGINES,
-    FOLDER,
-    LINEAR,
-    LOG,
+    LINEAR_SPACING,
+    LOG_SPACING,
     METHODS,
     MOST_RUNS,
+    NOT_A_STUDY,
     SPACINGS,
     STEP,
-    WHAT,
+    STUDIES_FOLDER,
     Range,
     Sample,
     StopTime,
     Study,
-    members,
+    norm_members,
 )
-from orchestrator.system.names import flattened, port_name
+from orchestrator.system.names import flatten, port_name
 from orchestrator.system.values import is_finite
 from orchestrator.vehicle.indices import index_columns
 
 #: What a figure may be called: its files are.
 _NAME = re.compile(r"[\w-]+")
 
-#: The table that is no figure.
+#: The table that is not a figure.
 LABELS = "labels"
 
 #: What is shown of a study whose file does not say it: of each vehicle, and of all together.
@@ -59,7 +59,7 @@ _LARGEST_SEED = 2**63 - 1
 
 def _each(fits: Callable[[Any], bool]) -> AfterValidator:
     def check(table: Mapping[str, Any]) -> Mapping[str, Any]:
-        if not all(fits(value) for _, value in flattened(table)):
+        if not all(fits(value) for _, value in flatten(table)):
             raise ValueError
         return table
 
@@ -74,27 +74,25 @@ _Texts = Annotated[dict[str, Any], _each(lambda text: isinstance(text, str)), "t
 class RangeTable(TomlTable):
     """A range under `[sample.range]`."""
 
-    low: float = needed("Where it begins.", "1.0", key="from")
-    high: float = needed("Where it ends; it may go either way.", "10.0", key="to")
+    low: float = needed("Start of the range.", "1.0", key="from")
+    high: float = needed("End of the range; it may be below the start.", "10.0", key="to")
     spacing: Annotated[str, OneOf(SPACINGS)] = entry(
-        "How values lie between the ends.", f"`{SPACINGS[0]}`"
+        "Spacing of the values between the ends.", f"`{SPACINGS[0]}`"
     )
 
 
 class GridTable(RangeTable):
     """A range under `[vary]`."""
 
-    n: Annotated[int, Field(ge=1, le=_MOST_VALUES)] = needed("How many values it has.", "7")
+    n: Annotated[int, Field(ge=1, le=_MOST_VALUES)] = needed("Number of values.", "7")
 
 
 class SampleTable(TomlTable):
     """Points drawn at random: `[sample]`."""
 
-    method: Annotated[str, OneOf(METHODS)] = entry("How points are drawn.", f"`{METHODS[0]}`")
-    n: Annotated[int, Field(ge=1, le=MOST_RUNS)] = needed("How many points.", "64")
-    seed: Annotated[int, Field(ge=0, le=_LARGEST_SEED)] = entry(
-        "Makes the points what they are.", "`0`"
-    )
+    method: Annotated[str, OneOf(METHODS)] = entry("How to draw points.", f"`{METHODS[0]}`")
+    n: Annotated[int, Field(ge=1, le=MOST_RUNS)] = needed("Number of points.", "64")
+    seed: Annotated[int, Field(ge=0, le=_LARGEST_SEED)] = entry("Fixes the points.", "`0`")
     range: dict[str, Any] = needed(
         "What is drawn: `component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "
         '"log" }`.',
@@ -105,32 +103,32 @@ class SampleTable(TomlTable):
 class StopTimeTable(TomlTable):
     """`stop_time` as a sum."""
 
-    base: float = needed("Of the sum [s].", "60.0")
-    per: _Numbers = needed("Seconds for each of a value that varies.", "{ plant.eta0.z = 1.2 }")
+    base: float = needed("Constant part [s].", "60.0")
+    per: _Numbers = needed("Seconds per unit of a value that varies.", "{ plant.eta0.z = 1.2 }")
 
 
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
-    kind: Annotated[str, OneOf(tuple(KINDS))] = needed(
-        "What it is.", " or ".join(f'"{kind}"' for kind in KINDS)
+    kind: Annotated[str, OneOf(tuple(FIGURE_KINDS))] = needed(
+        "Kind of figure.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
     )
     x: Names = entry(
-        "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
-        "`influence` what moves the others."
+        "Value along the horizontal axis; for `bands` also several, a column of panels each; for "
+        "`influence` the values that move the others."
     )
     y: Name = entry("Value along the vertical axis.")
-    show: Names = entry("What is shown, a row each.")
+    show: Names = entry("Values to show, a row each.")
     by: Names = entry(
-        "Columns that tell runs apart, by colours or in panels of their own; `[]` for none.",
+        "Columns that tell runs apart, by colours or in separate panels; `[]` for none.",
         "the scenario, if there are several",
     )
-    where: dict[str, Any] = entry("Only runs of which these columns have these values.", "none")
-    limits: _Numbers = entry("Lines at values of what is shown.", "none")
+    where: dict[str, Any] = entry("Only runs in which these columns have these values.", "none")
+    limits: _Numbers = entry("Lines at these values of the columns shown.", "none")
 
     @model_validator(mode="after")
     def _has_what_its_kind_has(self) -> Self:
-        _, needs, may = KINDS[self.kind]
+        _, needs, may = FIGURE_KINDS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:
@@ -147,7 +145,7 @@ class FiguresTable(TomlTable):
     __pydantic_extra__: dict[str, FigureTable]
     named: ClassVar = FigureTable
 
-    labels: _Texts = entry("What figures call columns.", "their names")
+    labels: _Texts = entry("Names of columns in figures.", "their names")
 
 
 class StudyFile(TomlTable):
@@ -155,14 +153,14 @@ class StudyFile(TomlTable):
 
     scenario: Name | Annotated[list[Name], Field(min_length=1)] = needed(
         "What is run: a scenario of `auv-fmu list`, or the path of a .toml, .ssp, .ssd or .fmu "
-        "file, or of an OspSystemStructure.xml, relative to this one. Of several, each is run at "
-        "every point, with the parameters that it has.",
+        "file, or of an OspSystemStructure.xml, relative to this one. If there are several, "
+        "each is run at every point, with the parameters that it has.",
         '"fig5"',
     )
     title: str = entry("Heading of the figures.", "none")
     remark: str = entry("What the report says below the figures, in Markdown.", "none")
     engine: Annotated[str, OneOf(ENGINES)] = entry(
-        "What makes the runs: the FMUs, or the equations compiled, which know only the standard "
+        "What makes the runs: the FMUs, or the compiled equations, which cover only the standard "
         "closed loop and give the same numbers.",
         f"`{ENGINES[0]}`",
     )
@@ -172,9 +170,7 @@ class StudyFile(TomlTable):
         "the scenario's",
     )
     step: float = entry("Communication step [s].", "the scenario's")
-    order: Annotated[str, OneOf(ORDERS)] = entry(
-        "In which components are stepped.", "the scenario's"
-    )
+    order: Annotated[str, OneOf(ORDERS)] = entry("Order of the steps.", "the scenario's")
     parameters: dict[str, Any] = entry(
         "Parameters of all runs, as in a scenario.", "the scenario's"
     )
@@ -185,11 +181,11 @@ class StudyFile(TomlTable):
         "nothing",
     )
     sample: SampleTable = entry(
-        "Points drawn at random, at every combination of `vary`: `n` of them, by a `method` out "
-        f"of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
+        "Points drawn at random, at every combination of `vary`: `n` of them, by a `method`, "
+        f"one of {', '.join(METHODS)}, with a `seed`, and under `[sample.range]` "
         '`component.parameter = [low, high]` or `{ from = 1.0, to = 10.0, spacing = "log" }`. '
         '`"|a, b, c|" = [low, high]` draws the norm of two or three numbers, and every direction '
-        "with the same chance.",
+        "with equal probability.",
         "none",
     )
     figures: FiguresTable = entry("What is drawn: see below.", "what moves what")
@@ -202,9 +198,9 @@ def read_study(name: str) -> Study:
         InputError: there is no such study, or its file has a mistake.
 
     """
-    path = path_of(name, FOLDER, "study", "a .toml file")
-    text = text_of(path, WHAT)
-    with explained(path, WHAT):
+    path = find_toml(name, STUDIES_FOLDER, "study", "a .toml file")
+    text = read_text(path, NOT_A_STUDY)
+    with explain_errors(path, NOT_A_STUDY):
         return study_of(path.stem, tomllib.loads(text), path)
 
 
@@ -229,16 +225,16 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         str(path.parent / scenario) if path and is_path(scenario) else scenario
         for scenario in ([names] if isinstance(names, str) else names)
     )
-    entries["parameters"] = dict(flattened(content.get("parameters", {})))
+    entries["parameters"] = dict(flatten(content.get("parameters", {})))
     entries["vary"] = {}
-    for key, value in flattened(content.get("vary", {}), _is_range):
+    for key, value in flatten(content.get("vary", {}), _is_range):
         with findings.collecting():
             entries["vary"][key] = _values(f"{where}: vary: {key}", value)
     if "sample" in content:
         with findings.collecting():
             entries["sample"] = _sample(f"{where}: sample", content["sample"])
     if (end := content.get("stop_time")) is not None:
-        per = dict(flattened(end["per"])) if isinstance(end, Mapping) else {}
+        per = dict(flatten(end["per"])) if isinstance(end, Mapping) else {}
         entries["stop_time"] = StopTime(end["base"] if isinstance(end, Mapping) else end, per)
     findings.refuse()
     study = Study(name, **entries)
@@ -258,7 +254,7 @@ def _values(where: str, value: Any) -> tuple[Any, ...]:
         raise InputError(f"{where}: write [values], or {{ from = 1.0, to = 10.0, n = 7 }}")
     GridTable.check(where, value)
     low, high, spacing = _range(where, value)
-    between = np.geomspace if spacing == LOG else np.linspace
+    between = np.geomspace if spacing == LOG_SPACING else np.linspace
     return tuple(between(low, high, value["n"]).tolist())
 
 
@@ -266,22 +262,22 @@ def _range(where: str, value: Any) -> Range:
     if isinstance(value, list) and len(value) == 2 and all(map(is_finite, value)):
         found = Range(*value)
     elif _is_range(value):
-        found = Range(value["from"], value["to"], value.get("spacing", LINEAR))
+        found = Range(value["from"], value["to"], value.get("spacing", LINEAR_SPACING))
     else:
         raise InputError(f"{where}: write [low, high], or {{ from = 1.0, to = 10.0 }}")
-    if found.spacing == LOG and not (found.low > 0.0 and found.high > 0.0):
-        raise InputError(f"{where}: spacing = {LOG!r} needs two positive ends")
+    if found.spacing == LOG_SPACING and not (found.low > 0.0 and found.high > 0.0):
+        raise InputError(f"{where}: spacing = {LOG_SPACING!r} needs two positive ends")
     return found
 
 
 def _sample(where: str, content: Mapping[str, Any]) -> Sample:
     findings, ranges = Findings(), {}
-    for key, value in flattened(content["range"], _is_range):
+    for key, value in flatten(content["range"], _is_range):
         with findings.collecting():
             if _is_range(value):
                 RangeTable.check(f"{where}: {key}", value)
             ranges[key] = limits = _range(f"{where}: {key}", value)
-            is_norm = key.endswith("|") and len(members(key)) in (2, 3)
+            is_norm = key.endswith("|") and len(norm_members(key)) in (2, 3)
             if key.startswith("|") and not (is_norm and min(limits.low, limits.high) >= 0.0):
                 raise InputError(
                     f"{where}: {key}: a norm is of two or three numbers, and not negative"
@@ -332,7 +328,7 @@ def read_figures(
 
     """
     tables, indices = dict(figures), indices or index_columns()
-    labels = dict(flattened(tables.pop(LABELS, {})))
+    labels = dict(flatten(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
         tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
@@ -342,7 +338,7 @@ def read_figures(
         with findings.collecting():
             if not _NAME.fullmatch(name):
                 raise InputError(
-                    f"{where}: figures: {name!r} is no name of a file: letters, digits, -"
+                    f"{where}: figures: {name!r} cannot be the name of a file: letters, digits, -"
                 )
             _check_figure(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
         plans.append(
@@ -353,8 +349,8 @@ def read_figures(
                 table.get("y", ""),
                 _listed(table.get("show", ())),
                 _listed(table.get("by", by)),
-                dict(flattened(table.get("where", {}))),
-                dict(flattened(table.get("limits", {}))),
+                dict(flatten(table.get("where", {}))),
+                dict(flatten(table.get("limits", {}))),
                 labels,
             )
         )
@@ -396,5 +392,5 @@ def _check_figure(
 
 def _listed(value: Any) -> list[str]:
     if isinstance(value, Mapping):
-        return [name for name, _ in flattened(value)]
+        return [name for name, _ in flatten(value)]
     return [value] if isinstance(value, str) else list(value)

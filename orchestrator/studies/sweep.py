@@ -22,15 +22,15 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.plan import PACKAGES
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.blocks import Making, local
+from orchestrator.studies.blocks import Making, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import Store, StudyResult, read_record, store
+from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study
 from orchestrator.studies.study_file import read_figures, read_study, study_of
 
@@ -60,7 +60,7 @@ class Means:
     engine: Annotated[
         str | None,
         CliOption(
-            "that makes the runs: the FMUs, or the compiled equations, with the same numbers; "
+            "what makes the runs: the FMUs, or the compiled equations, with the same numbers; "
             "default: the study's own",
             choices=ENGINES,
         ),
@@ -70,14 +70,14 @@ class Means:
     scheduler: Annotated[
         str | None,
         CliOption(
-            "of a Dask scheduler whose workers make the runs, for example tcp://10.0.0.1:8786; "
-            "default: processes on this machine",
+            "address of a Dask scheduler whose workers make the runs, for example "
+            "tcp://10.0.0.1:8786; default: processes on this machine",
             metavar="ADDRESS",
         ),
     ] = None
     workers: Annotated[
         int | None,
-        CliOption("processes on this machine; default: its cores", type=int, metavar="N"),
+        CliOption("number of processes on this machine; default: its cores", type=int, metavar="N"),
     ] = None
     force: Force = False
 
@@ -104,8 +104,8 @@ def sweep(
         engine: that makes the runs, `fmu` or `batch`; None: the study's own.
         kind: of the bundle's FMUs, `python` or `native`.
         loop: that makes their steps: `python`, `compiled` or `auto`.
-        scheduler: address of a Dask scheduler whose workers make the runs; None: processes of this
-            machine.
+        scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
+            this machine.
         workers: how many of these; None: one for each core.
         out: folder of the study; what was done there before is not done again. None:
             `results/NAME`.
@@ -119,15 +119,15 @@ def sweep(
     """
     plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return swept(plan, means, folder_of(plan, out), sys.argv, progress=progress)
+    return complete_study(plan, means, study_folder(plan, out), sys.argv, progress=progress)
 
 
-def folder_of(study: Study, out: str | Path | None) -> Path:
+def study_folder(study: Study, out: str | Path | None) -> Path:
     """Where a study goes."""
     return Path("results", study.stem) if out is None else Path(out)
 
 
-def swept(
+def complete_study(
     study: Study,
     means: Means,
     folder: Path,
@@ -151,14 +151,14 @@ def swept(
 
     """
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
-    systems = {name: loaded(name, means.kind) for name in study.scenario}
+    systems = {name: load_scenario(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
     plans = read_figures(
         study.name, study.figures, space.columns, space.has_scenarios, space.indices
     )
     engine = _engine(means.engine or study.engine, space.prepared, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
-    with store(folder, record, space.indices, means.force) as kept:
+    with open_store(folder, record, space.indices, means.force) as kept:
         kept.ledger.check(figure_files(plans))
         if not kept.is_done:
             if not len(kept) and (hint := faster(space, engine, means)):
@@ -166,7 +166,7 @@ def swept(
             name = study.name if progress else None
             _complete(kept, engine, space, means, name)
         result = StudyResult(folder)
-        kept.write_record({**read_record(folder), "failed": result.failed})
+        kept.write_record({**read_study_record(folder), "failed": result.failed})
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
@@ -195,12 +195,12 @@ def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
     for scenario, one in prepared.items():
         if one.input_table is not None:
-            raise InputError(f"{scenario}: has a table of inputs, which no study can follow")
+            raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
         if name == BATCH and one.events:
-            raise InputError(f"{scenario}: has events, which engine {BATCH!r} cannot have happen")
+            raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
         if name == BATCH and (more := _unknown_to_batch(one.experiment)):
             raise InputError(
-                f"{scenario}: has {more}, which engine {BATCH!r} does not know; use --engine {FMU}"
+                f"{scenario}: has {more}, which engine {BATCH!r} lacks; use --engine {FMU}"
             )
     if name == FMU:
         return FmuEngine(prepared, means.loop)
@@ -263,7 +263,7 @@ def _record(
 
 
 @contextmanager
-def making(
+def making_runs(
     engine: Engine,
     runs: Iterable[Point],
     *,
@@ -291,12 +291,11 @@ def making(
 
         if workers is not None:
             raise InputError(
-                "--workers is for processes of this machine: those of a scheduler are started with "
-                "it"
+                "--workers is for processes of this machine: a scheduler has its own workers"
             )
         crew = cluster(scheduler, engine)
     else:
-        crew = local(workers, engine)
+        crew = local_workers(workers, engine)
     with crew as of:
         yield Making(of).outcomes(runs)
 
@@ -316,7 +315,7 @@ def _complete(
     """
     runs = (space[number] for number in unfinished.missing(len(space)))
     with (
-        making(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
+        making_runs(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
         tqdm(
             total=len(space),
             initial=len(unfinished),

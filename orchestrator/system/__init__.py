@@ -1,4 +1,4 @@
-"""What is simulated: components behind their ports, connections and parameters.
+"""What is simulated: components as their ports, connections and parameters.
 
 Begin with `structure`. Nothing here knows which components there are.
 """

@@ -15,7 +15,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ModelVariable, ValidationError
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
-from orchestrator.machine.user_files import folder_of, unpacked
+from orchestrator.machine.user_files import unpack, unpacked_folder
 from orchestrator.system.values import Value, finite, integer, real, typed
 
 _CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}
@@ -35,7 +35,7 @@ WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
 
 
 class Described(NamedTuple):
-    """A description, and what is wrong with it; None: it is valid."""
+    """A description, and its flaw; None: it is valid."""
 
     description: ModelDescription
     flaw: Exception | None
@@ -44,7 +44,7 @@ class Described(NamedTuple):
         """What is wrong with it, in some words."""
         if isinstance(self.flaw, ValidationError):
             first, *others = map(str, self.flaw.problems)
-            return first + f" (and {len(others)} problems more)" * bool(others)
+            return first + f" (and {len(others)} more problems)" * bool(others)
         return None if self.flaw is None else reason(self.flaw)
 
 
@@ -75,7 +75,7 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         versions: of FMI that it may have.
 
     Raises:
-        InputError: it is no such FMU.
+        InputError: it is not such an FMU.
 
     """
     file = folder / "modelDescription.xml"
@@ -113,7 +113,7 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
 
 
 def _misread(file: Path) -> Iterator[str]:
-    """Numbers of a description that Python takes for others, or that are none."""
+    """Numbers of a description that Python would misread, or that are not numbers."""
     for element in _elements(ElementTree.parse(file).getroot()):
         if element.tag == "Item":
             for name in sorted({"name", "value"} - element.attrib.keys()):
@@ -125,7 +125,7 @@ def _misread(file: Path) -> Iterator[str]:
                     (integer if name in _INTEGERS else real)(one)
             except ValueError:
                 shown = shortened(repr(text))
-                yield f"{name} of <{element.tag}> is {shown}, which is no number"
+                yield f"{name} of <{element.tag}> is {shown}, which is not a number"
 
 
 def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
@@ -161,7 +161,7 @@ class Component:
             InputError: it was read in another process, and the file is another one now.
 
         """
-        return folder_of(self.fmu, self.digest)
+        return unpacked_folder(self.fmu, self.digest)
 
     @cached_property
     def variables(self) -> dict[str, ModelVariable]:
@@ -285,13 +285,13 @@ def read_component(
         name: of the instance.
         fmu: the file.
         versions: of FMI that it may have.
-        findings: take note of what is wrong with its description, and does no harm.
+        findings: take notes of harmless flaws in its description.
 
     Raises:
-        InputError: the file is missing or is no such FMU for co-simulation.
+        InputError: the file is missing or is not such an FMU for co-simulation.
 
     """
-    folder, digest = unpacked(fmu)
+    folder, digest = unpack(fmu)
     found = described(fmu, folder, tuple(versions))
     if findings is not None and (remark := found.remark()):
         findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")

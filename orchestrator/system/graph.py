@@ -41,7 +41,7 @@ def derived_order(system: System, solved: Sequence[Sequence[str]] = ()) -> list[
 
     No order does that for every connection of a ring. The component of the ring that stands first
     in the system then comes first, and takes one step late what feeds it; where the others are a
-    ring still, it is opened in the same way: see :func:`delayed`.
+    ring still, it is opened in the same way: see :func:`delayed_connections`.
 
     Args:
         system: that is stepped.
@@ -64,7 +64,7 @@ def derived_order(system: System, solved: Sequence[Sequence[str]] = ()) -> list[
     return [member for name in order for member in ring_of.get(name, (name,))]
 
 
-def delayed(
+def delayed_connections(
     system: System, order: Sequence[str], solved: Iterable[Sequence[str]] = ()
 ) -> list[Connection]:
     """The connections with direct feedthrough that an order makes one step late.
@@ -92,14 +92,16 @@ def in_stages(
 ) -> list[list[str]]:
     """An order in stages: no component takes what another one of its stage has just computed.
 
-    Solved rings have stages of their own, each in the place of its component that comes first.
+    Solved rings have their own stages, each in the place of its first component.
     """
     ring_of = {name: ring for ring in map(list, solved) for name in ring}
     units: dict[str, list[str]] = {}
     for name in order:
         ring = ring_of.get(name, [name])
         units.setdefault(ring[0], ring)
-    late = set(delayed(system, [name for unit in units.values() for name in unit], solved))
+    late = set(
+        delayed_connections(system, [name for unit in units.values() for name in unit], solved)
+    )
     feeding: dict[str, set[str]] = {name: set() for name in order}
     for connection in system.connections:
         if has_feedthrough(system, connection) and connection not in late:
@@ -188,7 +190,7 @@ def _in_levels(sources: _Sources, last: Collection[str]) -> list[str]:
 
 
 def _opened(ring: Sequence[str], sources: _Sources, place: Mapping[str, int]) -> list[str]:
-    """A ring in the order in which it is opened: its first, then what is left, part by part.
+    """A ring in the order in which it is opened: its first, then the rest, part by part.
 
     What is left of a ring may be rings again, and so on inwards. They are found from the inmost
     outwards: components are added to a graph, the last first, and each of them becomes one with

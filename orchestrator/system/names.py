@@ -58,10 +58,10 @@ def splits(text: str) -> Iterator[tuple[str, str]]:
         dot = text.rfind(".", 0, dot)
 
 
-def flattened(
+def flatten(
     table: Mapping[str, Any], is_value: Callable[[Any], bool] = lambda _: False, prefix: str = ""
 ) -> Iterator[tuple[str, Any]]:
-    """The values of a table by dotted names, whether its keys were quoted or dotted.
+    """Flatten a table to values by dotted names, whether its keys were quoted or dotted.
 
     Args:
         table: with tables in it.
@@ -72,7 +72,7 @@ def flattened(
     for key, value in table.items():
         name = f"{prefix}.{key}" if prefix else key
         if isinstance(value, Mapping) and not is_value(value):
-            yield from flattened(value, is_value, name)
+            yield from flatten(value, is_value, name)
         else:
             yield name, value
 

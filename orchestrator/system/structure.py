@@ -201,7 +201,7 @@ class System:
                 yield f"{target} is of causality {causality} and cannot be set"
 
     def _ambiguous(self) -> Iterator[str]:
-        """Names that two ports have: of a component, and of one whose name is a part of its own."""
+        """Names that two ports share, when one component's name begins another's."""
         for name, component in self.components.items():
             for outer, rest in splits(name):
                 if outer in self.components:
@@ -237,7 +237,7 @@ class System:
 
 
 def _check_transformed(connection: Connection, fmi_type: str) -> None:
-    """Refuse to compute with what is no number, and to make fractions of what has none."""
+    """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
     linear = isinstance(connection.transformation, Linear)
     if fmi_type == "String" or (linear and fmi_type != "Real"):
         how = "transformed linearly" if linear else "mapped"
@@ -253,7 +253,7 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
             if not least <= value <= most or (fmi_type != "Real" and value != int(value)):
                 raise InputError(
                     f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
-                    f"no {fmi_type} of FMI can be"
+                    f"FMI type {fmi_type} cannot hold"
                 )
 
 

@@ -16,7 +16,7 @@ from orchestrator.system.values import unit_of
 _MOST_PAIRS = 1000
 
 #: The base units of FMI 2.0 and SSP 1.0, in the order of :attr:`Unit.exponents`.
-BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
 @dataclass(frozen=True)
@@ -50,15 +50,15 @@ class Mapped:
 Transformation: TypeAlias = Linear | Mapped
 
 
-def chained(first: Transformation | None, then: Transformation | None) -> Transformation | None:
-    """Two transformations, one after the other, as one; None leaves a value as it is.
+def combine(first: Transformation | None, then: Transformation | None) -> Transformation | None:
+    """Combine two transformations, one after the other; None leaves a value as it is.
 
     Raises:
         InputError: one is linear, and the other a table; no number holds what they come to; or
             together they are too long a table.
 
     """
-    # One that says that nothing happens is kept where there is no other.
+    # An identity is kept only if there is no other.
     for nothing in (None, Linear()):
         if first == nothing:
             return then
@@ -69,7 +69,7 @@ def chained(first: Transformation | None, then: Transformation | None) -> Transf
         vanishes = not both.factor and first.factor and then.factor
         if vanishes or not (isfinite(both.factor) and isfinite(both.offset)):
             raise InputError(
-                f"linear transformations follow each other that come to the factor "
+                f"successive linear transformations combine to the factor "
                 f"{both.factor:g} and the offset {both.offset:g}"
             )
         return both
@@ -89,7 +89,7 @@ class Unit:
 
     Attributes:
         name: as connectors and variables write it.
-        exponents: of :data:`BASES`; None: nothing defines this unit.
+        exponents: of :data:`BASE_UNITS`; None: nothing defines this unit.
 
     """
 
@@ -112,7 +112,7 @@ def _defined(component: Component, name: str) -> Unit:
     for unit in component.description.unitDefinitions:
         if unit.name == name and unit.baseUnit is not None:
             base: Any = unit.baseUnit
-            exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASES)
+            exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASE_UNITS)
             return Unit(name, exponents, float(base.factor), float(base.offset))
     return Unit(name)
 

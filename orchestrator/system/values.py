@@ -90,13 +90,13 @@ def finite(text: str, where: str) -> float:
         where: it stands, for the message.
 
     Raises:
-        ValueError: it is none.
+        ValueError: it is not one.
 
     """
     try:
         number = real(text)
     except ValueError:
-        raise ValueError(f"{where} {text[:40]!r} is no number") from None
+        raise ValueError(f"{where} {text[:40]!r} is not a number") from None
     if not isfinite(number):
         raise ValueError(f"{where} {text[:40]!r} is not finite")
     return number
@@ -111,7 +111,7 @@ def is_finite(value: object) -> bool:
 
 def _plain(text: str) -> str:
     if "_" in text or not text.isascii():
-        raise ValueError(f"{text!r} is no plain number")
+        raise ValueError(f"{text!r} is not a plain number")
     return text
 
 
@@ -162,7 +162,7 @@ def is_of(variable: ModelVariable, value: object) -> bool:
     if kind in ("Integer", "Enumeration"):
         return type(value) is int and is_integer(value)
     if isinstance(value, str):
-        # Half of a pair of UTF-16 is no text.
+        # Half of a UTF-16 pair is not text.
         return kind == "String" and value.encode(errors="ignore").decode() == value
     return type(value) is {"Real": float, "Boolean": bool}.get(kind)
 

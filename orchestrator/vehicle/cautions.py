@@ -17,7 +17,7 @@ from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import unit_of
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, parameter, value_of, vehicle
+from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, real_parameter, value_of, vehicle
 
 #: References that are farther apart are not the same [m].
 _SAME = 1e-6
@@ -29,7 +29,7 @@ _REVERSES, _GROWS = 1.0, 2.0
 _VELOCITY_UNITS = {"m/s", "rad/s"}
 
 
-def watched(loop: Loop) -> tuple[str, str]:
+def watched_columns(loop: Loop) -> tuple[str, str]:
     """The columns whose extremes :func:`cautions_after` looks at: theta_hat[1], and the pitch."""
     return loop.theta_hat[0], loop.attitude[1]
 
@@ -116,10 +116,10 @@ def _of_the_robust_term(table: Table, loop: Loop) -> list[str]:
     needed = (eps, h_max, loop.ell, *loop.vehicle_parameters)
     if len(table) < 2 or table.missing((estimate,), needed):
         return []
-    rho_hat, eps_t = float(table[estimate].max()), parameter(table, eps)
-    plant = vehicle(lambda name: parameter(table, name), loop)
-    lambda_m2 = bounds(plant, parameter(table, loop.ell)).lambda_m2
-    h = min(table.header.experiment.step, parameter(table, h_max))
+    rho_hat, eps_t = float(table[estimate].max()), real_parameter(table, eps)
+    plant = vehicle(lambda name: real_parameter(table, name), loop)
+    lambda_m2 = bounds(plant, real_parameter(table, loop.ell)).lambda_m2
+    h = min(table.header.experiment.step, real_parameter(table, h_max))
     h_p = h * robust_rate(rho_hat, eps_t, lambda_m2)
     if h_p <= _REVERSES:
         return []

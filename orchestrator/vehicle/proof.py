@@ -33,7 +33,7 @@ from orchestrator.vehicle.signals import (
     Loop,
     limits,
     loops_of,
-    parameter,
+    real_parameter,
     true_control_point,
     value_of,
     vehicle,
@@ -193,10 +193,10 @@ def _certificates(header: Header, loop: Loop, starts: np.ndarray, ends: np.ndarr
 
 
 def _rows(loop: Loop, start: Table, end: Table) -> Iterator[list[float]]:
-    plant = vehicle(lambda name: parameter(start, name), loop)
+    plant = vehicle(lambda name: real_parameter(start, name), loop)
     *K2_names, lambda_name, saturation = _gains(loop)
-    ell, lambda_ = parameter(start, loop.ell), parameter(start, lambda_name)
-    K2_x, K2_y, K2_z = (parameter(start, name) for name in K2_names)
+    ell, lambda_ = real_parameter(start, loop.ell), real_parameter(start, lambda_name)
+    K2_x, K2_y, K2_z = (real_parameter(start, name) for name in K2_names)
     s = SATURATIONS[str(value_of(start, saturation))]
     lower, upper = limits(start, loop)
 

@@ -183,7 +183,7 @@ def value_of(table: Table, name: str) -> Value | None:
     return next((table.parameters[one] for one in names if one in table.parameters), None)
 
 
-def parameter(table: Table, name: str) -> float:
+def real_parameter(table: Table, name: str) -> float:
     """The value of a Real parameter `component.name` in a run.
 
     Raises:
@@ -199,8 +199,8 @@ def parameter(table: Table, name: str) -> float:
 def limits(table: Table, loop: Loop = STANDARD) -> tuple[np.ndarray, np.ndarray]:
     """The limits of (3), lower and upper, for u, q, r [N, N.m]."""
     return (
-        np.array([parameter(table, name) for name in loop.lower_limits]),
-        np.array([parameter(table, name) for name in loop.upper_limits]),
+        np.array([real_parameter(table, name) for name in loop.lower_limits]),
+        np.array([real_parameter(table, name) for name in loop.upper_limits]),
     )
 
 
@@ -211,7 +211,7 @@ def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:
 
 def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
     """y without measurement noise: (9) on the vehicle's posture, (rows, 3) [m]."""
-    ell = parameter(table, loop.ell)
+    ell = real_parameter(table, loop.ell)
     return np.array(
         [
             control_point((x, y, z), rotation_from_euler(*euler), ell)

@@ -15,7 +15,7 @@ import pytest
 import orchestrator.studies.batch
 from orchestrator import simulate, sweep
 from orchestrator.commands.main import main
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies
@@ -125,7 +125,7 @@ def test_page_of_studies_names_all_columns_options_and_ready_studies():
 def test_study_has_as_many_runs_as_the_page_says():
     [example] = blocks(STUDIES, "toml")
     study = study_of("mine", tomllib.loads(example.text))
-    space = Space(study, {name: loaded(name) for name in study.scenario})
+    space = Space(study, {name: load_scenario(name) for name in study.scenario})
     assert len(space) == 8 * 2 * 64 * 2
     assert read_figures("mine", study.figures, space.columns, space.has_scenarios)
 

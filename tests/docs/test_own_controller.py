@@ -1,4 +1,4 @@
-"""The guide to an own controller, followed literally."""
+"""The guide to your own controller, followed literally."""
 
 from __future__ import annotations
 

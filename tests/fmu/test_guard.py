@@ -22,7 +22,7 @@ from typing import Any
 import fmpy
 import pytest
 
-from fmus.python.own import build_own
+from fmus.python.own import build_script
 from fmus.python.packaging import loader_compiler
 from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
@@ -122,7 +122,7 @@ def refused(library: Library, **arguments: Any) -> Message:
         ("has no name", {"name": None}),
         *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
         ("GUID is not UTF-8", {"guid": b"\xff"}),
-        ("is not that of this FMU", {"guid": b"{}"}),
+        ("is not the one of this FMU", {"guid": b"{}"}),
         ("co-simulation only", {"kind": MODEL_EXCHANGE}),
         ("co-simulation only", {"kind": 77}),
     ],
@@ -228,7 +228,7 @@ def test_resource_that_is_no_file_is_not_waited_for(python, resources, name: str
     else:
         path.mkdir()
     message = refused(python, location=resources.as_uri().encode())
-    assert f"{path} is no regular file" in message.text or kind == "folder"
+    assert f"{path} is not a regular file" in message.text or kind == "folder"
 
 
 def test_library_beside_the_loader_is_found_where_the_loader_was(python, tmp_path, monkeypatch):
@@ -508,7 +508,7 @@ class Slow(Fmi2Slave):
 
 def test_child_that_is_forked_waits_for_no_thread_of_its_parent(python, tmp_path):
     (tmp_path / "slow.py").write_text(SLOW)
-    fmpy.extract(build_own(tmp_path / "slow.py", tmp_path), unzipdir=tmp_path / "slow")
+    fmpy.extract(build_script(tmp_path / "slow.py", tmp_path), unzipdir=tmp_path / "slow")
     subprocess.run(
         [sys.executable, "-c", FORKS, tmp_path / "slow", python.folder],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -553,7 +553,7 @@ class Foreign(Fmi2Slave):
 def foreign(tmp_path_factory: pytest.TempPathFactory) -> Library:
     folder = tmp_path_factory.mktemp("foreign")
     (folder / "foreign_slave.py").write_text(FOREIGN)
-    fmu = build_own(folder / "foreign_slave.py", folder)
+    fmu = build_script(folder / "foreign_slave.py", folder)
     return Library(Path(fmpy.extract(fmu, folder / "unpacked")))
 
 

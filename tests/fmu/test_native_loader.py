@@ -11,7 +11,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.python.own import build_own
+from fmus.python.own import build_script
 from fmus.python.packaging import LOADER, LOADER_FLAGS, loader_compiler
 from orchestrator.runs import bundle
 from support.hosts import bare_root, host, unpacked
@@ -171,7 +171,7 @@ def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path,
 @pytest.mark.xfail(reason="PythonFMU's own start of Python takes no lock that others could take")
 def test_threads_with_fmus_that_have_no_loader(tmp_path: Path):
     """What docs/hosts/c-program.md warns of."""
-    bundle.build(tmp_path, "plain")
+    bundle.build_bundle(tmp_path, "plain")
     program = host(tmp_path, "threads")
     arguments = unpacked(tmp_path, tmp_path / "plain")[:4]
     for _ in range(REPETITIONS):
@@ -249,7 +249,7 @@ class Talkative(Fmi2Slave):
 @needs_libpython
 def test_what_a_slave_prints_is_there_when_the_host_ends(tmp_path: Path):
     (tmp_path / "talkative.py").write_text(TALKATIVE)
-    fmpy.extract(build_own(tmp_path / "talkative.py", tmp_path), unzipdir=tmp_path / "fmu")
+    fmpy.extract(build_script(tmp_path / "talkative.py", tmp_path), unzipdir=tmp_path / "fmu")
     program = host(tmp_path, "threads", *FINDS_LIBPYTHON)
     folder = tmp_path / "fmu"
     process = run(program, str(folder / "binaries/linux64/Talkative.so"), str(folder / "resources"))
@@ -298,12 +298,12 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
 
 
 def test_plain_variant_is_there_on_request(tmp_path: Path):
-    bundle.build(tmp_path, "plain")
+    bundle.build_bundle(tmp_path, "plain")
     assert bundle.settings_of(tmp_path)["loader"] == "plain"
     fmpy.extract(tmp_path / "AuvPlant.fmu", unzipdir=tmp_path / "unpacked")
     libraries = tmp_path / "unpacked/binaries/linux64"
     assert [path.name for path in libraries.iterdir()] == ["AuvPlant.so"]
     fmpy.simulate_fmu(str(tmp_path / "AuvPlant.fmu"), stop_time=0.2)
-    assert bundle.build(tmp_path) == [], "what is there stays as it is"
-    written = bundle.build(tmp_path, "native")
+    assert bundle.build_bundle(tmp_path) == [], "what is there stays as it is"
+    written = bundle.build_bundle(tmp_path, "native")
     assert tmp_path / "AuvPlant.fmu" in written

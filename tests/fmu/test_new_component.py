@@ -29,7 +29,6 @@ OTHER = "fmus.disturbance_generator"
 #: Tests of any component, and what they read.
 TESTS = (
     "tests/fmu/test_built_fmu.py",
-    "tests/unit/fmus/native/test_equations.py",
     "tests/unit/fmus/native/test_translator.py",
 )
 READ = ("tests/support", "tests/fuzz", "docs/status.md", "pyproject.toml", *TESTS)
@@ -98,7 +97,11 @@ def test_both_kinds_describe_themselves_well(tree: Path, kind: str):
 
 
 def test_page_has_the_ports(tree: Path):
-    page = python(tree, "-c", f"from fmus.documentation import page; print(page({NAME!r}))")
+    page = python(
+        tree,
+        "-c",
+        f"from fmus.documentation import component_page; print(component_page({NAME!r}))",
+    )
     assert page.startswith("# FirstOrderLag\n\nT dx/dt = u - x")
     assert "| `y.x` | Real | m | Its value, measured: x |" in page
 

@@ -86,12 +86,12 @@ def test_host_runs_where_there_is_nothing_but_a_c_library(
 ):
     """5,000 steps; the table is that of the FMUs in Python, with tolerance 0."""
     system = system_of(native, scenario)
-    host = c_host.compiled(tmp_path, system, WHOLE, place(Path("/"), "linux64", ".so"))
+    host = c_host.compile_host(tmp_path, system, WHOLE, place(Path("/"), "linux64", ".so"))
     for component in system.components.values():
         shutil.copytree(unpacked / component.fmu.stem, tmp_path / component.fmu.stem)
     root = bare_root(tmp_path, host, *tmp_path.glob("*/binaries/linux64/*.so"))
-    c_host.run([*root, "/host"], tmp_path, WHOLE.full_steps, [])
-    said = verify(tmp_path / c_host.TABLE, system_of(dist, scenario), 0.0)
+    c_host.run_host([*root, "/host"], tmp_path, WHOLE.full_steps, [])
+    said = verify(tmp_path / c_host.TABLE_FILE, system_of(dist, scenario), 0.0)
     assert "to 100 s, in gauss-seidel order" in said
 
 
@@ -110,8 +110,8 @@ def run_elsewhere(
     """Rows of all Reals on another machine, where the command runs a program, and here."""
     here = run(system, SHORT.stop_time, SHORT.step)
     names = [name for name in here.header.columns if not name.endswith(".fault")]
-    program = c_host.compiled(folder, system, SHORT, library, zig(machine), name)
-    rows, _ = c_host.run([*command, program], folder, SHORT.full_steps, names)
+    program = c_host.compile_host(folder, system, SHORT, library, zig(machine), name)
+    rows, _ = c_host.run_host([*command, program], folder, SHORT.full_steps, names)
     return rows, here.group(*names)
 
 
@@ -119,7 +119,7 @@ def run_elsewhere(
 def windows(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The libraries that the build makes for Windows."""
     folder = tmp_path_factory.mktemp("windows")
-    bundle.build(folder, kind="native", platforms="win64")
+    bundle.build_bundle(folder, kind="native", platforms="win64")
     for name in NAMES:
         fmpy.extract(folder / f"{name}.fmu", unzipdir=folder / name)
     return folder

@@ -48,7 +48,7 @@ from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import Plan
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.scenario import FOLDER as SCENARIOS
+from orchestrator.runs.scenario import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 
@@ -329,7 +329,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
         _process_folder.cache_clear()
         try:
             runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
-            with patch.object(verify, "completed", partial(_replay, runs)):
+            with patch.object(verify, "simulate_to_end", partial(_replay, runs)):
                 found = kinds(runs)
                 for name, kind in found.items():
                     # The first use of a library may write into its cache.

@@ -30,7 +30,7 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.ledger import LEDGER
 from orchestrator.paper import report
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import opened
+from orchestrator.runs.folder import open_ledger
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.machine import contents, ended, forked, is_over
@@ -128,7 +128,7 @@ class Attack:
             self._lose(share, "a child stays")
         half = '"moving": {}' not in (self._place / LEDGER).read_text()
         counts[f"{self._name}: killed while files took their places"] += half
-        with opened(self._place):
+        with open_ledger(self._place):
             # Goes on with what was begun, as the next command does.
             pass
         found = visible(self._place)

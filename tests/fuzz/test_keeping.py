@@ -191,7 +191,7 @@ def quick(here: Path) -> Iterator[None]:
         ):
             stack.enter_context(patch.object(what, name, instead))
         if STUDIES:
-            stack.enter_context(patch("orchestrator.studies.sweep.making", making))
+            stack.enter_context(patch("orchestrator.studies.sweep.making_runs", making))
         yield
 
 

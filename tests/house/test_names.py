@@ -1,4 +1,4 @@
-"""One word, one thing: names occur once, and the glossary's words are where it says. Sizes."""
+"""One word, one thing: names occur once, terms live where the glossary says, tests as modules."""
 
 from __future__ import annotations
 
@@ -22,6 +22,14 @@ def test_no_module_and_no_class_of_the_orchestrator_has_the_name_of_another():
 
 def test_a_module_has_100_to_400_lines_or_a_reason():
     assert HOUSE["odd_sizes"]().keys() == HOUSE["REASONS"].keys()
+
+
+def test_a_unit_test_is_named_after_what_it_tests():
+    """A module, or a folder; `auv_fmu` lies in `src`."""
+    for path in (ROOT / "tests" / "unit").rglob("test_*.py"):
+        tested = path.relative_to(ROOT / "tests" / "unit").with_stem(path.stem[5:])
+        found = [ROOT / tested, ROOT / "src" / tested]
+        assert any(it.exists() or it.with_suffix("").is_dir() for it in found), path
 
 
 def test_terms_are_told_once_and_in_order():

@@ -14,7 +14,7 @@ from unittest.mock import patch
 import fmpy
 import pytest
 
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from support.settings import NAMES
 
 GCC = shutil.which("gcc")
@@ -95,7 +95,7 @@ def sanitize(folder: Path, what: str = MEMORY) -> Path:
 def sanitized(shared: Path, fmus: Path, name: str, what: str = MEMORY) -> Path:
     """An FMU in C, unpacked and compiled so once for all workers."""
     folder = shared / what / name
-    with claimed(shared, wait=True):
+    with hold_lock(shared, wait=True):
         if not folder.exists():
             with TemporaryDirectory(dir=shared) as new:
                 sanitize(Path(fmpy.extract(fmus / f"{name}.fmu", new)), what)

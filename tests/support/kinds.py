@@ -13,8 +13,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import port_name
@@ -53,7 +53,7 @@ def outcome(
     table = Table()
     try:
         system = closed_loop(fmus, read_scenario(scenario)).with_parameters(changes)
-        ending = simulate(planned(system, experiment), [table])
+        ending = simulate_plan(make_plan(system, experiment), [table])
     except InputError as error:
         return Outcome(str(error), None, (), np.empty((0, 0)))
     columns = table.header.columns

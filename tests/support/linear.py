@@ -10,8 +10,8 @@ import numpy as np
 
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import Connection, System
@@ -200,7 +200,7 @@ def error(folder: Path, model: Model, experiment: Experiment, says: str = "depen
     """The largest error of the outputs of a model, relative to their amplitudes."""
     fmus = {name: linear(folder, says) for name in model.parts}
     table = Table()
-    simulate(planned(system_of(fmus, model.parts, model.wires), experiment), [table])
+    simulate_plan(make_plan(system_of(fmus, model.parts, model.wires), experiment), [table])
     assert table.failure is None
     right = exact(model.parts, model.wires, np.asarray(table.time))
     return max(

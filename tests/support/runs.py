@@ -11,12 +11,12 @@ import numpy as np
 from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
-from orchestrator.runs.loading import loaded
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
@@ -48,8 +48,8 @@ def run_table(
 ) -> Table:
     """All rows of a run, however it ends."""
     table = Table()
-    how = chosen(loop, experiment, isolation)
-    simulate(planned(system, experiment), [table], isolation, how, hooks)
+    how = choose_loop(loop, experiment, isolation)
+    simulate_plan(make_plan(system, experiment), [table], isolation, how, hooks)
     return table
 
 
@@ -78,7 +78,7 @@ def system_of(fmus: Path, scenario: str) -> System:
 
 def prepared(name: str | Path, kind: str = "native", request: Request | None = None) -> Prepared:
     """A scenario, ready to be run."""
-    return prepare(*loaded(str(name), kind), request or Request(kind=kind))
+    return prepare(*load_scenario(str(name), kind), request or Request(kind=kind))
 
 
 def write(table: Table, path: Path) -> None:

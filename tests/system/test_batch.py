@@ -20,7 +20,7 @@ from auv_fmu.closed_loop import closed_loop as straight_line
 from auv_fmu.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
-from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies import batch_engine
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine, Point
@@ -54,7 +54,7 @@ def engines(*names: str) -> tuple[BatchEngine, FmuEngine]:
 def sampled(name: str) -> list[Point]:
     """Some runs of a ready study, cut short, every second one in the other order."""
     study = read_study(name)
-    space = Space(study, {scenario: loaded(scenario, KIND) for scenario in study.scenario})
+    space = Space(study, {scenario: load_scenario(scenario, KIND) for scenario in study.scenario})
     numbers = Random(name).sample(range(len(space)), SAMPLES)
     return [
         space[number]._replace(stop_time=STEPS * space[number].step, order=ORDERS[i % 2])
@@ -277,13 +277,13 @@ def test_another_process_finds_the_kernel_compiled():
     """It loads in a fraction of a second what has taken several to compile."""
     text = (
         "from auv_fmu.output_feedback import Gains\n"
-        "from orchestrator.studies.batch.compilation import compiled\n"
+        "from orchestrator.studies.batch.compilation import compile_run\n"
         "from orchestrator.studies.batch_engine import BatchEngine\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
         "engine = pickle.load(sys.stdin.buffer)\n"
         "list(engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
-        "stats = compiled(Gains).stats\n"
+        "stats = compile_run(Gains).stats\n"
         "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
     )
     batch, _ = engines("fig4")

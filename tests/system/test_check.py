@@ -13,7 +13,7 @@ from orchestrator.commands.main import main
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate
@@ -211,7 +211,7 @@ def test_another_vehicle_is_named_by_a_call_from_python(workplace):
 
 @pytest.mark.parametrize("name", names())
 def test_nothing_is_open_in_a_ready_scenario(name):
-    prepared = prepare(*loaded(name), Request(strict=True))
+    prepared = prepare(*load_scenario(name), Request(strict=True))
     assert prepared.doubts() == []
 
 

@@ -15,7 +15,7 @@ from orchestrator.commands.main import main
 from orchestrator.machine.cache import users_folder
 from orchestrator.machine.ledger import LEDGER
 from orchestrator.runs import bundle
-from orchestrator.runs.scenario import FOLDER as SCENARIOS
+from orchestrator.runs.scenario import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.scenario import names, read_scenario
 from support.texts import mentions, tells
 from support.tiers import slow

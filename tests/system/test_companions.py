@@ -11,7 +11,7 @@ import pytest
 from orchestrator.commands.main import main
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
@@ -28,7 +28,7 @@ def pair_of(text):
     """The two systems, from the text of a scenario."""
     Path("mine.toml").write_text(text)
     request = Request(kind="native")
-    return with_companion(prepare(*loaded("mine.toml", "native"), request), request)
+    return with_companion(prepare(*load_scenario("mine.toml", "native"), request), request)
 
 
 def runs_of(text, stop_time=1.0):
@@ -96,9 +96,9 @@ def test_where_the_controller_is_the_same_another_component_is_compared(workplac
 
 @pytest.mark.parametrize("name", names())
 def test_the_pairs_of_the_ready_scenarios_are_what_their_files_say(name):
-    prepared = prepare(*loaded(name), Request())
+    prepared = prepare(*load_scenario(name), Request())
     for companion in with_companion(prepared, Request())[1:]:
-        _, system = loaded(companion.scenario.name)
+        _, system = load_scenario(companion.scenario.name)
         assert companion.system.components.keys() == system.components.keys()
         for component, theirs in system.components.items():
             assert companion.system.components[component].digest == theirs.digest

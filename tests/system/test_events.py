@@ -6,6 +6,7 @@ import csv
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
@@ -174,6 +175,36 @@ def test_water_that_moves_is_added_to_the_current(tmp_path, way):
             np.testing.assert_array_equal(fed[name], set_[name], name)
 
 
+@pytest.mark.parametrize("between", ["hold", "linear"])
+@pytest.mark.parametrize("way", WAYS, ids=str)
+def test_an_override_hides_a_table_of_inputs_until_it_ends(tmp_path, way, between):
+    """The table changes meanwhile; the value of the table at its end is not the one before."""
+    file, scenario = tmp_path / "water.csv", tmp_path / "tide.toml"
+    file.write_text("time,plant.water.x\n0.0,0.1\n0.5,0.2\n1.0,0.4\n")
+    scenario.write_text(
+        'only = ["plant"]\nstop_time = 1.0\n[inputs]\nfile = "water.csv"\n'
+        f'between = "{between}"\n[[events]]\nat = 0.2\nfor = 0.4\n'
+        'override = { "plant.water.x" = -1.0 }\n'
+    )
+    table = simulate(scenario, **way)
+    # A row holds the inputs of the step that ends there.
+    begins = table.time[1:] - 0.02
+    at = {
+        "hold": lambda t: 0.1 if t < 0.499 else 0.2,
+        "linear": partial(np.interp, xp=[0.0, 0.5, 1.0], fp=[0.1, 0.2, 0.4]),
+    }[between]
+    expected = [-1.0 if 0.199 < t < 0.599 else at(t) for t in begins]
+    np.testing.assert_allclose(table["plant.water.x"][1:], expected, atol=1e-12)
+
+
+def test_an_input_that_follows_a_table_is_not_set(tmp_path):
+    file = tmp_path / "water.csv"
+    file.write_text("time,plant.water.x\n0.0,0.25\n")
+    events = [{"at": 0.5, "set": {"plant.water.x": 1.0}}]
+    with pytest.raises(ValueError, match=r"event 1: plant\.water\.x .* override"):
+        simulate("fig4", stop_time=1.0, inputs=file, events=events)
+
+
 def test_water_that_swells_drags_along_a_vehicle_that_nothing_drives(tmp_path):
     """m dv/dt = d (c(t) - v) for c(t) = a t: v = a (t - T (1 - exp(-t / T))) with T = m / d."""
     file, a, T = tmp_path / "swell.csv", 0.04, 25.0 / 30.0
@@ -266,7 +297,9 @@ def test_what_is_said_of_the_scenarios_is_so(name):
     scenario = read_scenario(name)
     [event] = scenario.events
     begin, end = event["at"], event["at"] + event.get("for", 0.0)
-    own = prepare(scenario, loaded(name, "native")[1], Request(kind="native", loop="compiled"))
+    own = prepare(
+        scenario, load_scenario(name, "native")[1], Request(kind="native", loop="compiled")
+    )
     for prepared in with_companion(own, Request(kind="native", loop="compiled")):
         table = Table()
         prepared.run([table])

@@ -59,6 +59,22 @@ def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str)
     check(system, host, 300)
 
 
+@pytest.mark.parametrize(
+    "host", ["c-program", *slow(*(name for name in HOSTS if name not in ("c-program", "ecos")))]
+)
+def test_a_start_time_reaches_the_host(dist: Path, host: str):
+    """The disturbance (56) is a function of the time."""
+    if host == "c-program" and machines_compiler() is None:
+        pytest.skip("there is no C compiler")
+    check(replace(closed_loop(dist), start_time=10.0), host, 300)
+
+
+@pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")
+def test_ecos_refuses_a_start_time(dist: Path):
+    [verdict] = compare(replace(closed_loop(dist), start_time=10.0), ["ecos"], 3, 0.02)
+    assert "from 10 s" in str(verdict.failure)
+
+
 def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkeypatch):
     monkeypatch.setitem(
         HOSTS, "ghost", HOSTS["ecos"].__class__("no-such-package", HOSTS["ecos"].run)

@@ -22,11 +22,11 @@ from orchestrator.formats.tables import read_rows
 from orchestrator.machine.errors import InputError, StartError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.structure import System
@@ -219,7 +219,9 @@ def test_nothing_hangs_where_the_supervisor_is_killed(c_fmu: Path, mark: str):
                     os.kill(int(process.name), signal.SIGKILL)
 
     table = Kills()
-    simulate(planned(foreign_system(c_fmu), Experiment(50.0, STEP)), [table], Isolation(20.0))
+    simulate_plan(
+        make_plan(foreign_system(c_fmu), Experiment(50.0, STEP)), [table], Isolation(20.0)
+    )
     assert table.failure is not None
     assert "SIGKILL" in table.failure
     assert left_over(mark) == []
@@ -251,13 +253,15 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
             go_on.wait()
 
     table = Waits()
-    plan = planned(foreign_system(c_fmu, "SILENT_ERROR"), SHORT)
+    plan = make_plan(foreign_system(c_fmu, "SILENT_ERROR"), SHORT)
     talkative = foreign_system(c_fmu, "LOGS", at=0.0)
-    steps = chosen(loop, plan.experiment)
-    thread = threading.Thread(target=simulate, args=(plan, [table], None, steps))
+    steps = choose_loop(loop, plan.experiment)
+    thread = threading.Thread(target=simulate_plan, args=(plan, [table], None, steps))
     thread.start()
     assert begun.wait(60.0)
-    assert len(simulate(planned(talkative, Experiment(STEP, STEP)), loop=steps).messages) == 101
+    assert (
+        len(simulate_plan(make_plan(talkative, Experiment(STEP, STEP)), loop=steps).messages) == 101
+    )
     gc.collect()
     go_on.set()
     thread.join()

@@ -22,10 +22,10 @@ from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Alter, Event, Events
 from orchestrator.master.hooks.hook import NEVER, Run
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName, port_name
@@ -247,7 +247,7 @@ def test_observers_of_slow_steps_are_told_meanwhile(folder, loop):
 
     table, experiment = Counts(), Experiment(10.0, H)
     system = pair(folder, "BEHAVE", milliseconds=40)
-    simulate(planned(system, experiment), [table], None, chosen(loop, experiment))
+    simulate_plan(make_plan(system, experiment), [table], None, choose_loop(loop, experiment))
     assert len(table) == 21
     assert max(told) <= 8
 
@@ -262,7 +262,9 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
 
     whole, full = Table(), Full()
     system, experiment = pair(folder, "BEHAVE"), Experiment(1000.0, H)
-    ending = simulate(planned(system, experiment), [full, whole], None, chosen(loop, experiment))
+    ending = simulate_plan(
+        make_plan(system, experiment), [full, whole], None, choose_loop(loop, experiment)
+    )
     assert ending.failure is not None
     assert ending.failure == (
         f"stopped at t = {whole.time[-1]:g} s: [Errno 28] No space left on device"

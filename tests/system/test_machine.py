@@ -22,7 +22,7 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
 from orchestrator.formats.tables import read_rows
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import record
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.record import read_result
@@ -335,7 +335,7 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
     assert process.returncode == 2
     [left] = Path("moved").glob(".auv-fmu-*")
     assert line == (
-        "auv-fmu: results/fig4 was moved or deleted while it was written, and what was computed "
+        "auv-fmu: results/fig4 was moved or deleted while it was written, and the results "
         f"went with it, in {left.name}"
     )
     assert rows(left)[0, 0] == 0.0
@@ -344,7 +344,7 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
 @pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["build"], ["report"]])
 def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, capsys, command):
     (workplace / "r").mkdir()
-    with claimed(workplace / "r"):
+    with hold_lock(workplace / "r"):
         assert main([*command, "--out", "r"]) == 2
     assert "into r;" in capsys.readouterr().err
     assert contents(workplace) == {}

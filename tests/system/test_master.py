@@ -20,13 +20,13 @@ from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import unpacked
+from orchestrator.machine.user_files import unpack
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import check_place
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned, stages
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan, stages
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
@@ -126,7 +126,7 @@ class Impatient(Table):
 def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, loop: str):
     """In a run that would take minutes."""
     result, experiment = Impatient(), Experiment(1e4, 0.02)
-    simulate(planned(system, experiment), [result], loop=chosen(loop, experiment))
+    simulate_plan(make_plan(system, experiment), [result], loop=choose_loop(loop, experiment))
     assert result.failure is not None
     assert "interrupted at t =" in result.failure
     assert 1 < len(result) < 500_000
@@ -203,7 +203,7 @@ def test_a_temporary_folder_of_any_name_is_left_empty(dist: Path, tmp_path: Path
 
 
 def test_temporary_folder_that_would_crash_a_plain_fmu_is_refused(dist: Path, tmp_path: Path):
-    plain, system = unpacked(dist / "AuvPlant.fmu").folder, tmp_path / "a+b"
+    plain, system = unpack(dist / "AuvPlant.fmu").folder, tmp_path / "a+b"
     shutil.copytree(plain, system)
     check_place(system)
     for library in system.glob("binaries/*/*_pythonfmu.*"):

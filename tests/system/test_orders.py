@@ -16,14 +16,14 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment, decimations
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import delays, planned, stages
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import delays, make_plan, stages
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.graph import delayed
+from orchestrator.system.graph import delayed_connections
 from orchestrator.system.structure import System
 from support.relay import relay, system_of
 from support.runs import whole as run
@@ -51,7 +51,7 @@ def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: objec
 @pytest.mark.parametrize("declares", [True, False])
 def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder, declares):
     system, table = ring(folder, declares), Table()
-    ending = simulate(planned(system, Experiment(3 * H, H, coupling="delay")), [table])
+    ending = simulate_plan(make_plan(system, Experiment(3 * H, H, coupling="delay")), [table])
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
     assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
@@ -97,7 +97,7 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     else:
         order = ("disturbance", "planner", *order)
     table = run(system, replace(experiment, order=order))
-    same = delayed(system, order) == []
+    same = delayed_connections(system, order) == []
     assert same == (order[-1] == "plant")
     assert (table.rows.tobytes() == derived.rows.tobytes()) == same
 
@@ -171,7 +171,7 @@ def test_a_scenario_may_state_order_and_steps(workplace):
 
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_no_step_is_logged(folder, isolation):
-    ending = simulate(
-        planned(system_of({"a": relay(folder)}), Experiment(10 * H, H)), (), isolation
+    ending = simulate_plan(
+        make_plan(system_of({"a": relay(folder)}), Experiment(10 * H, H)), (), isolation
     )
     assert ending.messages == ("a: initialises",)

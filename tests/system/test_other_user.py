@@ -14,10 +14,10 @@ from uuid import uuid4
 
 import pytest
 
-from orchestrator.machine.cache import keep, kept
+from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.machine.disk import process_folder
 from orchestrator.master import stepper
-from orchestrator.studies.sweep import making
+from orchestrator.studies.sweep import making_runs
 from support.machine import called
 from support.texts import mentions
 from support.toy_engine import Toy, outcome, run
@@ -92,8 +92,8 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "planted.so", source], check=True)
     forged = Path(mkdtemp())
     monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
-    keep("loop", stepper._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
-    keep("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
+    write_cached("loop", stepper._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
+    write_cached("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
     monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
     for path in (forged, *forged.rglob("*")):
         path.chmod(0o777)
@@ -122,30 +122,30 @@ def test_what_another_user_has_put_into_the_cache_is_not_run(
     assert mentions(line, f"auv-fmu: warning: {open_folder / 'auv-fmu'}")
     assert not planted.exists()
     with pytest.warns(UserWarning, match="only you can write"):
-        assert not kept("batch", "0")
+        assert not read_cached("batch", "0")
 
 
 def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, open_folder):
     subprocess.run(["chmod", "-R", "go-w", open_folder / "auv-fmu"], check=True)
     for folder in (open_folder / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)
-    assert stepper.kept() is None
-    assert not kept("batch", "0")
-    assert stepper.made().advance
+    assert stepper.load_stepper() is None
+    assert not read_cached("batch", "0")
+    assert stepper.compile_stepper().advance
     assert not planted.exists()
 
 
 def test_a_folder_cannot_be_made_before_us(open_folder, other):
     assert done_by(other, lambda: (open_folder / "auv-fmu").mkdir(0o755))
     with pytest.warns(UserWarning, match="only you can write"):
-        [path] = keep("loop", "0", {"a": b""})
+        [path] = write_cached("loop", "0", {"a": b""})
     assert path.is_relative_to(process_folder())
 
 
 def test_a_sweep_cannot_be_reached(other):
     psutil = pytest.importorskip("psutil", reason="needs the extra `studies`")
     runs = [run(number) for number in range(400)]
-    with making(Toy(0.001), iter(runs), workers=2) as blocks:
+    with making_runs(Toy(0.001), iter(runs), workers=2) as blocks:
         made = list(next(blocks))
         this = psutil.Process()
         processes = [this, *this.children(recursive=True)]

@@ -52,5 +52,5 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
 
 
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):
-    bundle.build(tmp_path / "elsewhere")
+    bundle.build_bundle(tmp_path / "elsewhere")
     assert contents(tmp_path / "elsewhere") == contents(dist)

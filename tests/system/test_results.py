@@ -19,9 +19,9 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import unpacked
+from orchestrator.machine.user_files import unpack
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.plan import planned
+from orchestrator.master.plan import make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Scenario
@@ -132,28 +132,28 @@ def test_record_names_the_fmu_that_ran(workplace: Path, change: Callable[[Path],
 def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
     """Also where it has the name, the place, the size and the time of the one before."""
     fmu = build(workplace)
-    folder, digest = unpacked(fmu)
-    assert unpacked(fmu) == (folder, digest)
+    folder, digest = unpack(fmu)
+    assert unpack(fmu) == (folder, digest)
     with_another_content(fmu)
-    again = unpacked(fmu)
+    again = unpack(fmu)
     assert again.digest == hashlib.sha256(fmu.read_bytes()).hexdigest() != digest
     assert b"Theirs" in (again.folder / "modelDescription.xml").read_bytes()
     copy = workplace / "copy.fmu"
     copy.write_bytes(fmu.read_bytes())
-    assert unpacked(copy) == again
+    assert unpack(copy) == again
 
 
 def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
     fmu = build(workplace)
     experiment = Experiment(0.2, 0.1)
-    prepared = Prepared(Scenario("s"), planned(system_of(fmu), experiment))
+    prepared = Prepared(Scenario("s"), make_plan(system_of(fmu), experiment))
     engine, run = FmuEngine({"s": prepared}), Point(0, "s", {}, 0.2, 0.1)
     assert list(pickle.loads(pickle.dumps(engine)).outcomes([run])) == list(engine.outcomes([run]))
     replace_by_another(fmu)
     with pytest.raises(InputError, match=r"plain\.fmu"):
         pickle.dumps(engine)
     assert (
-        Prepared(Scenario("s"), planned(system_of(fmu), experiment)).identity != prepared.identity
+        Prepared(Scenario("s"), make_plan(system_of(fmu), experiment)).identity != prepared.identity
     )
 
 

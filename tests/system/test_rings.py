@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import permutations
+from math import isfinite, sin
 
 import numpy as np
 import pytest
@@ -14,10 +15,11 @@ from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Run
+from orchestrator.master.observers import observer
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
-from orchestrator.master.stepper import made
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
+from orchestrator.master.stepper import compile_stepper
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
@@ -66,7 +68,7 @@ def test_the_order_of_elements_does_not_matter(folder, names):
 @pytest.mark.parametrize("coupling", ["solve", "linear"])
 def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
     system, experiment = ring(folder, 0.5, 0.9), Experiment(2.0, H, coupling=coupling)
-    made()
+    compile_stepper()
     table, *others = (
         run(system, experiment),
         run(system, experiment, loop="compiled"),
@@ -120,7 +122,7 @@ def test_of_two_solved_rings_neither_is_the_first(folder, names):
 
 def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_so(folder):
     system, table = ring(folder, 0.5, 0.9, cached=True, can=False), Table()
-    ending = simulate(planned(system, Experiment(2.0, H)), [table])
+    ending = simulate_plan(make_plan(system, Experiment(2.0, H)), [table])
     [message] = ending.messages
     assert mentions(message, "a b.y1 late: ring; Real")
     a = b = 0.0
@@ -129,14 +131,26 @@ def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_s
         b = 0.9 * a
         assert table["a.y1"][k] == pytest.approx(a, abs=1e-13)
     with pytest.raises(InputError, match=r"solve: a .*b\.y1"):
-        simulate(planned(system, Experiment(2.0, H, coupling="solve")))
+        simulate_plan(make_plan(system, Experiment(2.0, H, coupling="solve")))
 
 
 @pytest.mark.parametrize("k", [-2.0, 1.5, 6.0])
 @pytest.mark.parametrize("stop", [20.0, 200.0])
-def test_a_delayed_ring_that_grows_without_bound_ends_the_run(folder, k, stop):
-    ending = simulate(planned(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay")))
-    assert "bound" in str(ending.failure)
+@pytest.mark.parametrize("patience", [0.0, 0.2])
+def test_a_delayed_ring_that_grows_without_bound_ends_the_run(
+    folder, k, stop, patience, monkeypatch
+):
+    """At the same step however fast the machine is: after 512, or before a value overflows."""
+    monkeypatch.setattr(observer, "_PATIENCE", patience)
+    table = Table()
+    ending = simulate_plan(
+        make_plan(ring(folder, k, 1.0), Experiment(stop, H, coupling="delay")), [table]
+    )
+    assert str(ending.failure).count("grows without bound") == 1
+    steps = value = 0
+    while isfinite(value := k * value + sin(H * steps)) and steps < min(512, stop / H):
+        steps += 1
+    assert len(table.rows) == 1 + steps
 
 
 @pytest.mark.parametrize("growth", [0.0, 0.3, -0.3])
@@ -144,7 +158,7 @@ def test_what_grows_as_it_should_is_let_grow(folder, growth):
     """A ramp, and exponentials of time, on a ring that is delayed."""
     parts = gains(0.5, 0.9) | {"s": Part(A=[[growth, 1.0], [0.0, growth]], C=np.eye(2), x=[0, 1])}
     system = system_of({name: linear(folder) for name in "sab"}, parts, WIRES)
-    assert simulate(planned(system, Experiment(40.0, H, coupling="delay"))).failure is None
+    assert simulate_plan(make_plan(system, Experiment(40.0, H, coupling="delay"))).failure is None
 
 
 class _Broken:
@@ -161,10 +175,10 @@ def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, couplin
     system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
     whole, again = run(system, experiment), Table()
     kept = Checkpoints(tmp_path, {}, 1.0, resume=False)
-    ending = simulate(planned(system, experiment), [kept], hooks=[kept, _Broken()])
+    ending = simulate_plan(make_plan(system, experiment), [kept], hooks=[kept, _Broken()])
     assert ending.failure == "stopped at t = 2.1 s: broken off"
     kept = Checkpoints(tmp_path, {}, 1.0, resume=True)
-    simulate(planned(system, experiment), [again, kept], hooks=[kept])
+    simulate_plan(make_plan(system, experiment), [again, kept], hooks=[kept])
     assert kept.time == 3.0
     assert again.rows.tobytes() == whole.rows.tobytes()
 
@@ -190,10 +204,10 @@ def test_linear_inputs_are_of_second_order_where_held_ones_are_of_first(
 def test_linear_inputs_are_refused_where_an_fmu_cannot_take_them(folder):
     system = ring(folder, 0.5, 0.9, can=False)
     with pytest.raises(InputError, match=r"linear: a .*canInterpolateInputs"):
-        simulate(planned(system, Experiment(1.0, H, coupling="linear")))
+        simulate_plan(make_plan(system, Experiment(1.0, H, coupling="linear")))
     system = replace(ring(folder, 0.5, 0.9), steps={"b": 2 * H})
     with pytest.raises(InputError, match="linear: b: "):
-        simulate(planned(system, Experiment(1.0, H, coupling="linear")))
+        simulate_plan(make_plan(system, Experiment(1.0, H, coupling="linear")))
     with pytest.raises(InputError, match="order"):
         Experiment(1.0, H, ("a", "b", "s"), coupling="linear")
     with pytest.raises(InputError, match=r"'strong': .*solve, delay, linear"):

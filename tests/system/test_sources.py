@@ -142,7 +142,7 @@ def test_sources_that_cannot_be_compiled_are_said_in_one_line(tmp_path, files, l
 
 
 def test_without_a_compiler_it_is_said_what_to_install(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(binary, "compiler", lambda: None)
+    monkeypatch.setattr(binary, "find_compiler", lambda: None)
     fmu = with_sources(tmp_path, *WAYS["all"])
     for command in ("run", "check"):
         arguments = ["--stop-time", "1", "--out", str(tmp_path / "o")] if command == "run" else []

@@ -13,7 +13,7 @@ import pytest
 
 from orchestrator import sweep
 from orchestrator.commands.main import main
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine
@@ -53,7 +53,7 @@ def files(folder: Path) -> dict[str, int]:
 def straight(path: Path) -> list[Any]:
     """The outcomes of all runs, made one after the other in this process."""
     study = read_study(str(path))
-    space = Space(study, {name: loaded(name, "native") for name in study.scenario})
+    space = Space(study, {name: load_scenario(name, "native") for name in study.scenario})
     engine = FmuEngine(space.prepared)
     return list(engine.outcomes([space[i] for i in range(len(space))]))
 
@@ -81,7 +81,7 @@ def test_option_that_makes_many_runs_sooner_is_named(scenario, kind, n, option, 
     """Events are what the batch engine does not know."""
     monkeypatch.setattr("orchestrator.studies.sweep.machines_compiler", lambda: "cc")
     runs = {"scenario": scenario, "vary": {"plant.eta0.y": {"from": 0, "to": 1, "n": n}}}
-    space = Space(study_of("many", runs), {scenario: loaded(scenario, kind)})
+    space = Space(study_of("many", runs), {scenario: load_scenario(scenario, kind)})
     said = faster(space, FmuEngine(space.prepared), Means(kind=kind))
     assert mentions(said, f"{n:,} {kind} {option}") if option else said == ""
     assert faster(space, BatchEngine({}), Means(kind=kind)) == ""
@@ -150,7 +150,7 @@ CHANGES = {
     'stop_time = 1.0\n[components]\ncontroller = "PdController"\n[wires]\n'
     '"controller.dy" = "plant.dy"': ("the FMU of controller, what feeds controller.dy.x", ""),
     "stop_time = 1.0\n[steps]\ncontroller = 0.2": (
-        "the step of controller", "its controller has a step of its own",
+        "the step of controller", "its controller has a longer step",
     ),
     'stop_time = 1.0\norder = ["plant", "disturbance", "planner", "controller"]': (
         "order", "has order = ",

@@ -14,7 +14,7 @@ from orchestrator.paper import printed_table
 from orchestrator.paper.choices import OF_RUNS, OF_RUNS_OF_FIVE, PD, PROPOSED, PUBLISHED, Choice
 from orchestrator.paper.measures import approach_of
 from orchestrator.paper.printed_table import NUMBERS
-from orchestrator.paper.variants import FARTHEST, all_variants
+from orchestrator.paper.variants import FARTHEST_START, all_variants
 from support.runs import InThisProcess
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
@@ -94,7 +94,7 @@ def test_five_degrees_of_freedom_are_medians_over_starts_with_a_band(found):
     for scenario in (PROPOSED, PD):
         sixes = []
         for number in SHOWN:
-            away = np.random.default_rng(number).uniform(-FARTHEST, FARTHEST, 3)
+            away = np.random.default_rng(number).uniform(-FARTHEST_START, FARTHEST_START, 3)
             start = dict(zip("xyz", np.add((2.0, 6.0, 0.0), away).tolist(), strict=True))
             parameters = {"plant.roll": False, **{f"plant.eta0.{k}": x for k, x in start.items()}}
             if scenario == PROPOSED:

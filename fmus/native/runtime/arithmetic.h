@@ -7,7 +7,7 @@
 #ifndef ARITHMETIC_H
 #define ARITHMETIC_H
 
-/* Each operation is rounded by itself, as Python does it, whatever flags an importer compiles with. */
+/* Each operation is rounded separately, as in Python, whatever flags an importer compiles with. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && defined(__FP_FAST_FMA)
@@ -20,7 +20,7 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-/* Bytes of what is said of an error. */
+/* Bytes of the text of an error. */
 enum { WHY = 512 };
 
 typedef struct {

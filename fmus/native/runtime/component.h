@@ -7,7 +7,7 @@
  *     if (GOES_ON(this, NULL)) terminate(&this);
  *     return end(&this);
  *
- * docs/status.md says what is answered to what.
+ * docs/status.md says how each call is answered.
  */
 #ifndef COMPONENT_H
 #define COMPONENT_H
@@ -47,7 +47,7 @@ static const names version;
 static void *instantiate(string function, string wrong, string name, string token, logger host,
                          int logging);
 
-/* Frees an instance and its states; what is no live instance it leaves alone. */
+/* Frees an instance and its states; ignores anything that is not a live instance. */
 static void free_instance(void *handle, string function);
 
 /* The frame of every other call */
@@ -58,7 +58,7 @@ typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
 /* Waits until no other thread is in a call of the instance. */
 static call begin(void *handle, string function, when when);
 
-/* Whether a call goes on: only then it is looked at what is wrong with its arguments. */
+/* Whether a call goes on: only then are its arguments checked. */
 #define GOES_ON(call, wrong) ((call).status == FMI_OK && sound(&(call), wrong))
 
 /* What is wrong, unless it is NULL, is told, and leads to FMI's error state. */
@@ -67,7 +67,7 @@ static int sound(call *this, string wrong);
 /* Lets the next call of the instance begin; the status of this one. */
 static int end(call *this);
 
-/* Messages: what is refused is told even where logging is off; no categories: all. */
+/* Messages: refusals are logged even if logging is off; no categories: all. */
 static void choose_messages(call *this, int logging, size_t n, const string categories[]);
 static void tell(instance *it, int status, string text);
 

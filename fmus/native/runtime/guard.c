@@ -90,7 +90,7 @@ static int can_be_made(string wrong, string name, string token, message *why) {
     } else if (token != NULL && !is_utf8(token)) {
         compose(why, "the %s is not UTF-8", version.token);
     } else if (token != NULL && token[0] != '\0' && !same_token(token, MODEL_GUID)) {
-        compose(why, "%s %s is not that of this FMU, %s", version.token, token, MODEL_GUID);
+        compose(why, "%s %s is not the one of this FMU, %s", version.token, token, MODEL_GUID);
     } else {
         return 1;
     }

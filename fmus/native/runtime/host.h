@@ -1,4 +1,4 @@
-/* What a host hands over, and what it is told: the same for components in C and for the loader of
+/* What a host passes in, and what it is told: the same for components in C and for the loader of
  * those in Python.
  *
  * utf8.c       which bytes are text

@@ -51,7 +51,7 @@ static uint64_t hash(string text) {
     return sum;
 }
 
-/* Logs a message, the first time only that its key, or else its text, comes up. */
+/* Logs a message only the first time that its key, or else its text, occurs. */
 static void say(instance *it, message *said, int status, string key) {
     uint64_t sum = hash(key != NULL ? key : said->text);
     for (size_t i = 0; i < it->n_said; i++) {

@@ -50,7 +50,7 @@ static int accept(instance *it, const Error *error, message *why) {
     double draws[AT_LEAST_ONE(MODEL_DRAWS)];
     if (error->raised) return compose(why, "%s", error->why);
     if (!bounded(&next->state)) {
-        return compose(why, "the state is not finite, or beyond %g", LARGEST_STATE);
+        return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
     }
     for (int i = 0; i < MODEL_OUTPUTS; i++) {
         if (!isfinite(next->outputs.values[i])) {

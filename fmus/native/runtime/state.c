@@ -24,7 +24,7 @@ static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
 
-/* Difference of what was computed from the same numbers on two machines. */
+/* How far results from the same numbers may differ between two machines. */
 static const double NEAR = 1e-9;
 
 enum { CHECKSUM_SIZE = 4 };
@@ -186,7 +186,7 @@ static int take_this(reader *from, string text) {
     return take_text(from, found) && strcmp(found, text) == 0;
 }
 
-/* What is saved in the place of a truth value, which is -1 if it is none. */
+/* A saved truth value; -1 if it is neither. */
 static int take_truth(reader *from) {
     uint32_t word = take_word(from);
     return word <= 1 ? (int)word : -1;
@@ -206,7 +206,7 @@ static int take_parameter(reader *from, parameter_values *values, const port *po
         return compose(why, "%s: must be a Boolean", port->name);
     }
     if (port->kind == STRING && text_of(port, number) == NULL) {
-        return compose(why, "%s: is none of the choices", port->name);
+        return compose(why, "%s: is not one of the choices", port->name);
     }
     if (port->kind != STRING && !in_range(port, number, why)) return 0;
     put_parameter(values, port, number);
@@ -219,7 +219,7 @@ static int take_noise(reader *from, generator *noise, message *why) {
     noise->has_next = take_truth(from);
     noise->next = take_real(from);
     if (noise->place > GENERATOR_WORDS || noise->has_next < 0) {
-        return compose(why, "its noise generator is in no state that it can be in");
+        return compose(why, "its noise generator is in an impossible state");
     }
     return isfinite(noise->next) || compose(why, "its noise is not finite");
 }
@@ -231,11 +231,11 @@ static int are_zero(const double values[], size_t n) {
     return 1;
 }
 
-/* A run that was saved, as far as a look at each of its parts can tell what is wrong with it. */
+/* A saved run, checked part by part. */
 static int take_run(reader *from, run *it, message *why) {
     moment *now = &it->moments[it->now];
     uint32_t number = take_word(from);
-    if (number > TERMINATED) return compose(why, "no mode is %u", number);
+    if (number > TERMINATED) return compose(why, "%u is not a mode", number);
     it->mode = (mode)number;
     it->start_time = take_real(from);
     it->time = take_real(from);
@@ -243,7 +243,7 @@ static int take_run(reader *from, run *it, message *why) {
         return compose(why, "a value is not finite");
     }
     if (it->mode < STEPPING && it->time != it->start_time) {
-        return compose(why, "it has another time than that of its start");
+        return compose(why, "its time is not its start time");
     }
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER &&
@@ -275,7 +275,7 @@ static int take_run(reader *from, run *it, message *why) {
     it->fault = take_truth(from);
     if (it->fault < 0) return compose(why, "its fault is neither true nor false");
     return (!from->short_of && from->left == 0 && it->begun >= 0) ||
-           compose(why, "it has other parts");
+           compose(why, "it has missing or unknown parts");
 }
 
 static int nearly_equal(const double one[], const double other[], size_t n) {
@@ -294,12 +294,12 @@ static int can_be_reached(run *it, message *why) {
     output_values expected;
     Error error = {0};
     model_check(parameters, &error);
-    if (!error.raised && !bounded(&now->state)) return compose(why, "beyond %g", LARGEST_STATE);
+    if (!error.raised && !bounded(&now->state)) return compose(why, "it exceeds %g", LARGEST_STATE);
     model_derive(parameters, &now->state.groups, &error);
     model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
     if (error.raised) return compose(why, "%s", error.why);
     if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
-        return compose(why, "its outputs are not those of its state");
+        return compose(why, "its outputs do not belong to its state");
     }
     return 1;
 }
@@ -314,8 +314,8 @@ static size_t largest_size(void) {
 
 static int can_be_restored(const saved *state, run *it, message *why) {
     reader from = {.bytes = state->bytes, .left = content_size(state)};
-    if (!take_this(&from, MAGIC)) return compose(why, "the bytes are not those of a state");
-    if (state->size > largest_size()) return compose(why, "it has other parts");
+    if (!take_this(&from, MAGIC)) return compose(why, "the bytes are not a state");
+    if (state->size > largest_size()) return compose(why, "it has missing or unknown parts");
     if (state->sealed && !has_its_checksum(state)) {
         return compose(why, "the bytes were changed since they were written");
     }
@@ -356,7 +356,7 @@ static int has_place(call *this, void **state, entry **before) {
     return *state == NULL || (*before = held_state(this, *state)) != NULL;
 }
 
-/* Hands a state over to the host, in the place of one that it has had. */
+/* Hands a state over to the host, replacing one that it already had. */
 static void hand_over(call *this, saved *made, void **state, entry *before) {
     if (before != NULL && made != NULL) {
         free(before->thing);
@@ -434,7 +434,7 @@ static void serialise_state(call *this, void *state, unsigned char bytes[], size
         memcpy(bytes, it->bytes, size);
     }
     let_go(held);
-    sound(this, fits ? NULL : "the size is not that of the state");
+    sound(this, fits ? NULL : "the state has another size");
 }
 
 static void deserialise_state(call *this, const unsigned char bytes[], size_t size, void **state) {

@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0: what is sound goes on to PythonFMU. */
+/* The functions of FMI 2.0: valid calls are forwarded to PythonFMU. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <stdlib.h>
@@ -21,7 +21,7 @@
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
 
-/* What PythonFMU answers to a function of its own. */
+/* What PythonFMU answers to one of its functions. */
 #define TO_PYTHONFMU(call, name, parameters, arguments)                                          \
     do {                                                                                         \
         static int(*forward) parameters;                                                         \
@@ -124,7 +124,7 @@ EXPORT void fmi2FreeInstance(component c) {
     call this = begin(c, "fmi2FreeInstance", ALWAYS);
     void *state;
     if (this.instance == NULL) return;
-    /* What is lost may have been freed by PythonFMU in part: it is left alone. */
+    /* PythonFMU may have freed parts of a lost instance: it is not touched. */
     int sound = this.instance->condition != LOST;
     while ((state = state_of(c)) != NULL) {
         void *object = thing_of(state, STATE);
@@ -197,7 +197,7 @@ static string wrong_place(void **state) {
     return state == NULL ? "NULL" : *state == NULL ? NULL : wrong_state(*state);
 }
 
-/* Hands a state that PythonFMU has made over to the host, in the place of one that it has had. */
+/* Hands a state that PythonFMU has made over to the host, replacing one that it already had. */
 static void hand_over(call *this, component owner, void *made, void **state) {
     void *before = thing_of(*state, STATE);
     if (this->status != FMI_OK) return;
@@ -265,7 +265,7 @@ EXPORT int fmi2SerializeFMUstate(component c, void *state, char bytes[], size_t 
         void *object = thing_of(state, STATE);
         py.Py_IncRef(object);
         size_t needed = size_of_state(&this, object);
-        if (GOES_ON(this, size != needed ? "the size is not that of the state" : NULL)) {
+        if (GOES_ON(this, size != needed ? "the state has another size" : NULL)) {
             TO_PYTHONFMU(this, fmi2SerializeFMUstate, (component, void *, char *, size_t),
                          (this.instance->slave, object, bytes, size));
         }

@@ -45,7 +45,7 @@ void release_instance(instance *it) {
     free(it);
 }
 
-/* The instance behind a handle, when no other thread is in a call of it. */
+/* The instance of a handle, once no other thread is in a call of it. */
 static instance *awaited(component handle) {
     instance *it;
     while ((it = thing_of(handle, INSTANCE)) != NULL && it->busy &&

@@ -149,7 +149,7 @@ typedef struct {
 /* Whether a call is let through in FMI's error state. */
 typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
 
-/* Whether a call may be forwarded: only then it is looked at what is wrong with its arguments. */
+/* Whether a call may be forwarded: only then are its arguments checked. */
 #define GOES_ON(call, wrong)                                                                    \
     ((call).instance != NULL && (call).status == FMI_OK && sound(&(call), wrong))
 

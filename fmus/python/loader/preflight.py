@@ -1,7 +1,7 @@
 """Whether PythonFMU can make an instance from a folder of resources.
 
 PythonFMU 0.7 ends the process where the folder lacks the slave. The loader runs this text, which is
-compiled into it, before it forwards fmi2Instantiate. It must need nothing but Python 3.9.
+compiled into it, before it forwards fmi2Instantiate. It must need only Python 3.9.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def _check(resources: str, guid: str) -> None:
     if sound is None or sound.script not in sys.modules or _stamps(sound.files) != sound.stamps:
         sound = _sound[resources] = _examined(resources)
     if guid and guid.strip("{}").lower() != sound.guid.strip("{}").lower():
-        raise ValueError(f"GUID {guid} is not that of this FMU, {sound.guid}")
+        raise ValueError(f"GUID {guid} is not the one of this FMU, {sound.guid}")
 
 
 def _stamps(files: list[str]) -> list[tuple[int, int, int]]:
@@ -79,7 +79,7 @@ def _examined(resources: str) -> _Sound:
     # An import reads what was compiled before, if it is there.
     cached = Path(importlib.util.cache_from_source(str(path)))
     if cached.exists() and not cached.is_file():
-        raise ValueError(f"{cached} is no regular file")
+        raise ValueError(f"{cached} is not a regular file")
     # It tells what is wrong with a text, where an import may find the bytes of an older one.
     compile(text, path, "exec")
     module = _imported(script, resources)
@@ -97,7 +97,7 @@ def _content(path: Path) -> bytes:
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     with os.fdopen(descriptor, "rb") as file:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise ValueError(f"{path} is no regular file")
+            raise ValueError(f"{path} is not a regular file")
         return file.read()
 
 

@@ -1,6 +1,6 @@
 /* Finds Python and starts it, once a process.
  *
- * Each FMU has a loader of its own, and hosts instantiate FMUs from several threads. What all
+ * Each FMU has its own loader, and hosts instantiate FMUs from several threads. What all
  * loaders of a process share is one object: the dynamic linker makes symbols of the type
  * gnu_unique_object the same for all libraries, even the ones loaded only for themselves.
  *

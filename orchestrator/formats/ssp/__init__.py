@@ -5,7 +5,7 @@ the tree of systems (`hierarchy`) to what each connection and parameter set says
 from there to the output that feeds each input and the value of each parameter (`reader`).
 """
 
-#: The file of an archive that says what is in it.
+#: The file of an archive that describes its contents.
 STRUCTURE = "SystemStructure.ssd"
 
 _SSP = "http://ssp-standard.org/SSP1/SystemStructure"

@@ -1,6 +1,6 @@
-"""An SSP archive or its folder while it is read: its files, and what is found wrong with it.
+"""An SSP archive or its folder while it is read: its files, and the flaws found in it.
 
-Files are read leniently, and held against the schemas: what is harmless is a note. fmpy.ssp reads
+Files are read leniently, and checked with the schemas: harmless flaws are notes. fmpy.ssp reads
 a file only if it is valid to the letter, and does not decode the addresses of files.
 """
 
@@ -21,7 +21,7 @@ from lxml import etree
 
 from orchestrator.formats.ssp import NAMESPACES, STRUCTURE
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
-from orchestrator.machine.user_files import check_file, is_folder, unpacked
+from orchestrator.machine.user_files import check_file, is_folder, unpack
 from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.system.values import finite, integer
@@ -53,7 +53,7 @@ def read_document(text: bytes, note: Callable[[str], None]) -> Element:
 
     Args:
         text: the file.
-        note: takes what is not as it should be, and can be understood.
+        note: takes flaws that can still be understood.
 
     Raises:
         ValueError: it is not well-formed, or not without a document type.
@@ -102,7 +102,7 @@ class _Reader:
             self._note(f"the prefix {prefix!r} is not declared")
         elif not self._open and namespace not in NAMESPACES:
             where = f"the namespace {namespace!r}" if namespace else "no namespace"
-            self._note(f"elements are in {where}, which is none of SSP 1.0")
+            self._note(f"elements are in {where}, which does not belong to SSP 1.0")
         self.builder.start(name, plain)
 
     def end(self, tag: str) -> None:
@@ -113,7 +113,7 @@ class _Reader:
 
     def doctype(self, *_: object) -> None:
         """Refuse what could name further files, or unfold into more than memory holds."""
-        raise ValueError("it has a document type, which no file of an SSP has")
+        raise ValueError("it has a document type, which files of an SSP must not have")
 
 
 def _violations(root: str, text: bytes) -> list[str]:
@@ -125,7 +125,7 @@ def _violations(root: str, text: bytes) -> list[str]:
 
     """
     if root not in _SCHEMAS:
-        return [f"<{root}> is no element of SSP"]
+        return [f"<{root}> is not an element of SSP"]
     try:
         _schema(_SCHEMAS[root]).assertValid(etree.fromstring(text))
     except etree.LxmlError as error:
@@ -150,7 +150,7 @@ class Archive:
     """
 
     def __init__(self, path: Path, findings: Findings) -> None:
-        """Unpack what is no folder.
+        """Unpack anything but a folder.
 
         Raises:
             InputError: it cannot be unpacked.
@@ -160,7 +160,7 @@ class Archive:
         is_whole = is_folder(path)
         self._is_packed = not is_whole and path.suffix not in _LOOSE
         if self._is_packed:
-            self.folder = unpacked(path).folder
+            self.folder = unpack(path).folder
         else:
             self.folder = path.resolve() if is_whole else path.resolve().parent
 
@@ -231,21 +231,25 @@ class Archive:
         """
         base = self.folder if base is None else base
         if "://" in source:
-            self.problem(f"{needer}: {source!r} is elsewhere; a file in the archive is supported")
+            self.problem(
+                f"{needer}: {source!r} is elsewhere; only files in the archive are supported"
+            )
             return None
         try:
             decoded = unquote(urlsplit(source).path)
         except ValueError:
-            self.problem(f"{needer}: {source!r} is no URI")
+            self.problem(f"{needer}: {source!r} is not a URI")
             return None
         for name in dict.fromkeys((decoded, source, source.replace("\\", "/"))):
             path = Path(os.path.normpath(base / name))
             if self._is_packed and not path.is_relative_to(base):
-                self.problem(f"{needer}: {source!r} lies outside of the archive")
+                self.problem(f"{needer}: {source!r} lies outside the archive")
                 return None
             if path.is_file():
                 if name != decoded:
-                    self.note(f"{needer}: {source!r} is no URI, in which / separates and % encodes")
+                    self.note(
+                        f"{needer}: {source!r} is not a URI, in which / separates and % encodes"
+                    )
                 return path
         self.problem(f"holds no {source!r} for {needer}")
         return None
@@ -283,7 +287,7 @@ class Archive:
         try:
             return integer(text)
         except ValueError:
-            self.problem(f"{name} {text!r} is no integer")
+            self.problem(f"{name} {text!r} is not an integer")
             return 0
 
     def number(self, element: Element | None, name: str, otherwise: _Float) -> float | _Float:
@@ -292,7 +296,7 @@ class Archive:
         Args:
             element: with the attribute; None: there is none.
             name: of the attribute.
-            otherwise: its value where it is not stated, or, with a problem, where it is no number.
+            otherwise: its value where it is not stated or, with a problem, is not a number.
 
         """
         text = None if element is None else element.get(name)

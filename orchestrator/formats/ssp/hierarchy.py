@@ -12,7 +12,7 @@ from orchestrator.formats.ssp.archive import Archive
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import listed
-from orchestrator.system.units import BASES, Unit, Units, unit_of_port
+from orchestrator.system.units import BASE_UNITS, Unit, Units, unit_of_port
 from orchestrator.system.values import FMI2_NAMES, items_of, type_of
 
 #: An enumeration's values by the names of its items.
@@ -49,14 +49,14 @@ class Definitions:
 
 
 def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Definitions:
-    """What a file defines, and what is defined around it, over which it wins."""
+    """The definitions of a file, which win over those around it."""
     units = dict(outer.units)
     for unit in root.findall("Units/Unit"):
         name, base = unit.get("name", ""), unit.find("BaseUnit")
         if base is not None:
             units[name] = Unit(
                 name,
-                tuple(archive.integer(base, of) for of in BASES),
+                tuple(archive.integer(base, of) for of in BASE_UNITS),
                 archive.number(base, "factor", 1.0),
                 archive.number(base, "offset", 0.0),
             )
@@ -164,7 +164,7 @@ class Bus:
         return None if stated is None else replace(stated, causality=None)
 
     def named(self, _: str) -> Iterator[tuple[Node, Connector]]:
-        """Nothing in it has a value of its own."""
+        """Nothing in it has a value."""
         yield from ()
 
 
@@ -186,7 +186,7 @@ class Group:
     members: Mapping[str, Leaf | Bus | Group]
 
     def connector(self, name: str) -> Connector | None:
-        """One of its own connectors; None: it has none of that name."""
+        """One of its connectors; None: it has none of that name."""
         return self.connectors.get(name)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
@@ -263,11 +263,11 @@ class Builder:
         source, kind = content.get("source"), content.get("type", _FMU)
         implementation = content.get("implementation", "any")
         if kind != _FMU:
-            why = f"a component of type {kind!r} is not supported; an FMU is"
+            why = f"a component of type {kind!r} is not supported; only FMUs are"
         elif source is None:
             why = "a component without a source, which cannot be run"
         elif implementation not in ("any", "CoSimulation"):
-            why = f"asks for {implementation}, which is not supported; CoSimulation is"
+            why = f"asks for {implementation}, which is not supported; only CoSimulation is"
         else:
             fmu = self._archive.file(source, name)
             try:
@@ -293,7 +293,7 @@ class Builder:
             ):
                 if said and said != true:
                     self._archive.note(
-                        f"{Node(leaf.way, name)}: its {what} is {said}, and {true} in its FMU"
+                        f"{Node(leaf.way, name)}: its {what} is {said}, but {true} in its FMU"
                     )
         if absent:
             self._archive.note(

@@ -22,7 +22,7 @@ from orchestrator.formats.ssp.hierarchy import (
 )
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.names import listed
-from orchestrator.system.units import Linear, Mapped, Transformation, Unit, chained
+from orchestrator.system.units import Linear, Mapped, Transformation, Unit, combine
 from orchestrator.system.values import BOOLEANS, finite
 
 _TABLES = (
@@ -78,7 +78,7 @@ def _value(table: str, entry: Element, end: str, items: Items) -> float:
             raise ValueError(f"{end} {text!r} of a mapping is not in its enumeration")
         return float(items[text])
     if (value := finite(text, end)) != int(value):
-        raise ValueError(f"{end} {text!r} of a mapping is no integer")
+        raise ValueError(f"{end} {text!r} of a mapping is not an integer")
     return value
 
 
@@ -120,13 +120,13 @@ class Segment:
         """
         step = self.stated
         if self.converts:
-            step = chained(archive.conversion(unit, self.unit), step)
+            step = combine(archive.conversion(unit, self.unit), step)
             # What a transformation makes of a value is in the target's unit, or unknown.
             unit = self.unit or (unit if self.stated is None else None)
         else:
             # Said even where it changes nothing: the units at its ends may differ.
             step, unit = step or Linear(), self.unit
-        return chained(whole, step), unit
+        return combine(whole, step), unit
 
 
 def segments_of(archive: Archive, top: Group) -> dict[Node, Segment]:
@@ -240,7 +240,7 @@ class Given:
             stated = _transformation(self.entry, self.items, target.items)
             if not _converts_units(self.entry):
                 return stated
-        return chained(archive.conversion(self.unit, target.unit), stated)
+        return combine(archive.conversion(self.unit, target.unit), stated)
 
 
 #: What is given to nodes, and what is known of each of these.
@@ -310,7 +310,7 @@ class Bindings:
         if element.get("sourceBase", "SSD") != "SSD":
             if not isinstance(owner, Leaf) or owner.component is None:
                 named = ".".join(owner.way)
-                raise InputError(f"a file of {named!r}, which is no component with an FMU")
+                raise InputError(f"a file of {named!r}, which is not a component with an FMU")
             base = owner.component.folder
         file = self._archive.file(source, where, base)
         return None if file is None else self._archive.read(file)
@@ -343,7 +343,7 @@ class Bindings:
                 self._archive.problem(f"{where}: {name}: arrays are not supported")
                 continue
             if name in found:
-                self._archive.note(f"{where}: {name} stands twice in a parameter set")
+                self._archive.note(f"{where}: {name} appears twice in a parameter set")
             found[name] = Given(text, known.unit(value), known.items(value))
         return found
 

@@ -16,7 +16,7 @@ from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, listed
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.units import Transformation, Unit, chained
+from orchestrator.system.units import Transformation, Unit, combine
 from orchestrator.system.values import BOOLEANS, Value, real, typed
 
 #: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
@@ -127,7 +127,7 @@ class _Arrival:
     Attributes:
         start: where it sets out: at a component's port, or where it is given; None: there is none.
         leaf: the component that it comes from; None: it is given.
-        whole: what has happened to it since.
+        whole: its transformation since.
         unit: that it has.
         error: why it cannot come so far.
 
@@ -252,7 +252,7 @@ class _Ports:
             whole = given.transformation(self._archive, target)
             if arrival.error is not None:
                 raise arrival.error
-            whole = chained(whole, arrival.whole)
+            whole = combine(whole, arrival.whole)
         except ValueError as error:
             raise InputError(f"{arrival.start}: {error}") from None
         component, connector = leaf.component, leaf.connector(port.port)

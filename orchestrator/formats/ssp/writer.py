@@ -13,7 +13,7 @@ from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTU
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.units import BASES, Linear, Mapped
+from orchestrator.system.units import BASE_UNITS, Linear, Mapped
 from orchestrator.system.values import items_of, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
@@ -236,7 +236,7 @@ def _add_units(root: Element, system: System) -> None:
     parent = _add(root, "ssd:Units")
     for name in sorted(units):
         base = _add(_add(parent, "ssc:Unit", name=name), "ssc:BaseUnit")
-        for attribute, otherwise in (*((of, 0) for of in BASES), ("factor", 1), ("offset", 0)):
+        for attribute, otherwise in (*((of, 0) for of in BASE_UNITS), ("factor", 1), ("offset", 0)):
             stated = getattr(units[name], attribute, otherwise)
             if stated != otherwise:
                 base.set(attribute, str(stated))

@@ -1,1 +1,1 @@
-"""An FMU behind a few calls (`instance`): in this process (`loaded`) or in its own (`isolated`)."""
+"""An FMU as a few calls (`instance`): in this process (`loaded`) or in its own (`isolated`)."""

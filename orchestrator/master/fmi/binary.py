@@ -23,10 +23,10 @@ from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 from fmpy.model_description import read_build_description
 
 from orchestrator.machine import cache
-from orchestrator.machine.children import compiler, made_library
-from orchestrator.machine.disk import claimed
+from orchestrator.machine.children import compile_library, find_compiler
+from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.fmi.surroundings import put_back, within
+from orchestrator.master.fmi.surroundings import restore_mode, within_folder
 from orchestrator.system.component import Component
 
 #: How this program names itself in descriptions of FMUs.
@@ -77,8 +77,8 @@ class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
         try:
             result = super()._call(fname, *args)
         finally:
-            put_back()
-        # fmpy takes what is below all of FMI's statuses for a good one.
+            restore_mode()
+        # fmpy takes anything below FMI's statuses for success.
         if self._functions[fname].restype is fmi2Status and result < 0:
             raise FMICallException(fname, result)
         return result
@@ -86,7 +86,7 @@ class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
     def freeLibrary(self) -> None:
         """Unload the library."""
         super().freeLibrary()
-        put_back()
+        restore_mode()
 
 
 class _Lenient:
@@ -119,7 +119,7 @@ class Library:
     """
 
     def __init__(self, component: Component, folder: Path) -> None:
-        """Load what has been unpacked into a folder.
+        """Load an FMU that has been unpacked into a folder.
 
         Raises:
             InputError: it cannot be loaded.
@@ -130,23 +130,25 @@ class Library:
         make_binary(component, folder)
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
-            with within(folder):
+            with within_folder(folder):
                 self.fmu = FMU2OfOthers(
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,
                     unzipDirectory=str(folder),
                 )
         except Exception as error:
-            raise InputError(f"{named(component)} cannot be loaded: {reason(error)}") from error
+            raise InputError(
+                f"{name_with_fmu(component)} cannot be loaded: {reason(error)}"
+            ) from error
         finally:
-            put_back()
+            restore_mode()
         tool = component.description.generationTool or ""
         self.runs_python = runs_python(folder)
         self.is_akin = tool.startswith(_OWN) or self.runs_python
         self.corrupted, self.users = False, 0
 
 
-def named(component: Component) -> str:
+def name_with_fmu(component: Component) -> str:
     """A component and its FMU, for messages."""
     return f"{component.name}: {component.fmu.name}"
 
@@ -172,8 +174,8 @@ def check_place(folder: Path) -> None:
         and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII))
     ):
         raise InputError(
-            f"temporary folder {str(folder)!r}: PythonFMU takes no {odd[0]!r} in it; set TMPDIR to "
-            "another, or build the FMU with --loader native"
+            f"temporary folder {str(folder)!r}: PythonFMU cannot handle {odd[0]!r} in it; set "
+            "TMPDIR to another, or build the FMU with --loader native"
         )
 
 
@@ -196,12 +198,12 @@ def make_binary(component: Component, folder: Path) -> None:
         return
     key = _key(component)
     try:
-        with claimed(cache.folder_of(_CATEGORY), wait=True):
-            kept = cache.kept(_CATEGORY, key)
+        with hold_lock(cache.category_folder(_CATEGORY), wait=True):
+            kept = cache.read_cached(_CATEGORY, key)
             content = next(iter(kept.values())) if kept else _compiled(component, sources)
             if not kept:
                 with suppress(OSError):
-                    cache.keep(_CATEGORY, key, {binary.name: content})
+                    cache.write_cached(_CATEGORY, key, {binary.name: content})
         binary.parent.mkdir(parents=True, exist_ok=True)
         # Other processes may be about to load it.
         new = binary.with_name(f"{binary.name}.{os.getpid()}")
@@ -226,7 +228,9 @@ def check_binary(component: Component, folder: Path) -> None:
     if binary.is_file():
         for path in sorted(binary.parent.iterdir()):
             if path.is_file() and _is_cut_short(path):
-                raise InputError(f"{named(component)}: its {path.name} is cut short: get it anew")
+                raise InputError(
+                    f"{name_with_fmu(component)}: its {path.name} is truncated: download it again"
+                )
         return
     if _sources_of(component, folder):
         _check_compiler(component)
@@ -240,7 +244,8 @@ def check_binary(component: Component, folder: Path) -> None:
     else:
         there = "no binaries at all"
     raise InputError(
-        f"{named(component)} has no {binary.name} for this machine, {fmpy.platform}: it has {there}"
+        f"{name_with_fmu(component)} has no {binary.name} for this machine, {fmpy.platform}: "
+        f"it has {there}"
     )
 
 
@@ -358,7 +363,7 @@ def _check_compiler(component: Component) -> None:
         InputError: there is no compiler.
 
     """
-    if compiler() is None and not cache.kept(_CATEGORY, _key(component)):
+    if find_compiler() is None and not cache.read_cached(_CATEGORY, _key(component)):
         raise InputError(
             f"{component.fmu}: has no binary for this machine, {fmpy.platform}, and must be "
             "compiled: install gcc or clang, or `pip install ziglang`"
@@ -367,16 +372,16 @@ def _check_compiler(component: Component) -> None:
 
 def _compiled(component: Component, sources: Sources) -> bytes:
     _check_compiler(component)
-    run = compiler()
+    run = find_compiler()
     assert run is not None
     warnings.warn(
-        f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources are "
-        "compiled now, and kept",
+        f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources "
+        "are compiled now, and kept",
         stacklevel=2,
     )
     cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)
     files = map(str, sources.files)
-    return made_library(
+    return compile_library(
         run, *_FLAGS, *sources.options, "-idirafter", str(_HEADERS), *files, "-lm", *cpp
     )
 

@@ -25,7 +25,7 @@ _LONGEST_LETTER = 10_000
 
 
 class ComponentFailed(Exception):
-    """A component did not do what it was asked for; the text names it and says why.
+    """A component failed to do what it was asked to; the text names it and says why.
 
     Attributes:
         fatal: whether it is lost: FMI's fmi2Fatal, or its process has ended or hangs.
@@ -144,7 +144,7 @@ class Instance(Protocol):
         """Set tunable parameters between two steps."""
 
     def reset(self) -> None:
-        """Be what it was before the initialisation, which can then be entered again."""
+        """Return to the state before the initialisation, which can then be entered again."""
 
     def keep(self) -> None:
         """Keep the state of now, to go back to it."""
@@ -167,7 +167,7 @@ class Instance(Protocol):
         """Take on a state; what the row holds of this instance is left as it is."""
 
     def terminate(self) -> None:
-        """Let the FMU end what it has begun."""
+        """Let the FMU finish what it has begun."""
 
 
 class Listener(Protocol):
@@ -178,7 +178,7 @@ class Listener(Protocol):
 
 
 class Log:
-    """What the FMUs of a run have said with status warning or worse, and what was noticed of them.
+    """Messages of the FMUs with status warning or worse, and remarks on the FMUs.
 
     Attributes:
         refusals: the first of it with status discard: a value was not taken, though the call went
@@ -194,7 +194,7 @@ class Log:
         self.refusals: list[str] = []
 
     def remark(self, text: str) -> None:
-        """Note what was noticed of an FMU: no flood of its messages hides that."""
+        """Note a remark on an FMU: no flood of its messages hides that."""
         self._remarks.append(text)
 
     def take(self, status: int, text: str) -> None:
@@ -207,9 +207,9 @@ class Log:
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """All remarks, the first of what was said, and how much that was."""
+        """All remarks, the first messages, and the number of the others."""
         more = self._n - len(self._said)
-        return (*self._remarks, *self._said, *([f"and {more} messages more"] * (more > 0)))
+        return (*self._remarks, *self._said, *([f"and {more} more messages"] * (more > 0)))
 
     def state(self) -> dict[str, Any]:
         """All of it, as JSON has it."""

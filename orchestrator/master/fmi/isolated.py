@@ -67,7 +67,7 @@ def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
         return Isolation() if step_timeout is None else Isolation(step_timeout)
     if step_timeout is not None:
         raise InputError(
-            "a step timeout needs isolation: only an FMU in a process of its own can be ended"
+            "a step timeout needs isolation: only an FMU in a separate process can be ended"
         )
     return None
 
@@ -185,7 +185,7 @@ class IsolatedInstance:
         self._ask("tune", dict(values))
 
     def reset(self) -> None:
-        """Be what it was before the initialisation."""
+        """Return to the state before the initialisation."""
         self._ask("reset")
 
     def keep(self) -> None:
@@ -230,7 +230,7 @@ class IsolatedInstance:
         return 0
 
     def terminate(self) -> None:
-        """Let the FMU end what it has begun, free it, and end its process."""
+        """Let the FMU finish what it has begun, free it, and end its process."""
         try:
             self._ask("terminate")
             self.leave()
@@ -250,7 +250,7 @@ class IsolatedInstance:
         self._channel.close()
 
     def farewell(self) -> None:
-        """Give the process some time to end; there is no use in waiting for one that hangs."""
+        """Give the process some time to end; it is no use waiting for one that hangs."""
         if not self._hangs:
             self._status(min(self._timeout, FAREWELL))
 
@@ -305,7 +305,7 @@ class IsolatedInstance:
             raise self._lost() from error
 
     def _receive(self) -> Any:
-        """The value of the answer to what was asked for."""
+        """The value in the answer to a request."""
         longest = LONGEST_STATE if self._doing == "state" else LONGEST_NOTE
         try:
             note = self._channel.receive(longest)
@@ -334,7 +334,7 @@ class IsolatedInstance:
         self._told = len(self._theirs)
         for status, text in messages:
             if status not in _STATUSES:
-                raise ValueError("it knows another status than FMI")
+                raise ValueError("it uses a status unknown to FMI")
             self._log.take(int(status), _line(text))
         if failed is not None:
             raise ComponentFailed(_line(failed), bool(fatal))
@@ -386,5 +386,5 @@ def _how_it_ended(status: int | None) -> str:
         return f"exited with status {status}"
     names = {number.value: number.name for number in signal.Signals}
     name = names.get(-status, f"signal {-status}")
-    memory = ", perhaps for want of memory" if -status == signal.SIGKILL else ""
+    memory = ", perhaps for lack of memory" if -status == signal.SIGKILL else ""
     return f"was ended by {name} ({signal.strsignal(-status)}{memory})"

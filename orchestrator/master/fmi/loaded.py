@@ -38,9 +38,9 @@ from fmpy.logging import addLoggerProxy
 from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.fmi.binary import Library, library_of, named
+from orchestrator.master.fmi.binary import Library, library_of, name_with_fmu
 from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Listener, Part
-from orchestrator.master.fmi.surroundings import put_back
+from orchestrator.master.fmi.surroundings import restore_mode
 from orchestrator.master.fmi.transfer import (
     DO_STEP_TYPES,
     CMember,
@@ -48,7 +48,7 @@ from orchestrator.master.fmi.transfer import (
     DoStepCallback,
     PortBlock,
     address_of,
-    text_of,
+    decode_text,
 )
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value
@@ -107,7 +107,7 @@ class LoadedInstance:
             why = " ".join(heard) or reason(error)
             needs = component.description.coSimulation.needsExecutionTool
             tool = "; it needs the tool that it was made with" * needs
-            text = f"{named(component)} cannot be instantiated: {why}{tool}"
+            text = f"{name_with_fmu(component)} cannot be instantiated: {why}{tool}"
             raise InputError(text) from error
         self.do_step = self.function("DoStep")
         self._called_back: Any = None
@@ -198,7 +198,7 @@ class LoadedInstance:
         for call in (*self.set_inputs, *self.get_outputs):
             if (status := call()) not in (fmi2OK, fmi2Warning):
                 raise self.failed(status, "exchanging values")
-        put_back()
+        restore_mode()
 
     def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
         """How some outputs change with one input at the same time, by their value references."""
@@ -214,7 +214,7 @@ class LoadedInstance:
         self._set(values)
 
     def reset(self) -> None:
-        """Be what it was before the initialisation."""
+        """Return to the state before the initialisation."""
         self._call("reset")
 
     def keep(self) -> None:
@@ -242,7 +242,7 @@ class LoadedInstance:
         self._worst = 0
         with self._held("deSerializeFMUstate", state) as read:
             self._call("setFMUstate", read)
-        # Some say only in a message that it is none of theirs.
+        # Some say only in a message that it is not theirs.
         if self._worst >= fmi2Discard:
             raise ComponentFailed(self._complaints[-1])
 
@@ -250,7 +250,7 @@ class LoadedInstance:
     def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
         """A state that one of fmpy's methods gives, in the FMU's memory, freed at the end."""
         if not self._gives_state:
-            raise ComponentFailed(f"{self.name}: its FMU does not give its state away")
+            raise ComponentFailed(f"{self.name}: its FMU does not provide its state")
         state = self._call(method, *arguments)
         try:
             yield state
@@ -259,7 +259,7 @@ class LoadedInstance:
                 self._call("freeFMUstate", state)
 
     def terminate(self) -> None:
-        """Let the FMU end what it has begun."""
+        """Let the FMU finish what it has begun."""
         if not self._library.corrupted:
             self._call("terminate")
 
@@ -294,7 +294,7 @@ class LoadedInstance:
         value: Value | bytes | None
         (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
         if value is None or isinstance(value, bytes):
-            return text_of(value)
+            return decode_text(value)
         return bool(value) if variable.type == "Boolean" else value
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
@@ -306,7 +306,7 @@ class LoadedInstance:
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
-        put_back()
+        restore_mode()
         if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
             with suppress(FMICallException):
                 if self._fmu.getBooleanStatus(fmi2Terminated):
@@ -333,14 +333,14 @@ def _fmi_type(variable: ModelVariable) -> str:
 
 
 @contextmanager
-def loaded(
+def load_instance(
     component: Component, listener: Listener, folder: Path | None = None
 ) -> Iterator[LoadedInstance]:
-    """An instance of a component in this process, freed at the end.
+    """Load an instance of a component into this process, freed at the end.
 
     Args:
-        component: what is instantiated.
-        listener: takes what it says.
+        component: to instantiate.
+        listener: takes its messages.
         folder: into which its FMU is unpacked; None: this process unpacks it.
 
     Raises:

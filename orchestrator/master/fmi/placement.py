@@ -13,7 +13,7 @@ from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.fmi.binary import make_binary
 from orchestrator.master.fmi.instance import Instance, Log
 from orchestrator.master.fmi.isolated import IsolatedInstance, Isolation
-from orchestrator.master.fmi.loaded import loaded
+from orchestrator.master.fmi.loaded import load_instance
 from orchestrator.master.fmi.supervisor import Supervisor
 from orchestrator.system.component import Component
 
@@ -23,20 +23,20 @@ _LOCK = Lock()
 
 
 @contextmanager
-def placed(
+def place_instances(
     components: Mapping[str, Component],
     log: Log,
     isolation: Isolation | None,
     interrupts: Interrupts,
 ) -> Iterator[dict[str, Instance]]:
-    """Instances of components by their names: all in this process, or each in one of its own.
+    """Place instances of components, by name: all in this process, or each in a separate one.
 
-    One more of an FMU that allows one instance a process goes into one of its own in any case.
+    A further instance of an FMU that allows one per process always gets a separate process.
 
     Args:
         components: by their names.
         log: takes what the FMUs say.
-        isolation: how long isolated FMUs may take; None: all are to be in this process.
+        isolation: how long isolated FMUs may take; None: all are in this process.
         interrupts: that end the wait for an FMU.
 
     Raises:
@@ -50,14 +50,14 @@ def placed(
         instances: dict[str, Instance] = {}
         for name, component in components.items():
             if isolation is None and stack.enter_context(_has_room(component)):
-                instances[name] = stack.enter_context(loaded(component, log))
+                instances[name] = stack.enter_context(load_instance(component, log))
             else:
                 apart[name] = component
                 # Here there is time for it, and a caller to tell.
                 make_binary(component, component.folder)
         if apart:
             how = isolation or Isolation()
-            instances |= stack.enter_context(isolated(apart, log, how, interrupts))
+            instances |= stack.enter_context(isolate_instances(apart, log, how, interrupts))
         yield {name: instances[name] for name in components}
 
 
@@ -79,10 +79,10 @@ def _has_room(component: Component) -> Iterator[bool]:
 
 
 @contextmanager
-def isolated(
+def isolate_instances(
     components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
 ) -> Iterator[dict[str, Instance]]:
-    """Instances as :func:`placed` has them, each in a process of its own; all end with it."""
+    """Place instances, each in a separate process; all end with it."""
     with ExitStack() as stack:
         try:
             pairs = [socket.socketpair() for _ in components]

@@ -23,7 +23,7 @@ from subprocess import PIPE, Popen, TimeoutExpired
 from time import monotonic
 from typing import Any
 
-from orchestrator.machine.errors import plain
+from orchestrator.machine.errors import escape_unprintable
 from orchestrator.master.fmi.isolated import FAREWELL
 from orchestrator.master.fmi.worker import serve
 from orchestrator.system.component import Component
@@ -178,11 +178,11 @@ class _Captured:
         os.set_blocking(descriptor, False)
 
     def forward(self) -> None:
-        """Show what has come, if it is not too much."""
+        """Show the text that has arrived, if it is not too much."""
         with suppress(BlockingIOError):
             text = os.read(self._descriptor, _PIPE)
             if self._left > 0:
-                shown = plain(self._decoded(text[: self._left]), "\n\t")
+                shown = escape_unprintable(self._decoded(text[: self._left]), "\n\t")
                 _show(shown.encode())
                 self._left -= len(text)
                 if self._left <= 0:
@@ -211,7 +211,7 @@ class _Children:
             # That numpy may have threads: this process computes nothing.
             warnings.simplefilter("ignore", DeprecationWarning)
             pid = os.fork()
-        # A group of its own, so that what it starts can be ended with it.
+        # A separate group, so that whatever it starts can be ended with it.
         with suppress(OSError):
             os.setpgid(pid, pid)
         if pid == 0:

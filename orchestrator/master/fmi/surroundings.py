@@ -40,10 +40,10 @@ def _functions() -> Iterator[Callable[..., object]]:
 _take_default, _get, _set = _functions()
 
 
-def put_back() -> None:
+def restore_mode() -> None:
     """Take on the default mode after a call of an FMU, if numbers are others in the present one.
 
-    To look is a third of what it costs to take it on.
+    Looking costs a third of changing it.
     """
     if A * B * C != PRODUCT:
         _take_default()
@@ -64,7 +64,7 @@ def default_mode() -> Iterator[None]:
 class Surroundings:
     """The current folder, the standard streams, and what modules hold.
 
-    FMUs may change them as long as a run lasts, and find them as they have left them, so that
+    FMUs may change them during a run, and find them as they left them, so that
     nothing depends on when this program looks after its files.
     """
 
@@ -76,7 +76,7 @@ class Surroundings:
         self._modules = [(vars(module), dict(vars(module))) for module in _MODULES]
         self._streams = sys.stdin, sys.stdout, sys.stderr
         self._folder, self._status = Path(), os.stat(".")  # noqa: PTH116  # a third of the time
-        # It may have been deleted: there is none to go back to then.
+        # It may have been deleted: then there is nothing to go back to.
         with suppress(OSError):
             self._folder = Path.cwd()
 
@@ -134,7 +134,7 @@ class Surroundings:
 
 
 @contextmanager
-def within(folder: Path) -> Iterator[None]:
+def within_folder(folder: Path) -> Iterator[None]:
     """Make a folder the current one for a while; the one before may have been deleted."""
     if not hasattr(os, "fchdir"):
         with chdir(folder):

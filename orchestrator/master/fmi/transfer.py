@@ -165,7 +165,7 @@ class PortBlock:
         texts = (fmi2String * len(self._values))()
         status = function(self._references, self._n, texts)
         for i, text in enumerate(texts):
-            self._values[i] = self._strings.number(text_of(text))
+            self._values[i] = self._strings.number(decode_text(text))
         return status
 
 
@@ -179,6 +179,6 @@ def are_integers(values: np.ndarray) -> bool:
     return bool((values.astype(np.intc) == values).all())
 
 
-def text_of(string: bytes | None) -> str:
-    """A text that an FMU has given; some give none where an empty one is meant."""
+def decode_text(string: bytes | None) -> str:
+    """Decode a text that an FMU has given; some give none where an empty one is meant."""
     return (string or b"").decode(errors="replace")

@@ -24,11 +24,11 @@ from fmpy.fmi2 import fmi2OK, fmi2Warning
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, MessageQueue
-from orchestrator.master.fmi.loaded import LoadedInstance, loaded
+from orchestrator.master.fmi.loaded import LoadedInstance, load_instance
 from orchestrator.master.fmi.surroundings import Surroundings
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import member, step
+from orchestrator.master.schedule import member, step_members
 from orchestrator.system.component import Component, read_description
 from orchestrator.system.structure import System
 from orchestrator.system.values import StringTable
@@ -93,7 +93,7 @@ class Channel:
 
         Raises:
             EOFError, OSError: the other end is closed.
-            ValueError, RecursionError, MemoryError: it is no message.
+            ValueError, RecursionError, MemoryError: it is not a message.
 
         """
         self._move(self._connection.recv_into, self._received_bytes)
@@ -107,7 +107,7 @@ class Channel:
         return json.loads(text, object_hook=_from_text)
 
     def close(self) -> None:
-        """Let the other end know that there is no more."""
+        """Tell the other end that nothing more follows."""
         self._connection.close()
 
     def _move(self, move: Callable[[memoryview], int], data: memoryview) -> None:
@@ -160,7 +160,7 @@ def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.so
     with suppress(EOFError, OSError):
         channel.send()
         try:
-            with loaded(component, messages, folder) as instance:
+            with load_instance(component, messages, folder) as instance:
                 _Served(component, instance, channel, messages).answer_all()
         except InputError as error:
             channel.send({"refused": str(error)})
@@ -207,7 +207,7 @@ class _Served:
 
     def _step(self) -> None:
         t, h = self._channel.incoming[:2]
-        step([self._member], t, h)
+        step_members([self._member], t, h)
 
     def _are_read(self) -> bool:
         """Whether the outputs can be read after the last step."""

@@ -25,9 +25,9 @@ from uuid import uuid4
 
 import numpy as np
 
-from orchestrator.machine.disk import sealed, to_disk, unsealed, write_whole
+from orchestrator.machine.disk import sealed, sync_to_disk, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.ledger import moved_aside
+from orchestrator.machine.ledger import move_aside
 from orchestrator.master.fmi.instance import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
 from orchestrator.master.observers.observer import Ending, Header, NotKept
@@ -104,7 +104,7 @@ class RowLog:
         """Write some rows.
 
         Returns:
-            Row and column of the first number that is not what was there; None: all are.
+            Row and column of the first number that differs; None: none does.
 
         """
         content = rows.astype(_NUMBER, copy=False).tobytes()
@@ -118,7 +118,7 @@ class RowLog:
         return divmod(different, self._width)
 
     def _different(self, content: bytes) -> int | None:
-        """Which number, as it stands in the file, is the first that is not what is to be there."""
+        """The index in the file of the first number that differs from the expected one."""
         place = self._file.tell()
         there = np.frombuffer(self._file.read(len(content)), np.uint64)
         self._file.seek(place)
@@ -141,7 +141,7 @@ class RowLog:
     def to_disk(self) -> str:
         """Have all rows outlast the process, and a power cut; their digest is given back."""
         self._file.flush()
-        to_disk(self._path)
+        sync_to_disk(self._path)
         return self._digest.hexdigest()
 
     def close(self) -> None:
@@ -185,7 +185,7 @@ def check_gives_states(system: System) -> None:
     for name, component in system.components.items():
         if not component.gives_state:
             raise InputError(
-                f"{name}: its FMU {component.fmu.name} does not give its state away "
+                f"{name}: its FMU {component.fmu.name} does not provide its state "
                 "(canGetAndSetFMUstate and canSerializeFMUstate): a run with it has no checkpoints"
             )
 
@@ -221,7 +221,7 @@ class Checkpoints:
             token: random, for a new checkpoint; empty: one is drawn.
 
         Raises:
-            InputError: what is there is not wanted, or not what is wanted.
+            InputError: the checkpoint there is not asked for, or not the right one.
 
         """
         if not (isfinite(every) and every > 0.0):
@@ -247,19 +247,19 @@ class Checkpoints:
             if not resume:
                 raise InputError(
                     f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume goes "
-                    "on with it; --force moves it aside and begins anew"
+                    "on with it; --force moves it aside and starts over"
                 )
             if different := differences(found.of, self._run):
                 raise InputError(
-                    f"{self.folder} is of another run: {', '.join(different)} differ; run what it "
-                    "was made by, or let --force move it aside and begin anew"
+                    f"{self.folder} is of another run: {', '.join(different)} differ; run that "
+                    "one, or let --force move it aside and start over"
                 )
         except InputError:
             if not force:
                 raise
             for path in (self.folder / _STATE, self.folder / _ROWS):
                 if os.path.lexists(path):
-                    moved_aside(path)
+                    move_aside(path)
             return None
         return found
 
@@ -285,8 +285,8 @@ class Checkpoints:
         if (different := self._row_log.append(new)) and self._log is not None:
             row, column = different
             self._log.remark(
-                f"{self._columns[column]} is not what it was at t = {new[row, 0]:g} s before the "
-                "run was resumed: an FMU does not restore all of its state"
+                f"{self._columns[column]} differs at t = {new[row, 0]:g} s from its value before "
+                "the run was resumed: an FMU does not restore all of its state"
             )
 
     def end(self, ending: Ending) -> None:
@@ -306,7 +306,7 @@ class Checkpoints:
         return (run.made // steps + 1) * steps
 
     def remove(self) -> None:
-        """Remove what a run that has come to its end does not need any more."""
+        """Remove the files that a finished run no longer needs."""
         found, rows = _read(self.folder), self.folder / _ROWS
         if found is not None and found.identity == self._identity:
             # While there are rows, there is the proof that they are ours.
@@ -383,13 +383,13 @@ def _read(folder: Path) -> _Stored | None:
         return None
     with _explained(path):
         if not S_ISREG(path.lstat().st_mode):
-            raise ValueError("it is no file")
+            raise ValueError("it is not a file")
         return _Stored(**unsealed(path.read_text(encoding="utf-8")))
 
 
 @contextmanager
 def _explained(path: Path) -> Iterator[None]:
-    """Say of a checkpoint that is none, or is damaged, where it is."""
+    """Name the file of a checkpoint that is damaged or is not one."""
     try:
         yield
     except InputError:

@@ -56,7 +56,7 @@ class Layer(NamedTuple):
     """What an event does at one place.
 
     Attributes:
-        event: its number; what was there before any has :data:`_GROUND`.
+        event: its number; :data:`_GROUND` stands for the value before any event.
         effect: a key of :data:`_EFFECTS`.
         value: that goes with it.
 
@@ -109,7 +109,7 @@ class Layers:
         _EFFECTS[layer.effect](run, target, layer.value)
 
     def take(self, run: Run, event: int) -> None:
-        """Take away what an event does."""
+        """Undo what an event does."""
         for (target, _), layers in self._at.items():
             if layers[-1].event == event:
                 _EFFECTS[layers[-2].effect](run, target, layers[-2].value)
@@ -135,7 +135,7 @@ class Layers:
         ]
 
     def restore(self, state: Sequence[Any]) -> None:
-        """Be what it was; what acts already acts on."""
+        """Restore the saved state; events in progress continue."""
         self._at = {
             (PortName(component, port), sets): [Layer(*layer) for layer in layers]
             for component, port, sets, layers in state
@@ -228,7 +228,7 @@ class Set:
 
 @dataclass(frozen=True)
 class Reset:
-    """Let components begin anew, with their parameters as they are."""
+    """Start components over, with their current parameters."""
 
     components: tuple[str, ...]
 
@@ -373,11 +373,11 @@ class Events:
             self._happened.append(Occurrence(run.time, text, label, number))
 
     def _next(self, run: Run, number: int) -> int:
-        """After how many steps something is to be done about an event."""
+        """After how many steps an event needs action."""
         begin = _due(run, self._events[number]) if self._waits(number) else NEVER
         return min(begin, self._progress[number].end)
 
 
 def _due(run: Run, event: Event) -> int:
-    """After how many steps an event is to be looked at."""
+    """After how many steps to look at an event."""
     return run.made + 1 if event.at is None else run.experiment.reaching(event.at)

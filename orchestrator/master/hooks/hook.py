@@ -23,7 +23,7 @@ class Run:
     """A run, as far as it has come.
 
     Attributes:
-        system, experiment: what is run.
+        system, experiment: of the run.
         instances: of its components, by their names.
         row: of all values.
         stages: of every step.
@@ -72,7 +72,7 @@ class Hook(Protocol):
 
         Raises:
             Ended: the run is to end here.
-            ComponentFailed: a component did not do what it was asked for.
+            ComponentFailed: a component failed to do what it was asked to.
 
         """
 
@@ -81,7 +81,7 @@ class Hook(Protocol):
 class Lasting(Protocol):
     """What a run that is resumed has to know again of an earlier process.
 
-    A hook that is one remembers by itself what it has done, and what is still to be done.
+    Such a hook itself remembers what it has done and has still to do.
     """
 
     def state(self) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.formats.tables import ROWS, parquet
+from orchestrator.formats.tables import ROWS_AT_ONCE, parquet
 from orchestrator.machine.disk import is_still
 from orchestrator.master.observers.observer import Ending, Header
 
@@ -34,7 +34,7 @@ class _Output(RawIOBase):
         """Check that it is still where it was made.
 
         Raises:
-            OSError: what is written would go nowhere.
+            OSError: the output would go nowhere.
 
         """
         try:
@@ -173,16 +173,16 @@ class ParquetFile:
         self._file = BufferedWriter(self._output)
         self._writer = self._parquet.ParquetWriter(self._file, self._schema)
         self._waiting = [np.empty((0, len(self._schema)))]
-        self._n, self._room = 0, min(header.experiment.rows, ROWS)
+        self._n, self._room = 0, min(header.experiment.rows, ROWS_AT_ONCE)
         self._take_room()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, when there are enough of them: always as many at once."""
         self._waiting.append(rows.copy())
-        while sum(map(len, self._waiting)) >= ROWS:
+        while sum(map(len, self._waiting)) >= ROWS_AT_ONCE:
             waiting = np.vstack(self._waiting)
-            self._waiting = [waiting[ROWS:]]
-            self._write(waiting[:ROWS])
+            self._waiting = [waiting[ROWS_AT_ONCE:]]
+            self._write(waiting[:ROWS_AT_ONCE])
             self._take_room()
 
     def end(self, ending: Ending) -> None:
@@ -217,4 +217,7 @@ class ParquetFile:
 
 
 #: Writers by the ending of their files.
-FORMATS: dict[str, type[CsvFile] | type[ParquetFile]] = {"csv": CsvFile, "parquet": ParquetFile}
+TABLE_FORMATS: dict[str, type[CsvFile] | type[ParquetFile]] = {
+    "csv": CsvFile,
+    "parquet": ParquetFile,
+}

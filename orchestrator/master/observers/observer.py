@@ -61,7 +61,7 @@ class Occurrence(NamedTuple):
 
     Attributes:
         time: at which it did [s].
-        text: what it was.
+        text: what happened.
         label: its name in a figure; empty: it has none, as the end of something.
         event: its number among those that may happen.
 
@@ -103,7 +103,7 @@ class NotKept(Exception):
 
 
 class Observer(Protocol):
-    """Something that takes what a run computes."""
+    """Takes the rows that a run computes."""
 
     def begin(self, header: Header) -> None:
         """Prepare for the rows of a run."""
@@ -261,7 +261,7 @@ class Selection:
         self._observer.begin(replace(header, columns=kept))
 
     def take(self, rows: np.ndarray) -> None:
-        """Hand on what is kept."""
+        """Pass on the rows that are kept."""
         if self._columns is not None:
             rows = rows[:, self._places]
         if self._every is None:
@@ -294,7 +294,7 @@ def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
 
 def matches(name: str, pattern: str) -> bool:
     """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
-    # Brackets belong to names of arrays, and are no sets of letters here.
+    # Brackets belong to names of arrays; they are not sets of letters here.
     escaped = pattern.replace("[", "[[]")
     is_member = name.startswith((f"{pattern}.", f"{pattern}["))
     return name == pattern or is_member or fnmatchcase(name, escaped)

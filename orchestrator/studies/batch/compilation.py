@@ -1,8 +1,8 @@
 """The kernel and the equations, compiled by numba once for each controller and kept.
 
-It is the same text, except what refusals say: numba makes no texts, so what compiled equations
-raise has none. The rest is Python's: each operation is rounded by itself, nothing is contracted or
-reordered, and sine and the like come from the same library.
+It is the same code, except for the texts of refusals: numba makes no texts, so exceptions of
+compiled equations have none. As in Python, each operation is rounded separately, nothing is
+contracted or reordered, and sine and the like come from the same library.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from numba.core.compiler import CompileResult
 from numba.extending import intrinsic, overload
 
 from auv_fmu.closed_loop import LAWS, Law, Moment
-from orchestrator.machine.cache import keep, kept
+from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.studies.batch import kernel
 from orchestrator.studies.batch.support import digest
 
@@ -146,8 +146,8 @@ def _code(functions: list[ast.FunctionDef], path: str) -> CodeType:
 
 
 @cache
-def compiled(gains: type[Any]) -> Callable[..., Moment]:
-    """The function :func:`.kernel.run` for the controller with a type of gains.
+def compile_run(gains: type[Any]) -> Callable[..., Moment]:
+    """Compile the function :func:`.kernel.run` for the controller with a type of gains.
 
     It is compiled when it is first called, which takes some ten seconds, unless some process of
     this user has done so before.
@@ -160,9 +160,9 @@ def compiled(gains: type[Any]) -> Callable[..., Moment]:
 
 
 class _Kept:
-    """What numba asks for code that was compiled earlier, in the place of its own cache.
+    """What numba asks for code that was compiled earlier, instead of its own cache.
 
-    Numba's own is where its configuration says, and takes whatever is there.
+    Numba's cache is where its configuration says, and takes whatever is there.
     """
 
     cache_path = None
@@ -175,7 +175,7 @@ class _Kept:
         """The code for the types of arguments, or None."""
         target.refresh()
         rebuild: Any = CompileResult._rebuild
-        for content in kept(_CATEGORY, self._key(signature, target.codegen())).values():
+        for content in read_cached(_CATEGORY, self._key(signature, target.codegen())).values():
             return rebuild(target, *pickle.loads(content))
         return None
 
@@ -185,8 +185,8 @@ class _Kept:
         key = self._key(signature, result.codegen)
         # What cannot be kept is compiled again.
         with suppress(OSError):
-            if not kept(_CATEGORY, key):
-                keep(_CATEGORY, key, {"kernel": dumps(result._reduce())})
+            if not read_cached(_CATEGORY, key):
+                write_cached(_CATEGORY, key, {"kernel": dumps(result._reduce())})
 
     def _key(self, signature: Any, codegen: Any) -> str:
         text = repr((self._name, signature, numba.__version__, sys.version, codegen.magic_tuple()))

@@ -69,7 +69,7 @@ def unsupported(system: System, fmus: Path) -> str:
     for one in sorted(map(_shown, wires - connections)):
         return f"it has no wire {one}"
     later = [f"it starts at {system.start_time:g} s"] if system.start_time else []
-    return next(iter([*(f"its {name} has a step of its own" for name in system.steps), *later]), "")
+    return next(iter([*(f"its {name} has a longer step" for name in system.steps), *later]), "")
 
 
 def _contents(part: Component) -> tuple[str, str]:

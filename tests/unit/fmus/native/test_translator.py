@@ -1,4 +1,4 @@
-"""The C sources of components: equations complete, or refused; ports as they are declared."""
+"""The C sources of components: equations as in Python, bit for bit, and ports as declared."""
 
 from __future__ import annotations
 
@@ -6,21 +6,42 @@ import ast
 import re
 import subprocess
 import sys
+from ctypes import byref, c_double, c_ulong
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from random import Random
+from typing import Any, get_args, get_origin, get_type_hints
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.discovery import components
-from fmus.native.program import plain
+from fmus.native.program import strip_sphinx_marks
 from fmus.native.translator import tables, translated
 from fmus.ports.port import FAULT, H_MAX, Port
-from support.equations import FLAGS, ROOT, RUNTIME
+from fmus.python.callbacks import describe_error
+from support.equations import (
+    FLAGS,
+    ROOT,
+    RUNTIME,
+    WHY,
+    bits,
+    equations,
+    filled,
+    flat,
+    structure,
+)
+from support.settings import behaviour_of
 
 PACKAGES = [*components().values()]
 
+#: Where equations live, and where they overflow.
+MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
+
 every = pytest.mark.parametrize("package", PACKAGES)
+randoms = st.randoms(use_true_random=True)
 
 
 @pytest.mark.parametrize("package", PACKAGES[:2])
@@ -73,7 +94,7 @@ def test_each_function_has_its_docstring_above_it(package):
             if head:
                 first, *_ = (ast.get_docstring(node) or "").splitlines()
                 above = head[1].rpartition("\n\n")[2]
-                assert above.startswith(f"/* {plain(first)}"), node.name
+                assert above.startswith(f"/* {strip_sphinx_marks(first)}"), node.name
                 seen += 1
     assert seen > 0
 
@@ -83,20 +104,20 @@ def test_each_function_has_its_docstring_above_it(package):
     [
         ("def begin(parameters: A) -> A:\n    return begin(parameters)\n", "begin calls itself"),
         ("def begin(t: int, h: int) -> A:\n    return A(t / h)\n", "a division of whole numbers"),
-        ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is no field here"),
+        ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is not a field"),
         ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: 2 values for 1 fields"),
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
         ("def begin(parameters: A) -> A:\n    return A(max(1.0, 2.0))\n", "10: the name max"),
         ("def begin(t: int, h: int) -> A:\n    t, h = h, t\n    return A(1.0)\n", "10: h is given"),
         (
             "def begin(parameters: A, t: int) -> A:\n    return A(parameters[t])\n",
-            "10: a computed subscript of what is no tuple of equal parts",
+            "10: a computed subscript of something other than a tuple of parts of one type",
         ),
         (
             "def begin(state: tuple[float, float], t: float) -> A:\n    return A(state[t])\n",
-            "10: a subscript that is no whole number",
+            "10: a subscript that is not a whole number",
         ),
-        ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is no type"),
+        ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is not a type"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
@@ -207,12 +228,12 @@ def test_parameters_lie_where_the_equations_look_for_them(package: str):
     assert len({row["place"] for row in parameters}) == len(parameters)
 
 
-def at(structure: Any, member: str) -> Any:
+def at(model: Any, member: str) -> Any:
     """A member as C names it: a tuple of Python is one with an array `v`."""
     for field, place in re.findall(r"(\w+)(?:\.v\[(\d+)\])?", member):
-        structure = getattr(structure, field)
-        structure = structure[int(place)] if place else structure
-    return structure
+        model = getattr(model, field)
+        model = model[int(place)] if place else model
+    return model
 
 
 def test_choices_are_the_texts_and_the_numbers_of_the_equations():
@@ -226,3 +247,164 @@ def test_choices_are_the_texts_and_the_numbers_of_the_equations():
         assert found == dict(port.choices)
         assert float(row["start"]) == found[str(port.start)]
         assert int(row["n"]) == len(found)
+
+
+def number(random: Random) -> float:
+    return random.choice((0.0, -0.0, 1.0, random.uniform(-1.0, 1.0) * random.choice(MAGNITUDES)))
+
+
+def value(kind: Any, random: Random, wild: float = 0.3) -> Any:
+    """Something that a type of the equations can hold; most numbers are tame."""
+    if kind is float:
+        return number(random) if random.random() < wild else random.uniform(-3.0, 3.0)
+    if kind in (int, bool):
+        return random.randrange(3 if kind is int else 2)
+    if get_origin(kind) is tuple:
+        return tuple(value(k, random, wild) for k in get_args(kind))
+    parts = {name: value(k, random, wild) for name, k in get_type_hints(kind).items()}
+    return parts if issubclass(kind, dict) else kind(**parts)
+
+
+def outcome(made: Any) -> tuple[str, list[str]]:
+    return "", bits(flat(made))
+
+
+def raised(call: Any) -> tuple[str, list[str]]:
+    """What a function gives, or what it raises as a slave would say it."""
+    try:
+        return outcome(call())
+    except Exception as error:
+        return describe_error(error)[: WHY - 1], []
+
+
+@every
+@given(random=randoms)
+def test_begin(package, random):
+    both, wild = equations(package), random.choice((0.0, 0.02, 0.3))
+    parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
+    t = number(random)
+    given = {"parameters": parameters, "inputs": inputs, "t": t}
+    state, outputs = both.kept(), structure(both.outputs)()
+    why = both.call(
+        "begin",
+        filled(both.parameters, parameters),
+        filled(both.inputs, inputs),
+        t,
+        state,
+        outputs,
+    )
+    found = (why, []) if why else outcome([state, outputs])
+    assert found == raised(lambda: both.python("begin", **given))
+
+
+@every
+@given(random=randoms)
+def test_advance(package, random):
+    both, wild = equations(package), random.choice((0.0, 0.02, 0.3))
+    parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
+    state = value(both.state, random, wild)
+    t, h, n = number(random), random.random(), random.randrange(1, 5)
+    given = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": n}
+    kept, outputs = both.kept(state), structure(both.outputs)()
+    why = both.call("derive", filled(both.parameters, parameters), kept)
+    if both.derived:
+        derived = raised(lambda: both.python("derive", **given))
+        assert ((why, []) if why else outcome(kept.x1)) == derived
+        if why:
+            return
+        given["derived"] = both.python("derive", **given)
+    why = both.call(
+        "advance",
+        filled(both.parameters, parameters),
+        kept,
+        filled(both.inputs, inputs),
+        t,
+        h,
+        n,
+        outputs,
+    )
+    found = (why, []) if why else outcome([kept, outputs])
+    assert found == raised(lambda: both.python("advance", **given))
+
+
+@pytest.mark.parametrize(
+    "package", [p for name, p in components().items() if behaviour_of(name).hooks["expected"]]
+)
+@given(random=randoms)
+def test_expected(package, random):
+    both, wild = equations(package), random.choice((0.0, 0.02, 0.3))
+    parameters, state = value(both.parameters, random, wild), value(both.state, random, wild)
+    outputs = value(both.outputs, random, wild)
+    if hasattr(state, "quaternion") and random.random() < 0.5:
+        state = state._replace(quaternion=(0.6, 0.0, 0.8, 0.0))
+    found = structure(both.outputs)()
+    why = both.call(
+        "expected",
+        filled(both.parameters, parameters),
+        both.kept(state),
+        filled(both.outputs, outputs),
+        found,
+    )
+    given = {"parameters": parameters, "state": state, "outputs": outputs}
+    assert ((why, []) if why else outcome(found)) == raised(
+        lambda: both.python("expected", **given)
+    )
+
+
+@given(random=randoms)
+def test_restarts_of_the_observer(random):
+    both, wild = equations("fmus.observer_controller"), 0.0
+    parameters = value(both.parameters, random, wild)
+    state, inputs = value(both.state, random, wild), value(both.inputs, random, wild)
+    given = {"parameters": parameters, "state": state, "inputs": inputs}
+    kept = both.kept(state)
+    passed = filled(both.parameters, parameters), kept, filled(both.inputs, inputs)
+    assert bool(both.result("credible", *passed)) == both.python("credible", **given)
+    assert both.call("restart", *passed) == ""
+    assert outcome(kept) == outcome(both.python("restarted", **given))
+    text = both.library.restarted().decode() % 0.02
+    assert text == both.behaviour.RESTARTED.format(t=0.02)
+
+
+@given(random=randoms)
+def test_limits_that_leave_an_actuator_nothing(random):
+    both, wild = equations("fmus.auv_plant"), 0.3
+    parameters = value(both.parameters, random, wild)
+    why = both.call("check", filled(both.parameters, parameters))
+    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+
+
+@given(random=randoms, n=st.integers(0, MOST + 2), timed=st.booleans())
+def test_paths_are_refused_alike(random, n, timed):
+    """Most of them somewhere on the way; more waypoints than there are, for a place beyond them."""
+    both, default = equations("fmus.path_planner"), Parameters()
+    series = [tuple(random.uniform(-15.0, 15.0) for _ in range(MOST)) for _ in "xyz"]
+    t = tuple(sorted(random.uniform(0.0, 2000.0) for _ in range(MOST)))
+    flat_z = tuple(0.2 * z for z in series[2])
+    T = random.uniform(1.0, 40.0)
+    waypoints = Waypoints(n, *series[:2], flat_z, t, timed, random.uniform(0.05, 1.0), T)
+    parameters = default._replace(waypoints=waypoints)
+    why = both.call("check", filled(both.parameters, parameters))
+    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+
+
+@given(random=randoms)
+def test_noise_of_the_localisation(random):
+    both, wild = equations("fmus.auv_plant"), 0.3
+    parameters, outputs = value(both.parameters, random, wild), value(both.outputs, random, wild)
+    n = value(tuple[float, float, float], random, wild)
+    passed = filled(both.outputs, outputs)
+    both.library.measure(
+        byref(filled(both.parameters, parameters)), (c_double * 3)(*n), byref(passed)
+    )
+    measured = both.behaviour.measured(parameters, outputs["y"], n)
+    assert outcome(passed) == outcome({**outputs, "y": measured})
+
+
+@pytest.mark.parametrize("seed", [0, 1, -1, 2**31 - 1, -(2**31)])
+def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
+    both = equations("fmus.auv_plant")
+    parameters = structure(both.parameters)()
+    parameters.noise.seed = seed
+    both.library.seed.restype = c_ulong
+    assert both.library.seed(byref(parameters)) == seed % 2**32

@@ -77,8 +77,12 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
     [
         ("def advance", "def _advance", "has no advance"),
         ("class Outputs(TypedDict)", "class Output(TypedDict)", "has no Outputs"),
-        ("def _moved", "def moved", r"moved is none of the hooks check, begin, .*, expected$"),
-        ("advance(h: float,", "advance(h: float, dt: float,", "advance takes dt, which is none of"),
+        ("def _moved", "def moved", r"moved is not one of the hooks check, begin, .*, expected$"),
+        (
+            "advance(h: float,",
+            "advance(h: float, dt: float,",
+            "advance takes dt, which is not one of",
+        ),
         ("\n\ndef _moved", f"{SEED}\n\ndef _moved", "has seed, but no measured"),
         ("\n\ndef _moved", f"{MEASURED}\n\ndef _moved", "has measured, but no seed"),
         ("def _moved", "RESTARTED = 'again'\n\n\ndef _moved", "has RESTARTED, but no credible"),

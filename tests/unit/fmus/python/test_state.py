@@ -242,7 +242,7 @@ def test_reference_of_another_state_is_refused():
     driver.step()
     saved = driver.slave._get_fmu_state()
     driver.slave._set_fmu_state({**saved, "outputs": [1.0, *saved["outputs"][1:]]})
-    assert "not those of its state" in driver.messages()[0]
+    assert "do not belong to its state" in driver.messages()[0]
 
 
 def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
@@ -410,17 +410,17 @@ def test_json_gives_a_state_back(whole):
 @pytest.mark.parametrize(
     ("kind", "value", "why"),
     [
-        (Pair, [1.0], "[1.0] in the place of 2 values"),
-        (Pair, 1.0, "1.0 in the place of 2 values"),
-        (Pair, [1.0, [1.0, 2.0, 3.0]], "[1.0, 2.0, 3.0] in the place of 2 values"),
+        (Pair, [1.0], "[1.0] instead of 2 values"),
+        (Pair, 1.0, "1.0 instead of 2 values"),
+        (Pair, [1.0, [1.0, 2.0, 3.0]], "[1.0, 2.0, 3.0] instead of 2 values"),
         (float, nan, "a value is not finite"),
         (float, -inf, "a value is not finite"),
-        (float, True, "True is no float"),
-        (float, "x" * 99, f"'{'x' * 39} is no float"),
-        (int, 1.0, "1.0 is no int"),
-        (bool, 1, "1 is no bool"),
-        (str, None, "None is no str"),
-        (int | None, 1.5, "1.5 is no int, 1.5 is no NoneType"),
+        (float, True, "True is not of type float"),
+        (float, "x" * 99, f"'{'x' * 39} is not of type float"),
+        (int, 1.0, "1.0 is not of type int"),
+        (bool, 1, "1 is not of type bool"),
+        (str, None, "None is not of type str"),
+        (int | None, 1.5, "1.5 is not of type int, 1.5 is not of type NoneType"),
     ],
 )
 def test_what_is_of_another_shape_is_refused(kind, value, why):

@@ -68,7 +68,7 @@ def test_of_a_good_fmu_nothing_is_said(fmu):
         ("note", ('valueReference="1"', 'valueReference="0"'), "u p one"),
         ("note", ('<Real start="0"/>', '<Real start="0" unit="m"/>'), 'unit "m"'),
         ("note", ('causality="output"', 'causality="output" initial="exact"'), '"y"'),
-        ("to know", ("CommunicationStepSize", "CommunicationStep"), "steps one length"),
+        ("to know", ("CommunicationStepSize", "CommunicationStep"), "steps fixed length"),
         ("to know", ('canSerializeFMUstate="true"', 'needsExecutionTool="true"'), "program"),
         ("to know", ('canGetAndSetFMUstate="true" canSerializeFMUstate="true"', ""), "no state"),
         ("to know", (' dependencies="1"', ""), "depend all inputs"),

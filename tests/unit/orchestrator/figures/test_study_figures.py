@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.figures.study_figures import bands, best, draw_figures, influence, maps
+from orchestrator.figures.study_figures import bands, draw_figures, influence, maps, pareto_front
 from orchestrator.figures.study_values import Values
 from orchestrator.studies.study_file import read_figures
 from orchestrator.vehicle.indices import index_columns
@@ -75,7 +75,7 @@ def test_maps_are_medians_and_grey_where_no_run_has_any():
 
 def test_front_is_what_nothing_else_beats():
     points = np.random.default_rng(4).integers(0, 30, (200, 2)).astype(float)
-    found = {tuple(point) for point in best(points)}
+    found = {tuple(point) for point in pareto_front(points)}
     expected = {
         tuple(p) for p in points if not any((q <= p).all() and (q < p).any() for q in points)
     }

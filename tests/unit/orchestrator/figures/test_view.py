@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import extremes, page
+from orchestrator.figures.view import extremes, view_page
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import STANDARD
 from support.tables import loop_table
@@ -39,7 +39,7 @@ def test_thinned_lines_keep_their_extremes(values, divisions):
 def test_frames_are_those_of_the_run():
     """Position and attitude at each frame, from the table by the definition of R."""
     table = loop_table()
-    data = data_of(page("run", Drawn("run", table)))
+    data = data_of(view_page("run", Drawn("run", table)))
     frames = data["frames"]
     np.testing.assert_allclose(frames["time"], table.time, rtol=1e-5)
     for k in (0, 123, 399):
@@ -59,7 +59,7 @@ def test_frames_are_those_of_the_run():
 @pytest.mark.parametrize("z_up", [False, True])
 def test_body_is_upright_whichever_way_z_points(z_up):
     """In the picture: the upper fin is above the hull, and the axes are right-handed."""
-    data = data_of(page("run", Drawn("run", loop_table(), z_up)))
+    data = data_of(view_page("run", Drawn("run", loop_table(), z_up)))
     axes = [data["scene"]["layout"]["scene"][f"{k}axis"] for k in "xyz"]
     signs = np.sign([axis["range"][1] - axis["range"][0] for axis in axes])
     assert np.prod(signs) == 1.0
@@ -71,23 +71,25 @@ def test_body_is_upright_whichever_way_z_points(z_up):
 
 
 def test_what_is_missing_is_named_on_the_page():
-    text = page("run", Drawn("run", loop_table(without=STANDARD.theta_hat)))
+    text = view_page("run", Drawn("run", loop_table(without=STANDARD.theta_hat)))
     assert "estimated parameters left out: no controller.theta_hat[1]" in text
 
 
 def test_a_run_without_a_vehicle_has_no_page():
     with pytest.raises(InputError, match=r"no vehicle to show: no plant\.eta\.x"):
-        page("run", Drawn("run", loop_table(without=STANDARD.posture)))
+        view_page("run", Drawn("run", loop_table(without=STANDARD.posture)))
 
 
 def test_values_that_json_lacks_are_gaps():
     table = loop_table()
     table["plant.tau.u"][10:] = np.nan
-    values = [trace["y"] for trace in data_of(page("run", Drawn("run", table)))["series"]["traces"]]
+    values = [
+        trace["y"] for trace in data_of(view_page("run", Drawn("run", table)))["series"]["traces"]
+    ]
     assert any(None in y for y in values)
 
 
 def test_the_title_is_text_and_no_markup():
-    text = page("<script>alert(1)</script> {{data}}", Drawn("run", loop_table()))
+    text = view_page("<script>alert(1)</script> {{data}}", Drawn("run", loop_table()))
     assert "<script>alert(1)" not in text
     assert "&lt;script&gt;alert(1)&lt;/script&gt; {{data}}" in text

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from orchestrator.machine.cache import folder_of, keep, kept
+from orchestrator.machine.cache import category_folder, read_cached, write_cached
 from orchestrator.machine.disk import process_folder
 
 CONTENT = {"a.so": b"library", "b": b""}
@@ -37,20 +37,20 @@ def contents(found: dict[Path, bytes]) -> dict[str, bytes]:
 def is_refused(users: Path, culprit: Path) -> None:
     """Nothing is taken from the user's folder, and one line says why."""
     with pytest.warns(UserWarning, match="only you can write") as said:
-        found = kept("kind", "0")
+        found = read_cached("kind", "0")
     assert not any(path.is_relative_to(users) for path in found)
     assert str(culprit) in str(said[0].message)
     with pytest.warns(UserWarning, match="only you can write"):
-        [*paths] = keep("kind", "0", CONTENT)
+        [*paths] = write_cached("kind", "0", CONTENT)
     assert all(path.is_relative_to(process_folder()) for path in paths)
 
 
 def test_what_was_kept_is_found_again(users):
-    assert kept("kind", "0") == {}
+    assert read_cached("kind", "0") == {}
     assert not users.exists()
-    paths = keep("kind", "0", CONTENT)
-    assert kept("kind", "0") == dict(zip(paths, CONTENT.values(), strict=True))
-    assert kept("kind", "1") == kept("other", "0") == {}
+    paths = write_cached("kind", "0", CONTENT)
+    assert read_cached("kind", "0") == dict(zip(paths, CONTENT.values(), strict=True))
+    assert read_cached("kind", "1") == read_cached("other", "0") == {}
     assert all(path.is_relative_to(users / "auv-fmu" / "kind") for path in paths)
 
 
@@ -58,35 +58,35 @@ def test_what_was_kept_is_found_again(users):
 def test_nobody_else_may_enter_whatever_the_umask(users, umask):
     before = os.umask(umask)
     try:
-        keep("kind", "0", CONTENT)
+        write_cached("kind", "0", CONTENT)
     finally:
         os.umask(before)
     for path in (users, *users.rglob("*")):
         assert path.stat().st_mode & 0o077 == 0, path
-    assert contents(kept("kind", "0")) == CONTENT
+    assert contents(read_cached("kind", "0")) == CONTENT
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o702, 0o777, 0o1777])
 @pytest.mark.parametrize("folder", ["", "kind", "digests"])
 def test_a_folder_that_others_can_write_is_not_used(users, folder, mode):
-    keep("kind", "0", CONTENT)
+    write_cached("kind", "0", CONTENT)
     (users / "auv-fmu" / folder).chmod(mode)
     is_refused(users, users / "auv-fmu" / folder)
 
 
 def test_a_parent_by_which_others_could_swap_it_is_not_used(users):
-    keep("kind", "0", CONTENT)
+    write_cached("kind", "0", CONTENT)
     users.chmod(0o777)
     is_refused(users, users)
     # In folders such as /tmp they cannot.
     users.chmod(0o1777)
-    assert contents(kept("kind", "0")) == CONTENT
+    assert contents(read_cached("kind", "0")) == CONTENT
 
 
 @needs_root
 @pytest.mark.parametrize("folder", [".", "auv-fmu", "auv-fmu/kind", "auv-fmu/digests"])
 def test_a_folder_of_another_user_is_not_used(users, folder):
-    keep("kind", "0", CONTENT)
+    write_cached("kind", "0", CONTENT)
     os.chown(users / folder, STRANGER, STRANGER)
     is_refused(users, users / folder)
 
@@ -95,18 +95,18 @@ def test_a_folder_of_another_user_is_not_used(users, folder):
 @pytest.mark.parametrize("pattern", ["auv-fmu/kind/0-*", "auv-fmu/kind/*/a.so", "**/*.json"])
 @pytest.mark.parametrize("harm", ["owner", "mode"])
 def test_a_file_of_another_user_is_not_used(users, pattern, harm):
-    keep("kind", "0", CONTENT)
+    write_cached("kind", "0", CONTENT)
     [path] = users.glob(pattern)
     if harm == "owner":
         os.chown(path, STRANGER, STRANGER)
     else:
         path.chmod(0o666)
-    assert kept("kind", "0") == {}
+    assert read_cached("kind", "0") == {}
 
 
 @pytest.mark.parametrize("folder", ["", "kind", "digests"])
 def test_links_are_not_followed_out_of_it(users, tmp_path, folder):
-    keep("kind", "0", CONTENT)
+    write_cached("kind", "0", CONTENT)
     place = users / "auv-fmu" / folder
     place.rename(tmp_path / "elsewhere")
     place.symlink_to(tmp_path / "elsewhere")
@@ -116,8 +116,8 @@ def test_links_are_not_followed_out_of_it(users, tmp_path, folder):
 def test_the_users_own_links_to_it_are(users, tmp_path, monkeypatch):
     (tmp_path / "disk").mkdir(0o700)
     users.symlink_to("disk")
-    keep("kind", "0", CONTENT)
-    assert contents(kept("kind", "0")) == CONTENT
+    write_cached("kind", "0", CONTENT)
+    assert contents(read_cached("kind", "0")) == CONTENT
     assert (tmp_path / "disk" / "auv-fmu").is_dir()
     (tmp_path / "disk").chmod(0o777)
     is_refused(users, tmp_path / "disk")
@@ -128,7 +128,7 @@ def test_the_users_own_links_to_it_are(users, tmp_path, monkeypatch):
 def test_what_is_not_as_it_was_is_not_found_and_stays(users, tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("cache")
     os.environ["XDG_CACHE_HOME"] = str(folder)
-    paths = keep("kind", "0", CONTENT)
+    paths = write_cached("kind", "0", CONTENT)
     [record] = folder.rglob("*.json")
     path = data.draw(st.sampled_from([*paths, record]))
     old = path.read_bytes()
@@ -140,28 +140,28 @@ def test_what_is_not_as_it_was_is_not_found_and_stays(users, tmp_path_factory, d
         ).filter(lambda content: content != old)
     )
     path.write_bytes(new)
-    assert kept("kind", "0") == {}
-    assert keep("kind", "0", CONTENT) != paths
-    assert contents(kept("kind", "0")) == CONTENT
+    assert read_cached("kind", "0") == {}
+    assert write_cached("kind", "0", CONTENT) != paths
+    assert contents(read_cached("kind", "0")) == CONTENT
     assert path.read_bytes() == new
 
 
 def test_a_record_leads_nowhere_else(users, tmp_path):
-    keep("kind", "0", CONTENT)
+    write_cached("kind", "0", CONTENT)
     [record] = users.rglob("*.json")
     content = json.loads(record.read_text())
     (tmp_path / "a.so").write_bytes(CONTENT["a.so"])
     for folder, file in (("../../..", "a.so"), (str(tmp_path), "a.so"), ("x", "../../../../a.so")):
         digests = {file: content["sha256"]["a.so"]}
         record.write_text(json.dumps({"folder": folder, "sha256": digests}))
-        assert kept("kind", "0") == {}
+        assert read_cached("kind", "0") == {}
 
 
 def test_a_fifo_does_not_hold_it_up(users):
-    paths = keep("kind", "0", CONTENT)
+    paths = write_cached("kind", "0", CONTENT)
     paths[0].unlink()
     os.mkfifo(paths[0])
-    assert kept("kind", "0") == {}
+    assert read_cached("kind", "0") == {}
 
 
 @pytest.mark.parametrize("variables", [{"XDG_CACHE_HOME": "cache"}, {"HOME": "home"}, {"HOME": ""}])
@@ -170,9 +170,9 @@ def test_the_current_folder_is_none(workplace, monkeypatch, variables):
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     code = (
-        "from orchestrator.machine.cache import folder_of, kept\n"
-        "kept('loop', '0')\n"
-        "try: print(folder_of('loop'))\n"
+        "from orchestrator.machine.cache import category_folder, read_cached\n"
+        "read_cached('loop', '0')\n"
+        "try: print(category_folder('loop'))\n"
         "except OSError: pass\n"
     )
     command = [sys.executable, "-W", "ignore", "-c", code]
@@ -183,8 +183,8 @@ def test_the_current_folder_is_none(workplace, monkeypatch, variables):
 
 def test_a_cache_that_cannot_be_written_says_so(users):
     users.write_text("")
-    assert kept("kind", "0") == {}
+    assert read_cached("kind", "0") == {}
     with pytest.raises(OSError, match="cache"):
-        folder_of("kind")
+        category_folder("kind")
     with pytest.raises(OSError, match="cache"):
-        keep("kind", "0", CONTENT)
+        write_cached("kind", "0", CONTENT)

@@ -10,23 +10,23 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine import disk
-from orchestrator.machine.disk import claimed, process_folder, sealed
+from orchestrator.machine.disk import hold_lock, process_folder, sealed
 from support.machine import contents, ended, eventually, forked
 
 
 def test_what_a_process_has_claimed_is_kept_from_others_until_it_is_killed(tmp_path: Path):
     def work() -> None:
-        with claimed(tmp_path):
+        with hold_lock(tmp_path):
             (tmp_path / "held").touch()
             signal.pause()
 
     pid = forked(work)
     assert eventually((tmp_path / "held").exists)
-    with pytest.raises(BlockingIOError), claimed(tmp_path):
+    with pytest.raises(BlockingIOError), hold_lock(tmp_path):
         pass
     os.kill(pid, signal.SIGKILL)
     ended(pid)
-    with claimed(tmp_path):
+    with hold_lock(tmp_path):
         pass
 
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.machine.disk import sealed, unsealed
-from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, moved_aside
+from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, move_aside
 from orchestrator.system.names import file_name
 from support.machine import contents
 
@@ -71,7 +71,7 @@ def test_links_lead_nowhere(tmp_path: Path, name):
 )
 def test_a_list_that_is_none_of_ours_proves_nothing(tmp_path: Path, content):
     (tmp_path / LEDGER).write_text(content)
-    with pytest.raises(Taken, match="which files it wrote cannot be told"):
+    with pytest.raises(Taken, match="its own files are unknown"):
         Ledger(tmp_path)
     Ledger(tmp_path, force=True)
     assert (tmp_path / f"{LEDGER}.~1~").read_text() == content
@@ -140,12 +140,12 @@ def test_no_bit_of_a_ledger_is_changed_unseen(tmp_path: Path):
 def test_what_is_moved_aside_replaces_nothing(tmp_path: Path):
     for text in ("first", "second"):
         (tmp_path / "a").write_text(text)
-        moved_aside(tmp_path / "a")
+        move_aside(tmp_path / "a")
     (tmp_path / "a").mkdir()
     (tmp_path / "a" / "b").write_text("third")
-    moved_aside(tmp_path / "a")
+    move_aside(tmp_path / "a")
     (tmp_path / "a").symlink_to("nowhere")
-    moved_aside(tmp_path / "a")
+    move_aside(tmp_path / "a")
     assert contents(tmp_path) == {"a.~1~": b"first", "a.~2~": b"second", "a.~3~/b": b"third"}
     assert os.readlink(tmp_path / "a.~4~") == "nowhere"  # noqa: PTH115  # not what it leads to
 

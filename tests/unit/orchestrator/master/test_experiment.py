@@ -99,7 +99,7 @@ def test_an_unknown_order_is_refused():
 
 def test_a_step_of_a_component_may_be_beyond_all_multiples():
     system = replace(load("fig4", "native"), steps={"plant": 1e308})
-    with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are no multiple"):
+    with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are not a multiple"):
         decimations(system, 0.02)
 
 

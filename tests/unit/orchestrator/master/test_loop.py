@@ -11,7 +11,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master import loop
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.loop import PYTHON_LOOP, chosen, interpreted
+from orchestrator.master.loop import PYTHON_LOOP, choose_loop, step_interpreted
 from orchestrator.master.row import Gathering
 from orchestrator.master.schedule import Decimation, Stage, StageCall
 
@@ -45,13 +45,13 @@ def made(limit: float, experiment: Experiment) -> SimpleNamespace:
 
 def test_stages_come_one_after_the_other_and_slow_ones_when_they_are_due():
     run = made(99.0, Experiment(2.0, 0.5))
-    assert len(list(interpreted(run))) == run.made == 4
+    assert len(list(step_interpreted(run))) == run.made == 4
     assert run.rows == [[0.5, 0.5, 0, 0], [1, 1, 0.5, 0], [1.5, 1.5, 1, 1], [2, 2, 1.5, 1.5]]
 
 
 def test_a_row_that_is_not_finite_is_not_kept():
     run = made(1.5, Experiment(2.0, 0.5))
-    list(interpreted(run))
+    list(step_interpreted(run))
     assert run.made == len(run.rows) == 2
     assert np.isnan(run.row.values[0])
 
@@ -59,7 +59,7 @@ def test_a_row_that_is_not_finite_is_not_kept():
 def test_a_run_goes_on_after_the_steps_that_were_made():
     run = made(99.0, Experiment(2.0, 0.5))
     run.made = 2
-    list(interpreted(run))
+    list(step_interpreted(run))
     assert [row[0] for row in run.rows] == [1.5, 2.0]
 
 
@@ -67,14 +67,14 @@ def test_a_run_goes_on_after_the_steps_that_were_made():
 def library(monkeypatch: pytest.MonkeyPatch) -> object:
     """Compiled already."""
     found = object()
-    monkeypatch.setattr(loop, "kept", lambda: found)
+    monkeypatch.setattr(loop, "load_stepper", lambda: found)
     return found
 
 
 def test_the_compiled_loop_is_taken_where_it_pays(library: object):
-    assert chosen("auto", SHORT) == chosen("python", LONG) == PYTHON_LOOP
-    assert chosen("auto", LONG).name == chosen("compiled", SHORT).name == "compiled"
-    assert chosen("auto", LONG, Isolation()) == PYTHON_LOOP
+    assert choose_loop("auto", SHORT) == choose_loop("python", LONG) == PYTHON_LOOP
+    assert choose_loop("auto", LONG).name == choose_loop("compiled", SHORT).name == "compiled"
+    assert choose_loop("auto", LONG, Isolation()) == PYTHON_LOOP
 
 
 @pytest.mark.parametrize(
@@ -82,4 +82,4 @@ def test_the_compiled_loop_is_taken_where_it_pays(library: object):
 )
 def test_what_is_no_loop_is_refused(library: object, name, isolation, word):
     with pytest.raises(InputError, match=word):
-        chosen(name, LONG, isolation)
+        choose_loop(name, LONG, isolation)

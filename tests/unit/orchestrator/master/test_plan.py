@@ -20,8 +20,8 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.events import Event, Stop
 from orchestrator.master.hooks.timing import InputTable
-from orchestrator.master.loop import chosen
-from orchestrator.master.plan import delays, digest_of, gathered, planned, stages
+from orchestrator.master.loop import choose_loop
+from orchestrator.master.plan import delays, digest_of, gathered_connections, make_plan, stages
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import Request
 from orchestrator.system.component import Component
@@ -100,12 +100,12 @@ def test_what_opens_a_ring_is_said(relays):
 def test_inputs_are_gathered_before_the_stage_that_needs_them(
     relays, wires, order, latest, expected
 ):
-    found = gathered(relays(wires), ["a", "b", "c"], order=order, latest=latest)
+    found = gathered_connections(relays(wires), ["a", "b", "c"], order=order, latest=latest)
     assert [[str(wire.target) for wire in wires] for wires in found] == expected
 
 
 def test_a_solved_ring_gathers_by_itself(relays):
-    assert gathered(relays(RING), [["a", "b"], ["c"]], [["a", "b"]]) == [[], []]
+    assert gathered_connections(relays(RING), [["a", "b"], ["c"]], [["a", "b"]]) == [[], []]
 
 
 @pytest.mark.parametrize(
@@ -114,22 +114,22 @@ def test_a_solved_ring_gathers_by_itself(relays):
 )
 def test_what_cannot_be_run_is_refused_by_name(relays, steps, experiment, word):
     with pytest.raises(InputError, match=word):
-        planned(replace(relays(CHAIN), steps=steps), experiment)
+        make_plan(replace(relays(CHAIN), steps=steps), experiment)
 
 
 def test_a_step_of_a_component_is_a_number_of_those_of_the_run(relays):
     system = replace(relays(CHAIN), steps={"b": 0.25})
-    assert planned(system, EXPERIMENT).decimations == {"a": 1, "b": 2, "c": 1}
+    assert make_plan(system, EXPERIMENT).decimations == {"a": 1, "b": 2, "c": 1}
 
 
 def test_an_fmu_of_one_step_length_ends_with_its_last_whole_step(relays, monkeypatch):
     monkeypatch.setattr(Component, "takes_any_step", False)
-    plan = planned(relays(CHAIN), Experiment(1.05, 0.125))
+    plan = make_plan(relays(CHAIN), Experiment(1.05, 0.125))
     assert plan.experiment.stop_time == 1.0
     assert mentions(" ".join(plan.remarks), "a, b, c 1 s")
-    assert planned(relays(CHAIN), EXPERIMENT).remarks == ()
+    assert make_plan(relays(CHAIN), EXPERIMENT).remarks == ()
     with pytest.raises(InputError, match=r"0\.125 s"):
-        planned(relays(CHAIN), Experiment(0.1, 0.125))
+        make_plan(relays(CHAIN), Experiment(0.1, 0.125))
 
 
 @cache
@@ -286,7 +286,7 @@ def made_in_another_way(run: Prepared, choice: Choice) -> Prepared:
         run,
         scenario=replace(run.scenario, name="another", title="Another", digest="1234"),
         isolation=choice.random.choice([None, Isolation(20.0)]),
-        loop=chosen(choice.random.choice(["python", "auto"]), run.experiment),
+        loop=choose_loop(choice.random.choice(["python", "auto"]), run.experiment),
         real_time=choice.random.choice([None, 1.0]),
     )
 

@@ -12,8 +12,8 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import completed, simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan, simulate_to_end
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
@@ -50,7 +50,7 @@ class Watching:
 
 def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System):
     table = Table()
-    ending = simulate(planned(system, EXPERIMENT), [table])
+    ending = simulate_plan(make_plan(system, EXPERIMENT), [table])
     assert (ending.failure, ending.messages, len(table)) == (None, (), 9)
     np.testing.assert_array_equal(table.time, 0.125 * np.arange(9))
     np.testing.assert_allclose(table["sine.y0"], np.sin(table.time), atol=1e-12)
@@ -60,7 +60,7 @@ def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System
 
 def test_observers_are_told_header_rows_and_end(system: System):
     told: list[object] = []
-    ending = simulate(planned(system, EXPERIMENT), [Watching(told)])
+    ending = simulate_plan(make_plan(system, EXPERIMENT), [Watching(told)])
     header, *blocks, last = told
     assert header.parameters[port_name("sine.x1")] == 1.0
     assert header.experiment == EXPERIMENT
@@ -71,7 +71,7 @@ def test_observers_are_told_header_rows_and_end(system: System):
 def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
     told: list[object] = []
     with pytest.raises(ValueError, match="no room"):
-        simulate(planned(system, EXPERIMENT), [Watching(told), Watching([], fails=True)])
+        simulate_plan(make_plan(system, EXPERIMENT), [Watching(told), Watching([], fails=True)])
     header, ending = told
     assert isinstance(header, Header) and mentions(ending.failure, "no room")
 
@@ -79,11 +79,11 @@ def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
 def test_a_value_that_is_not_finite_ends_the_run_before_its_row(system: System):
     table = Table()
     grows = system.with_parameters({port_name("sine.A00"): 1e308, port_name("sine.x0"): 1.0})
-    ending = simulate(planned(grows, EXPERIMENT), [table])
+    ending = simulate_plan(make_plan(grows, EXPERIMENT), [table])
     assert mentions(ending.failure, "0.125 sine.y0")
     assert len(table) == 1
     with pytest.raises(InputError, match="sine"):
-        completed(planned(grows, EXPERIMENT))
+        simulate_to_end(make_plan(grows, EXPERIMENT))
 
 
 @pytest.mark.parametrize("frozen", [False, True], ids=["not hashable", "equal"])
@@ -97,5 +97,5 @@ def test_every_hook_is_called_whatever_it_is(system: System, frozen: bool):
             return run.made + self.steps
 
     called: list[tuple[int, int]] = []
-    simulate(planned(system, EXPERIMENT), hooks=[Every(3), Every(4), Every(3)])
+    simulate_plan(make_plan(system, EXPERIMENT), hooks=[Every(3), Every(4), Every(3)])
     assert called == [(0, 3), (0, 4), (0, 3), (3, 3), (3, 3), (4, 4), (6, 3), (6, 3), (8, 4)]

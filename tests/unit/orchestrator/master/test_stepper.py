@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.machine import children
-from orchestrator.machine.cache import keep
+from orchestrator.machine.cache import write_cached
 from orchestrator.machine.errors import InputError
 from orchestrator.master import loop, stepper
 from orchestrator.master.experiment import Experiment
@@ -47,27 +47,27 @@ def steps(n: int) -> Experiment:
 
 @needs_compiler
 def test_auto_compiles_for_many_steps_and_then_takes_it_for_fewer(cache):
-    assert loop.chosen("auto", steps(100)).name == "python"
+    assert loop.choose_loop("auto", steps(100)).name == "python"
     assert not cache.exists()
-    assert loop.chosen("auto", steps(100_000)).name == "compiled"
+    assert loop.choose_loop("auto", steps(100_000)).name == "compiled"
     assert len(list(cache.iterdir())) == 1
-    assert loop.chosen("auto", steps(100)).name == "compiled"
-    assert loop.chosen("auto", steps(1)).name == "python"
+    assert loop.choose_loop("auto", steps(100)).name == "compiled"
+    assert loop.choose_loop("auto", steps(1)).name == "python"
 
 
 def test_without_a_compiler_auto_is_silent_and_compiled_says_what_to_install(no_compiler):
-    assert loop.chosen("auto", steps(100_000)).name == "python"
+    assert loop.choose_loop("auto", steps(100_000)).name == "python"
     with pytest.raises(InputError, match=r"install gcc or clang, or `pip install ziglang`$"):
-        loop.chosen("compiled", steps(1))
+        loop.choose_loop("compiled", steps(1))
 
 
 @needs_compiler
 def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    assert loop.chosen("auto", steps(100_000)).name == "python"
+    assert loop.choose_loop("auto", steps(100_000)).name == "python"
     with pytest.raises(InputError, match=r"the loop cannot be compiled: .*/file") as error:
-        loop.chosen("compiled", steps(1))
+        loop.choose_loop("compiled", steps(1))
     assert "\n" not in str(error.value)
 
 
@@ -80,9 +80,9 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
     compiler.write_text(f"#!/bin/sh\necho first >&2\nprintf '{said}' >&2\nexit 1\n")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
-    assert loop.chosen("auto", steps(100_000)).name == "python"
+    assert loop.choose_loop("auto", steps(100_000)).name == "python"
     with pytest.raises(InputError, match=f"the loop cannot be compiled: {heard}"):
-        loop.chosen("compiled", steps(1))
+        loop.choose_loop("compiled", steps(1))
     assert list(cache.iterdir()) == []
 
 
@@ -90,14 +90,14 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
 @pytest.mark.parametrize("length", [3000, *slow(0, 100, -1)])
 def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
     # In another process: this one would hold on to the library.
-    code = "from orchestrator.master import stepper; print(stepper.made()._name)"
+    code = "from orchestrator.master import stepper; print(stepper.compile_stepper()._name)"
     [place] = map(Path, subprocess.check_output([sys.executable, "-c", code]).decode().split())
     content = place.read_bytes()
     place.write_bytes(content[:length])
     loaded = []
     monkeypatch.setattr(stepper, "CDLL", lambda path: loaded.append(path) or CDLL(path))
-    assert stepper.kept() is None
-    assert stepper.made().advance
+    assert stepper.load_stepper() is None
+    assert stepper.compile_stepper().advance
     assert loaded and str(place) not in loaded
     # Whatever that is, it is not ours to overwrite.
     assert place.read_bytes() == content[:length]
@@ -109,9 +109,9 @@ def test_a_library_without_the_function_is_no_library(cache, tmp_path):
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
     subprocess.run(["cc", "-shared", "-o", other, source], check=True)
-    keep("loop", stepper._key(), {"stepper.so": other.read_bytes()})
-    assert stepper.kept() is None
-    assert stepper.made().advance
+    write_cached("loop", stepper._key(), {"stepper.so": other.read_bytes()})
+    assert stepper.load_stepper() is None
+    assert stepper.compile_stepper().advance
 
 
 @needs_compiler
@@ -120,7 +120,7 @@ def test_what_others_have_in_the_cache_stays(cache):
     for path in own:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         path.write_text("mine")
-    stepper.made()
+    stepper.compile_stepper()
     assert [path.read_text() for path in own] == ["mine"] * 3
 
 
@@ -132,7 +132,7 @@ def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monke
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setattr("orchestrator.machine.children._LIMIT", 0.5)
     with pytest.raises(InputError, match=r"cannot be compiled: .*/cc has not ended after 0\.5 s$"):
-        stepper.made()
+        stepper.compile_stepper()
     session = int((tmp_path / "session").read_text())
     assert eventually(lambda: not members(session))
 
@@ -144,7 +144,7 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
         f'#!/bin/sh\necho compiled >> {tmp_path}/log\nexec {shutil.which("cc")} "$@"\n'
     )
     (tmp_path / "cc").chmod(0o755)
-    code = "from orchestrator.master import stepper; stepper.made().advance"
+    code = "from orchestrator.master import stepper; stepper.compile_stepper().advance"
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
     processes = [
         subprocess.Popen([sys.executable, "-P", "-c", code], env=environment) for _ in range(4)
@@ -167,6 +167,6 @@ def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
     pytest.importorskip("ziglang", reason="ziglang is not installed")
     monkeypatch.setattr(children.shutil, "which", lambda _: None)
     with pytest.raises(InputError):
-        stepper.made(in_no_time=True)
-    assert stepper.made().advance
-    assert stepper.kept() is not None
+        stepper.compile_stepper(in_no_time=True)
+    assert stepper.compile_stepper().advance
+    assert stepper.load_stepper() is not None

@@ -10,7 +10,7 @@ from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.kept_runs import KeptRuns, key_of
 from orchestrator.paper.sections import as_request
-from orchestrator.runs.preparation import prepared_of, with_companion
+from orchestrator.runs.preparation import prepare_request, with_companion
 from orchestrator.runs.request import Request
 from support.runs import InThisProcess
 
@@ -35,7 +35,7 @@ def test_label_is_what_the_user_types(run, label):
 
 
 def companions(run):
-    own, *rest = with_companion(prepared_of(run), run)
+    own, *rest = with_companion(prepare_request(run), run)
     return [as_request(one, own, run) for one in rest]
 
 
@@ -57,11 +57,11 @@ def test_a_scenario_and_its_companion_are_run_as_it_says(tmp_path):
     )
     run = Request(str(own))
     [companion] = companions(run)
-    for one in (prepared_of(run), prepared_of(companion)):
+    for one in (prepare_request(run), prepare_request(companion)):
         assert one.experiment.order == "jacobi"
         assert one.system.steps == {"controller": 0.2}
-    [as_one] = with_companion(prepared_of(run), run)[1:]
-    assert prepared_of(companion).identity == as_one.identity
+    [as_one] = with_companion(prepare_request(run), run)[1:]
+    assert prepare_request(companion).identity == as_one.identity
     assert companion.command_line == (
         "fig5-pd --stop-time 1 --order jacobi --set planner.eta0.z=-2 (steps: controller = 0.2 s)"
     )
@@ -72,9 +72,9 @@ def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
     copy.write_text('title = "Another"\nstop_time = 100.0\n')
     slow = tmp_path / "slow.toml"
     slow.write_text("stop_time = 100.0\n[steps]\ncontroller = 0.2\n")
-    key = key_of(prepared_of(Request("fig4")))
-    assert key_of(prepared_of(Request("fig4", {"plant.noise.std": 0.001}))) == key
-    assert key_of(prepared_of(Request(str(copy), {"plant.noise.std": 0.001}))) == key
+    key = key_of(prepare_request(Request("fig4")))
+    assert key_of(prepare_request(Request("fig4", {"plant.noise.std": 0.001}))) == key
+    assert key_of(prepare_request(Request(str(copy), {"plant.noise.std": 0.001}))) == key
     others = [
         QUIET,
         Request("fig4", order="jacobi"),
@@ -84,7 +84,7 @@ def test_keys_tell_what_is_run_and_not_how_it_is_called(tmp_path):
         Request("fig5-pd"),
         Request(str(slow)),
     ]
-    assert len({key, *(key_of(prepared_of(run)) for run in others)}) == 1 + len(others)
+    assert len({key, *(key_of(prepare_request(run)) for run in others)}) == 1 + len(others)
 
 
 def test_equal_runs_are_made_once_and_used_again(tmp_path):
@@ -146,4 +146,4 @@ def test_a_run_that_cannot_be_made_says_why(tmp_path):
 
 def test_every_run_of_claims_and_effects_can_be_made():
     for run in {run for each in (*CLAIMS, *EFFECTS) for run in each.runs}:
-        prepared_of(run)
+        prepare_request(run)

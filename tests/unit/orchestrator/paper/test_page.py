@@ -8,12 +8,12 @@ import pytest
 from orchestrator.paper.page import (
     actuator_values,
     contents,
+    escape_markdown,
     headings,
     html,
     linked,
     numbers,
     picture,
-    plain,
     readings,
     table,
 )
@@ -61,7 +61,9 @@ def test_pictures_are_within_the_page_and_lead_to_their_files(tmp_path):
     "text", ["<b>bold</b>", "a | b", "*x*, _y_ and __z__", "[l](http://x)", "`c`", "1 # 2", "A_f_d"]
 )
 def test_texts_of_strangers_are_texts(text, tmp_path):
-    page = html(f"# T\n\n## {plain(text)}\n\n" + table(["c"], [[plain(text)]]), tmp_path)
+    page = html(
+        f"# T\n\n## {escape_markdown(text)}\n\n" + table(["c"], [[escape_markdown(text)]]), tmp_path
+    )
     escaped = text.replace("<", "&lt;").replace(">", "&gt;")
     assert f">{escaped}</h2>" in page
     assert f">{escaped}</td>" in page

@@ -8,7 +8,7 @@ import pytest
 
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.kept_runs import KeptRun
-from orchestrator.paper.sections import draw_section, sections, written
+from orchestrator.paper.sections import draw_section, section_text, sections
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.system.names import port_name
@@ -71,7 +71,7 @@ def test_labels_of_a_comparison_are_apart(tmp_path):
 
 def test_a_section_has_its_numbers_with_units_and_its_command(tmp_path):
     [section] = sections(["fig7a"])
-    text = "\n\n".join(written(section, Known(INDICES), ["no velocity"], tmp_path))
+    text = "\n\n".join(section_text(section, Known(INDICES), ["no velocity"], tmp_path))
     assert text.startswith("### Fig. 7(a): proposed controller under A_f = 1, A_d = 2\n")
     assert "| L2 effort (u, q, r) | 1 N·√s; 2, 3 N·m·√s |" in text
     assert "| share of saturated steps (u, q, r) | 0, 0.5, 1 |" in text
@@ -87,13 +87,13 @@ def test_what_is_ours_may_be_anything(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('[wires]\n"a.b" = "c.d"\n[ours]\nwires = "w"\nlegend = "l"\nx.y = "z"\n')
     [section] = sections([str(file)])
-    text = "\n\n".join(written(section, Known({"failure": "no"}), [], tmp_path))
+    text = "\n\n".join(section_text(section, Known({"failure": "no"}), [], tmp_path))
     assert text.endswith("- `wires`: w\n- `legend`: l\n- `x.y`: z")
 
 
 def test_a_failure_is_said(tmp_path):
     [section] = sections(["fig3a"])
-    text = "\n\n".join(written(section, Known({"failure": "the <sea> is dry"}), [], tmp_path))
+    text = "\n\n".join(section_text(section, Known({"failure": "the <sea> is dry"}), [], tmp_path))
     assert r"**The run fig3a ended early:** the \<sea\> is dry" in text
 
 

@@ -24,7 +24,7 @@ from orchestrator.paper.choices import (
 from orchestrator.paper.measures import Approach, errors, numbers_of
 from orchestrator.paper.printed_table import section, write_variants
 from orchestrator.paper.variants import moved
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
@@ -258,7 +258,7 @@ def test_every_combination_has_a_row_as_it_is_read_best(tmp_path):
 
 def test_starts_are_moved_by_no_more_than_is_said():
     """From where the variant itself starts, by the number of the start, and else nothing."""
-    engine = BatchEngine({PD: loaded(PD)[1]})
+    engine = BatchEngine({PD: load_scenario(PD)[1]})
     for options, start in (({}, (2.0, 6.0, 0.0)), ({"plant.eta0.y": -3.0}, (2.0, -3.0, 0.0))):
         run = Point(0, PD, {"plant.roll": False, **options}, 200.0, 0.02)
         starts = []
@@ -297,7 +297,7 @@ def scenarios_and_options():
             *OF_RUNS,
             *(each for each in OF_RUNS_OF_FIVE if each.options == (FIVE_DEGREES,)),
         ):
-            for option in choices.options_of(choice, scenario):
+            for option in choices.choice_options(choice, scenario):
                 if option.parameters:
                     yield pytest.param(scenario, option, id=f"{scenario}-{option.text}")
 
@@ -305,7 +305,7 @@ def scenarios_and_options():
 @pytest.mark.parametrize(("scenario", "option"), list(scenarios_and_options()))
 def test_every_option_changes_the_system(scenario, option):
     """Each parameter is there, takes the value, and has another one in the scenario."""
-    system = prepare(*loaded(scenario), Request()).system
+    system = prepare(*load_scenario(scenario), Request()).system
     for name, value in option.parameters.items():
         assert system.value(port_name(name)) != value
         changed = system.with_parameters({port_name(name): value})

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import build, current_fmus, settings_of
+from orchestrator.runs.bundle import build_bundle, current_fmus, settings_of
 
 
 @pytest.fixture
@@ -23,23 +23,23 @@ def folder(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_what_is_up_to_date_is_not_written_again(folder: Path):
     before = {path: path.stat().st_mtime_ns for path in folder.iterdir()}
-    assert build(folder) == []
+    assert build_bundle(folder) == []
     assert {path: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
 def test_what_is_missing_or_stale_is_written(folder: Path):
     whole = (folder / "auv.ssp").read_bytes()
     (folder / "auv.ssp").unlink()
-    assert build(folder) == [folder / "auv.ssp"]
+    assert build_bundle(folder) == [folder / "auv.ssp"]
     assert (folder / "auv.ssp").read_bytes() == whole
 
 
 def test_a_file_that_was_changed_since_is_the_users(folder: Path):
     (folder / "SHA256SUMS").write_text("mine")
     with pytest.raises(InputError, match="SHA256SUMS"):
-        build(folder)
+        build_bundle(folder)
     assert (folder / "SHA256SUMS").read_text() == "mine"
-    assert build(folder, force=True) == [folder / "SHA256SUMS"]
+    assert build_bundle(folder, force=True) == [folder / "SHA256SUMS"]
     assert "mine" in {path.read_bytes().decode("latin-1") for path in folder.iterdir()}
 
 
@@ -63,7 +63,7 @@ def test_a_build_that_fails_leaves_what_was_there(folder: Path, monkeypatch: pyt
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
     monkeypatch.setattr(bundle, "run_fmus", fails)
     with pytest.raises(InputError, match="no compiler"):
-        build(folder)
+        build_bundle(folder)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
 
 

@@ -15,8 +15,8 @@ from shutil import rmtree
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.ledger import LEDGER, RECORD, located
-from orchestrator.runs.folder import opened, replaced
+from orchestrator.machine.ledger import LEDGER, RECORD, locate
+from orchestrator.runs.folder import open_ledger, replace_files
 from support.machine import contents, ended, forked, killed_at
 
 
@@ -27,7 +27,7 @@ def write(
     failure: str | None = None,
     keep: Callable[[], bool] = lambda: False,
 ) -> None:
-    with replaced(folder, keep=keep) as unfinished:
+    with replace_files(folder, keep=keep) as unfinished:
         for name in names:
             (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
             (unfinished / name).write_text(text)
@@ -39,14 +39,14 @@ def write(
 def write_half(
     folder: Path, error: BaseException, keep: Callable[[], bool] = lambda: False
 ) -> None:
-    with replaced(folder, keep=keep) as unfinished:
+    with replace_files(folder, keep=keep) as unfinished:
         (unfinished / "a.csv").write_text("rows so far")
         raise error
 
 
 def settle(folder: Path) -> None:
     """Go on with what a killed process has begun, as the next command does."""
-    with opened(folder):
+    with open_ledger(folder):
         pass
 
 
@@ -56,9 +56,9 @@ def files(folder: Path) -> set[str]:
 
 def seen(folder: Path) -> dict[str, bytes]:
     """The result as the commands see it that only read; empty, where there is no record."""
-    record = located(folder / RECORD)
+    record = locate(folder / RECORD)
     names = json.loads(record.read_text())["files"] if record.is_file() else []
-    return {name: located(folder / name).read_bytes() for name in names}
+    return {name: locate(folder / name).read_bytes() for name in names}
 
 
 def test_earlier_files_go_and_those_of_others_stay(tmp_path: Path):
@@ -79,14 +79,14 @@ def test_after_an_exception_everything_is_as_it_was(tmp_path: Path):
 
 
 def test_a_folder_that_was_made_for_nothing_goes(tmp_path: Path):
-    with pytest.raises(InputError, match="no scenario"), replaced(tmp_path / "r"):
+    with pytest.raises(InputError, match="no scenario"), replace_files(tmp_path / "r"):
         raise InputError("no scenario")
     assert not (tmp_path / "r").exists()
 
 
 def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path):
     def killed() -> None:
-        with replaced(tmp_path / "r") as unfinished:
+        with replace_files(tmp_path / "r") as unfinished:
             (unfinished / "result.csv").write_text("half")
             os.kill(os.getpid(), signal.SIGKILL)
 
@@ -100,8 +100,8 @@ def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path):
 def test_second_run_into_the_same_folder_is_refused(tmp_path: Path):
     other = (
         "from pathlib import Path\n"
-        "from orchestrator.runs.folder import replaced\n"
-        f"with replaced(Path({str(tmp_path / 'r')!r})): print('in', flush=True); input()\n"
+        "from orchestrator.runs.folder import replace_files\n"
+        f"with replace_files(Path({str(tmp_path / 'r')!r})): print('in', flush=True); input()\n"
     )
     with subprocess.Popen(
         [sys.executable, "-P", "-c", other],
@@ -224,7 +224,7 @@ def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
         # Just before the first file is moved.
         assert killed_at(1, lambda: write(folder, "a.csv", "new.png"), ["replace"])
         assert (folder / "a.csv").read_text() == "old"
-        assert located(folder / "a.csv").read_text() == "new"
+        assert locate(folder / "a.csv").read_text() == "new"
 
     n = 0
     while True:
@@ -305,6 +305,6 @@ def test_a_folder_in_the_way_changes_nothing(tmp_path: Path):
 def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
     """An export into the folder of a run."""
     write(tmp_path / "r", "a.csv", text="whole")
-    with replaced(tmp_path / "r") as unfinished:
+    with replace_files(tmp_path / "r") as unfinished:
         (unfinished / "fig4.ssp").write_text("exported")
     assert files(tmp_path / "r") == {"a.csv", RECORD, "fig4.ssp"}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load, loaded
+from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
@@ -148,8 +148,8 @@ def test_other_tables_have_other_digests(tmp_path):
         ("time\n0\n", "holds no inputs"),
         ("time,plant.tau.u\n", "holds no inputs"),
         ("time,plant.tau.u\n0,nan\n", "must be finite"),
-        ("time,plant.tau.u\n1,1\n0,1\n", "times must not fall"),
-        ("time,plant.tau.u\n-1e308,1\n1e308,1\n", "must lie less than 1e+308 s apart"),
+        ("time,plant.tau.u\n1,1\n0,1\n", "times must not decrease"),
+        ("time,plant.tau.u\n-1e308,1\n1e308,1\n", "must be less than 1e+308 s apart"),
         ("time,plant.tau.u,plant.tau.u\n0,1,1\n", "two columns have the same name"),
         ("time,plant.tau.x\n0,1\n", "did you mean"),
         ("time,plant.eta.x\n0,1\n", "of causality output"),
@@ -170,11 +170,11 @@ def test_an_input_that_is_fed_is_refused(tmp_path):
 
 
 def test_a_value_beside_the_table_is_refused(tmp_path):
-    with pytest.raises(InputError, match="beside the table"):
+    with pytest.raises(InputError, match="a column of the table"):
         read_table(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
     # On the command line it wins over what the scenario has.
     inputs = tmp_path / "inputs.csv"
-    prepared = prepare(*loaded("fig3a", "native"), Request(kind="native", inputs=inputs))
+    prepared = prepare(*load_scenario("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
     assert np.array_equal(prepared.input_table.values, [[1.0]])
 

@@ -22,7 +22,7 @@ pytest.importorskip("distributed", reason="needs the extra `cluster`")
 from dask import config
 
 from orchestrator.machine.errors import InputError
-from orchestrator.studies.sweep import making
+from orchestrator.studies.sweep import making_runs
 
 TESTS = Path(__file__).parents[3]
 
@@ -73,7 +73,7 @@ def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler,
     address, _ = scheduler
     runs = [run(number) for number in range(100)]
     with worker(address, tmp_path) as lost, ExitStack() as stack:
-        blocks = stack.enter_context(making(Toy(0.05), iter(runs), scheduler=address))
+        blocks = stack.enter_context(making_runs(Toy(0.05), iter(runs), scheduler=address))
         first = next(blocks)
         lost.kill()
         stack.enter_context(worker(address, tmp_path))
@@ -89,7 +89,7 @@ def test_a_scheduler_that_goes_is_said(scheduler, tmp_path):
     with (
         gives_up_after(5.0),
         worker(address, tmp_path),
-        making(Toy(0.05), map(run, count()), scheduler=address) as blocks,
+        making_runs(Toy(0.05), map(run, count()), scheduler=address) as blocks,
     ):
         next(blocks)
         process.kill()
@@ -109,7 +109,7 @@ def test_who_cannot_make_runs_is_said_in_a_line(means, text):
     with (
         gives_up_after(0.5),
         pytest.raises(InputError, match=f"^{re.escape(text)}"),
-        making(Toy(), [], **means),
+        making_runs(Toy(), [], **means),
     ):
         pass
 
@@ -124,11 +124,11 @@ def test_no_address_leaves_anything_to_wait_for():
     ]  # fmt: skip
     code = (
         "from orchestrator.machine.errors import InputError\n"
-        "from orchestrator.studies.sweep import making\n"
+        "from orchestrator.studies.sweep import making_runs\n"
         "from support.toy_engine import Toy\n"
         f"for address in {addresses}:\n"
         "    try:\n"
-        "        with making(Toy(), [], scheduler=address): pass\n"
+        "        with making_runs(Toy(), [], scheduler=address): pass\n"
         "    except InputError as error: print(error)\n"
     )
     process = subprocess.run(
@@ -147,6 +147,6 @@ def test_who_answers_and_says_nothing_is_no_scheduler():
         with (
             gives_up_after(0.5),
             pytest.raises(InputError, match=r"^no scheduler answers"),
-            making(Toy(), [], scheduler=address),
+            making_runs(Toy(), [], scheduler=address),
         ):
             pass

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS
@@ -21,7 +21,7 @@ qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 
 def space(**content: Any) -> Space:
     study = study_of("mine", {"scenario": "fig5", **content})
-    return Space(study, {name: loaded(name) for name in study.scenario})
+    return Space(study, {name: load_scenario(name) for name in study.scenario})
 
 
 def test_grid_is_every_combination_whose_last_value_changes_fastest():

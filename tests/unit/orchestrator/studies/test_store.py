@@ -15,7 +15,7 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.studies.engine import Outcome
-from orchestrator.studies.store import StudyResult, read_record, store
+from orchestrator.studies.store import StudyResult, open_store, read_study_record
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
 
@@ -44,15 +44,15 @@ def outcome(number: int) -> Outcome:
 
 
 def check_refused(words: str, folder: Path, record: Mapping[str, Any] = RECORD):
-    with pytest.raises(InputError, match=words), store(folder, record, index_columns()):
+    with pytest.raises(InputError, match=words), open_store(folder, record, index_columns()):
         raise AssertionError
 
 
 def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
-    with store(tmp_path / "new", RECORD, index_columns()) as first:
+    with open_store(tmp_path / "new", RECORD, index_columns()) as first:
         assert list(first.missing(6)) == [0, 1, 2, 3, 4, 5]
         first.add([outcome(4), outcome(1)])
-    with store(tmp_path / "new", RECORD, index_columns()) as second:
+    with open_store(tmp_path / "new", RECORD, index_columns()) as second:
         assert len(second) == 2
         assert list(second.missing(6)) == [0, 2, 3, 5]
         missing = second.missing(6)
@@ -67,7 +67,7 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     odd = dict.fromkeys(index_columns(), 0.1 + 0.2) | {"late_error": -0.0, "largest_speed": np.inf}
     del odd["time_to_reach"]
     outcomes = [outcome(3), Outcome(1, {}, "stopped at t = 1 s: it would"), outcome(2)]
-    with store(tmp_path, RECORD, index_columns()) as unfinished:
+    with open_store(tmp_path, RECORD, index_columns()) as unfinished:
         unfinished.add(outcomes)
         unfinished.add([Outcome(0, odd)])
         unfinished.publish(Toys(4))
@@ -88,7 +88,7 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
 
 
 def test_result_gives_columns_and_suggests_names(tmp_path):
-    with store(tmp_path, RECORD | {"runs": 2}, index_columns()) as unfinished:
+    with open_store(tmp_path, RECORD | {"runs": 2}, index_columns()) as unfinished:
         unfinished.add([outcome(1), Outcome(0, {}, "it would not")])
         unfinished.publish(Toys(2))
     result = StudyResult(tmp_path)
@@ -97,30 +97,30 @@ def test_result_gives_columns_and_suggests_names(tmp_path):
     assert result["late_error"][1] == outcome(1).indices["late_error"]
     assert list(result["failure"]) == ["it would not", None]
     assert dict(result).keys() == set(result)
-    assert result.record == read_record(tmp_path)
+    assert result.record == read_study_record(tmp_path)
     assert repr(result) == f"<StudyResult {tmp_path.name}: 2 runs, 1 failed>"
     with pytest.raises(KeyError, match="no column 'late_eror'; did you mean late_error"):
         result["late_eror"]
-    with pytest.raises(InputError, match="holds no study that is done"):
+    with pytest.raises(InputError, match="holds no finished study"):
         StudyResult(tmp_path / "elsewhere")
 
 
 def test_study_that_is_done_is_not_opened_again(tmp_path):
-    with store(tmp_path, RECORD | {"runs": 1}, index_columns()) as unfinished:
+    with open_store(tmp_path, RECORD | {"runs": 1}, index_columns()) as unfinished:
         unfinished.add([outcome(0)])
         unfinished.publish(Toys(1))
     # As if it had been killed before its database was gone.
-    with store(tmp_path, RECORD, index_columns()) as unfinished:
+    with open_store(tmp_path, RECORD, index_columns()) as unfinished:
         assert unfinished.is_done
     assert not (tmp_path / "unfinished.sqlite").exists()
 
 
 def test_other_study_is_refused(tmp_path):
-    with store(tmp_path, RECORD, index_columns()):
+    with open_store(tmp_path, RECORD, index_columns()):
         pass
     other = {"made_of": {"points": "5678", "scenario": ["fig4"], "step": 0.01}}
     check_refused("another study, which differs in points, step; choose", tmp_path, other)
-    assert read_record(tmp_path) == json.loads(json.dumps(RECORD))
+    assert read_study_record(tmp_path) == json.loads(json.dumps(RECORD))
 
 
 @pytest.mark.parametrize(
@@ -134,14 +134,14 @@ def test_other_study_is_refused(tmp_path):
     ],
 )
 def test_what_makes_systems_others_is_named(tmp_path, before, now, words):
-    with store(tmp_path, {"made_of": {"systems": before}}, index_columns()):
+    with open_store(tmp_path, {"made_of": {"systems": before}}, index_columns()):
         pass
     record = {"made_of": {"systems": now}}
     check_refused(f"another study, which differs in {words}; choose", tmp_path, record)
 
 
 def test_folder_is_for_one_process(tmp_path):
-    with store(tmp_path, RECORD, index_columns()):
+    with open_store(tmp_path, RECORD, index_columns()):
         check_refused("another run is writing into", tmp_path)
 
 
@@ -162,7 +162,7 @@ def test_what_is_not_ours_is_refused(tmp_path, file, content):
 
 
 def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
-    with store(tmp_path / "study", RECORD, index_columns()):
+    with open_store(tmp_path / "study", RECORD, index_columns()):
         pass
     (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)
     check_refused(r"unfinished\.sqlite is not a file that auv-fmu wrote", tmp_path / "study")
@@ -177,10 +177,10 @@ import sys
 from itertools import count
 from pathlib import Path
 from orchestrator.studies.engine import Outcome
-from orchestrator.studies.store import store
+from orchestrator.studies.store import open_store
 from orchestrator.vehicle.indices import index_columns
 
-with store(Path(sys.argv[1]), {RECORD!r}, index_columns()) as unfinished:
+with open_store(Path(sys.argv[1]), {RECORD!r}, index_columns()) as unfinished:
     for block in count(len(unfinished) // {BLOCK}):
         unfinished.add([Outcome({BLOCK} * block + i, {{}}, str(i)) for i in range({BLOCK})])
 """
@@ -195,7 +195,7 @@ def test_kill_loses_at_most_the_block_under_way(tmp_path):
         assert eventually(lambda log=log: log.exists() and log.stat().st_size > 100_000)
         process.send_signal(signal.SIGKILL)
         process.wait()
-        with store(tmp_path, RECORD, index_columns()) as unfinished:
+        with open_store(tmp_path, RECORD, index_columns()) as unfinished:
             assert len(unfinished) > done
             done = len(unfinished)
             # All of a block, or none.

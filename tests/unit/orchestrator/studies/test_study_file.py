@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.runs.loading import loaded
+from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import BATCH, Range, Sample, StopTime, ready_studies
 from orchestrator.studies.study_file import read_figures, read_study, study_of
@@ -241,7 +241,7 @@ def test_mistakes_are_told_in_a_line(figure, complaint):
 
 
 def test_a_figure_is_named_as_a_file_can_be():
-    with pytest.raises(InputError, match="is no name of a file"):
+    with pytest.raises(InputError, match="cannot be the name of a file"):
         plans(**{"../mine": BANDS})
 
 
@@ -260,7 +260,7 @@ def test_study_holds_the_proposed_controller_against_pd_ten_thousand_times(name)
     assert study.engine == BATCH
     assert study.remark.count("\n\n") == 1, "two paragraphs"
     pytest.importorskip("scipy", reason="needs the extra `studies`")
-    space = Space(study, {scenario: loaded(scenario) for scenario in study.scenario})
+    space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
     assert len(space) >= 10_000
     first, second = space[0], space[1]
     assert (first.scenario, second.scenario) == ("fig5", "fig5-pd")

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
-from orchestrator.system.units import Linear, Mapped, UndefinedUnit, Unit, chained, conversion
+from orchestrator.system.units import Linear, Mapped, UndefinedUnit, Unit, combine, conversion
 
 LENGTH, TEMPERATURE = (0, 1, 0, 0, 0, 0, 0, 0), (0, 0, 0, 0, 1, 0, 0, 0)
 M, INCH = Unit("m", LENGTH), Unit("inch", LENGTH, 0.0254)
@@ -89,7 +89,7 @@ TABLES = st.dictionaries(NUMBERS, NUMBERS, max_size=5).map(
 @given(st.tuples(LINEARS, LINEARS) | st.tuples(TABLES, TABLES), NUMBERS)
 def test_chained_transformations_are_one_after_the_other(both, value):
     first, then = both
-    whole = chained(first, then)
+    whole = combine(first, then)
     assert whole is not None
     assert whole(value) == then(first(value))
 
@@ -97,13 +97,13 @@ def test_chained_transformations_are_one_after_the_other(both, value):
 def test_what_leaves_a_value_as_it_is_goes_with_everything():
     table, line = Mapped(((1.0, 2.0),)), Linear(2.0, 1.0)
     for other in (table, line, Linear(), None):
-        assert chained(Linear(), other) == chained(other, Linear()) == (other or Linear())
-        assert chained(None, other) == chained(other, None) == other
+        assert combine(Linear(), other) == combine(other, Linear()) == (other or Linear())
+        assert combine(None, other) == combine(other, None) == other
 
 
 def test_line_and_table_do_not_follow_each_other():
     with pytest.raises(InputError, match="follow each other"):
-        chained(Linear(2.0), Mapped(((1.0, 2.0),)))
+        combine(Linear(2.0), Mapped(((1.0, 2.0),)))
 
 
 def test_what_tables_come_to_is_bounded():
@@ -111,12 +111,12 @@ def test_what_tables_come_to_is_bounded():
         Mapped(tuple((float(i), 0.5) for i in range(first, first + 501))) for first in (0, 501)
     )
     with pytest.raises(InputError, match="1,000"):
-        chained(one, other)
+        combine(one, other)
 
 
 @pytest.mark.parametrize("size", [1e200, 1e-200])
 def test_transformations_that_no_number_holds_do_not_follow_each_other(size):
-    with pytest.raises(InputError, match="linear transformations follow each other that come to"):
-        chained(Linear(size), Linear(size))
+    with pytest.raises(InputError, match="successive linear transformations combine to"):
+        combine(Linear(size), Linear(size))
     # A factor of zero says what it does.
-    assert chained(Linear(size), Linear(0.0, 1.0)) == Linear(0.0, 1.0)
+    assert combine(Linear(size), Linear(0.0, 1.0)) == Linear(0.0, 1.0)

@@ -11,15 +11,15 @@ import pytest
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.loop import chosen
+from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
-from orchestrator.runs.loading import loaded
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
+from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import StudyResult, store
+from orchestrator.studies.store import StudyResult, open_store
 from orchestrator.studies.study_file import study_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import indices as table_of_indices
@@ -120,9 +120,9 @@ def test_what_is_never_reached_is_not_there():
 
 
 def test_closed_loop_has_all_of_them():
-    _, system = loaded("fig4", "native")
+    _, system = load_scenario("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
-    simulate(planned(system, experiment), [observer], loop=chosen("auto", experiment))
+    simulate_plan(make_plan(system, experiment), [observer], loop=choose_loop("auto", experiment))
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 
@@ -146,8 +146,8 @@ def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
     assert result.metrics()["largest_depth"] == deepest
 
     study = {"scenario": "fig4", "stop_time": 1.0, "vary": {"plant.nu0.w": [1.0]}}
-    space = Space(study_of("own", study), {"fig4": loaded("fig4", "native")})
-    with store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
+    space = Space(study_of("own", study), {"fig4": load_scenario("fig4", "native")})
+    with open_store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
         kept.add(list(FmuEngine(space.prepared).outcomes([space[0]])))
         kept.publish(space)
     made = StudyResult(tmp_path)

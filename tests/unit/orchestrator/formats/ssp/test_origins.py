@@ -15,7 +15,7 @@ from orchestrator.formats.ssp.hierarchy import Node
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection
-from orchestrator.system.units import chained
+from orchestrator.system.units import combine
 from support.archives import (
     archive,
     binding,
@@ -96,7 +96,7 @@ class OneByOne(reader._Ports):
                 value, known = self._given[start]
                 try:
                     first = value.transformation(self._archive, known)
-                    whole = chained(first, carried(known.unit or value.unit, i))
+                    whole = combine(first, carried(known.unit or value.unit, i))
                 except InputError as error:
                     raise InputError(f"{start}: {error}") from None
                 self._set(port, leaf, reader._Arrival(start, whole=whole))

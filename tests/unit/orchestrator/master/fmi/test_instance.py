@@ -12,9 +12,9 @@ import pytest
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.fmi.placement import placed
+from orchestrator.master.fmi.placement import place_instances
 from orchestrator.master.row import Row
-from orchestrator.master.schedule import member, step
+from orchestrator.master.schedule import member, step_members
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -31,7 +31,7 @@ def ready(system: System, place: str) -> Iterator[tuple[Instance, Row]]:
     """The instance of a system of one component, ready for its first step, and the row."""
     with held_interrupts() as interrupts:
         isolation = Isolation() if place == "isolated" else None
-        with placed(system.components, Log(), isolation, interrupts) as instances:
+        with place_instances(system.components, Log(), isolation, interrupts) as instances:
             row = Row(system, instances)
             ((name, instance),) = instances.items()
             instance.enter_initialization(system.parameters_of(name))
@@ -44,7 +44,7 @@ def stepped(instance: Instance, row: Row, first: int, n: int) -> np.ndarray:
     """The rows after some steps, of which the first is given by its number."""
     rows = np.empty((n, len(row.values)))
     for i in range(n):
-        step([member(instance)], (first + i) * STEP, STEP)
+        step_members([member(instance)], (first + i) * STEP, STEP)
         rows[i] = row.values
     return rows
 
@@ -77,7 +77,9 @@ def test_an_fmu_that_gives_no_state_is_named(tmp_path: Path, place: str):
     assert not component.gives_state
     with ready(System("one", {"stubborn": component}, ()), place) as (instance, _):
         for call in (instance.state, lambda: instance.restore(b"")):
-            with pytest.raises(ComponentFailed, match="stubborn: its FMU does not give its state"):
+            with pytest.raises(
+                ComponentFailed, match="stubborn: its FMU does not provide its state"
+            ):
                 call()
 
 

@@ -21,11 +21,11 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi import placement
 from orchestrator.master.fmi.instance import Log, MessageQueue
 from orchestrator.master.fmi.isolated import IsolatedInstance, Isolation
-from orchestrator.master.fmi.loaded import loaded
+from orchestrator.master.fmi.loaded import load_instance
 from orchestrator.master.fmi.worker import LONGEST_NOTE, Channel, _Served, sizes
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 from support.others import build, system_of
@@ -78,7 +78,7 @@ def answering(component: Component, channel: Answering) -> Iterator[None]:
         letters = MessageQueue()
         with suppress(EOFError, OSError):
             channel.send()
-            with loaded(component, letters) as instance:
+            with load_instance(component, letters) as instance:
                 _Served(component, instance, channel, letters).answer_all()
         channel.close()
 
@@ -108,8 +108,8 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
                 instance.leave()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placement, "isolated", isolated)
-        simulate(planned(system, Experiment(0.1 * STEPS, 0.1)), [table], Isolation())
+        patch.setattr(placement, "isolate_instances", isolated)
+        simulate_plan(make_plan(system, Experiment(0.1 * STEPS, 0.1)), [table], Isolation())
     return table
 
 

@@ -18,8 +18,8 @@ from orchestrator.master.hooks.checkpoint import (
     interval_in,
 )
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import planned
-from orchestrator.master.simulation import simulate
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
 
@@ -36,8 +36,8 @@ def parts(folder: Path, **how: bool) -> System:
 def run(system: System, stop_time: float, *checkpoints: Checkpoints) -> Table:
     table = Table()
     # They come first: what others are told, they can tell again.
-    plan = planned(system, Experiment(stop_time, STEP))
-    simulate(plan, [*checkpoints, table], hooks=checkpoints)
+    plan = make_plan(system, Experiment(stop_time, STEP))
+    simulate_plan(plan, [*checkpoints, table], hooks=checkpoints)
     return table
 
 

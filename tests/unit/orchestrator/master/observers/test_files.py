@@ -9,18 +9,18 @@ import pytest
 
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.files import FORMATS
+from orchestrator.master.observers.files import TABLE_FORMATS
 from orchestrator.master.observers.observer import Ending, Header
 
 
-@pytest.mark.parametrize("ending", FORMATS)
+@pytest.mark.parametrize("ending", TABLE_FORMATS)
 def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
     if ending == "parquet":
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     path = tmp_path / f"result.{ending}"
     rows = np.random.default_rng(1).normal(scale=1e3, size=(20_001, 4))
     rows[5] = [1e-310, -0.0, 1.7976931348623157e308, np.nextafter(1.0, 2.0)]
-    file = FORMATS[ending](path)
+    file = TABLE_FORMATS[ending](path)
     file.begin(Header(("a.x", "a.y", "b.z"), Experiment(1.0, 0.1)))
     for block in np.split(rows, [1, 600, 19_000]):
         file.take(block)
@@ -38,7 +38,7 @@ def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
     files = []
     for i, block in enumerate((512, 700, 20_000)):
         path = tmp_path / f"{i}.parquet"
-        file = FORMATS["parquet"](path)
+        file = TABLE_FORMATS["parquet"](path)
         file.begin(Header(("a.x",), Experiment(1.0, 0.1)))
         for start in range(0, len(rows), block):
             file.take(rows[start : start + block])

@@ -1,4 +1,4 @@
-"""What a component defines, in one as small as can be, dx/dt = gain a, seen as b; and its class."""
+"""A slave of a component as small as can be, dx/dt = gain a, seen as b; and how slaves are made."""
 
 from __future__ import annotations
 
@@ -314,7 +314,7 @@ def test_state_of_whole_numbers_is_bounded_as_one_of_floats(slave):
     slave._set_fmu_state({**saved, "state": [[10**200, 0]]})
     slave._set_fmu_state({**saved, "state": [[1e100, 0.0]]})
     assert slave._get_fmu_state()["state"] == ((1e100, 0.0),)
-    assert messages_of(slave) == ["state refused: beyond 1e+100"]
+    assert messages_of(slave) == ["state refused: it exceeds 1e+100"]
 
 
 def test_state_that_cannot_be_saved_says_why_when_it_is_set(slave, monkeypatch):
@@ -329,8 +329,8 @@ def test_state_that_cannot_be_saved_says_why_when_it_is_set(slave, monkeypatch):
 @pytest.mark.parametrize(
     ("state", "b", "why"),
     [
-        ((1.0, nan), 0.0, "the state is not finite, or beyond 1e+100"),
-        ((-1.1e100, 0.0), 0.0, "the state is not finite, or beyond 1e+100"),
+        ((1.0, nan), 0.0, "the state is not finite, or exceeds 1e+100"),
+        ((-1.1e100, 0.0), 0.0, "the state is not finite, or exceeds 1e+100"),
         ((0.0, 0.0), nan, "b.y = nan: must be finite"),
         ((0.0, 0.0), -inf, "b.y = -inf: must be finite"),
     ],

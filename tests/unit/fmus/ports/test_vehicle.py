@@ -1,4 +1,4 @@
-"""Ports that components share. Declared while their module is imported, so it is run once more."""
+"""Ports of the vehicle. Declared while their module is imported, so it is run once more."""
 
 from __future__ import annotations
 
@@ -6,8 +6,6 @@ from runpy import run_path
 
 from auv_fmu.vehicle import Vehicle
 from fmus.ports import vehicle
-from fmus.ports.controllers import command
-from fmus.ports.port import Port, inputs
 
 UNITS = {
     **dict.fromkeys(("m11", "m22", "m33"), "kg"),
@@ -32,14 +30,3 @@ def test_parameters_of_equation_2_are_declared_with_their_units_and_bounds():
         elif name.startswith("d"):
             assert port.minimum == 0.0, "damping takes energy"
             assert port.description == f"Linear damping: {name[1:]}"
-
-
-def test_command_depends_on_the_inputs_that_are_said():
-    known = inputs("y", {"x": "m"}, "Place")
-    about = "Commanded force and moments (21), not limited"
-    assert command("(21)", known) == tuple(
-        Port(
-            f"tau.{k}", "output", "continuous", "Real", f"{about}: {k}", unit, feedthrough=("y.x",)
-        )
-        for k, unit in (("u", "N"), ("q", "N.m"), ("r", "N.m"))
-    )

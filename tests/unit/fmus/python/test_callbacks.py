@@ -64,26 +64,26 @@ REASONS = {
         nan, 0.5
     ),
     "fmi2DoStep is not allowed when terminated": terminated_then(lambda s: s.do_step(2.0, 0.5)),
-    "state refused: the bytes are not those of a state": from_bytes(b"[1]"),
-    "state refused: the bytes are not those of a state ": from_bytes(b"\xff"),
+    "state refused: the bytes are not a state": from_bytes(b"[1]"),
+    "state refused: the bytes are not a state ": from_bytes(b"\xff"),
     "state refused: the bytes were changed since they were written": from_bytes(b"{}"),
     "state refused: not a state of fmus.disturbance_generator.DisturbanceGenerator": (
         from_json(identity="another")
     ),
-    "state refused: it has other parts": from_json(more=1),
-    "state refused: no mode is 'bogus'": from_json(mode="bogus"),
+    "state refused: it has missing or unknown parts": from_json(more=1),
+    "state refused: 'bogus' is not a mode": from_json(mode="bogus"),
     "state refused: it has a state before the initialisation": from_json(mode="instantiated"),
     "state refused: its fault is neither true nor false": from_json(fault=0),
-    "state refused: it has other parameters": from_json(parameters={}),
-    "state refused: it has other ports": from_json(inputs=[1.0]),
-    "state refused: it has other ports ": from_json(outputs=7),
+    "state refused: it has missing or unknown parameters": from_json(parameters={}),
+    "state refused: its values do not match the ports": from_json(inputs=[1.0]),
+    "state refused: its values do not match the ports ": from_json(outputs=7),
     "state refused: it has steps, or outputs, without a state": from_json(state=None),
     "state refused: it has steps, or outputs, without a state ": (
         from_json(state=None, mode="terminated", outputs=[1.0] * 6)
     ),
-    "state refused: [0.0] in the place of 0 values": from_json(state=[0.0]),
+    "state refused: [0.0] instead of 0 values": from_json(state=[0.0]),
     "state refused: this component keeps nothing outside its state": from_json(hidden=[1]),
-    "state refused: '0' is no float": from_json(start_time="0"),
+    "state refused: '0' is not of type float": from_json(start_time="0"),
 }
 
 #: What is discarded; all else fails.
