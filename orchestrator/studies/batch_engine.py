@@ -59,7 +59,7 @@ _ACCUMULATED = [
     if index.accumulated
 ]
 
-#: The others: they are made of the rows, as those of FMUs are, which takes longer.
+#: The others: reducers make them of the rows, as they do after a run of FMUs; it takes longer.
 _OF_ROWS = [index for index in INDICES if not index.accumulated]
 
 
@@ -335,8 +335,9 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
     return {name: value for name, value in values.items() if not isnan(value)}
 
 
+@np.errstate(all="ignore")
 def _of_rows(job: _Job, stop_time: float, end: np.void, rows: np.ndarray) -> dict[str, float]:
-    """The other indices of a run that ends at a time [s], by their columns."""
+    """The other indices of a run that ends at a stop time [s], by their columns."""
     if not _OF_ROWS:
         return {}
     shorter = replace(job.experiment, stop_time=stop_time)

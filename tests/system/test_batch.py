@@ -186,7 +186,7 @@ def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
 
 @pytest.mark.parametrize("name", ["fig4", "fig5-pd"])
 def test_an_index_that_is_not_accumulated_is_made_of_the_rows(monkeypatch, name):
-    """The same to the last bit, of a run that others end within."""
+    """To the last bit what the accumulators hold, for each of several stop times."""
     batch, _ = engines(name)
     run = Point(0, name, {"plant.noise.std": 0.001}, 20.01, 0.02)
     ends = [2.0, 7.5, 20.01]
