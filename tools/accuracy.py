@@ -7,6 +7,7 @@ the FMU. It takes three minutes on one core, and 1 GB.
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -268,6 +269,7 @@ def show(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     made = Runs()
     plant_alone(made)
     whole_loop(made)

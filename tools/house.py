@@ -5,8 +5,8 @@
 
 from __future__ import annotations
 
+import argparse
 import ast
-import sys
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -88,13 +88,16 @@ def odd_sizes() -> dict[str, int]:
     }
 
 
-def main(arguments: Sequence[str]) -> None:
+def main() -> None:
     """Print it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--rooms", action="store_true", help="leave the modules out")
+    is_short: bool = parser.parse_args().rooms
     house = [module for package in PACKAGES for module in modules(package)]
     rooms: Mapping[str, list[Module]] = defaultdict(list)
     for module in house:
         rooms[module.room].append(module)
-        if "--rooms" not in arguments:
+        if not is_short:
             print(f"{module.path.as_posix():50} {module.lines:4}  {module.first_line}")
     for room, found in {**rooms, "all": house}.items():
         lines = [module.lines for module in found]
@@ -108,4 +111,4 @@ def main(arguments: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

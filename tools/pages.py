@@ -11,6 +11,7 @@ docs/ready-studies.md. `study_pictures.py` draws those figures, `reference.py` w
 
 from __future__ import annotations
 
+import argparse
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -241,6 +242,7 @@ def paper() -> dict[str, str]:
 
 def main() -> None:
     """Write the files that are not as they are to be."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     for path, text in files().items():
         if not path.exists() or path.read_text(encoding="utf-8") != text:
             path.parent.mkdir(parents=True, exist_ok=True)

@@ -9,7 +9,7 @@ and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import fmpy
@@ -97,7 +97,9 @@ def _write_options(stem: Path) -> Path:
 
 def main() -> None:
     """Write the reference results."""
-    folder = Path(*sys.argv[1:2] or ["reference"])
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=Path, default=Path("reference"))
+    folder: Path = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     for path in write_reference(current_fmus(), folder):
         print(path)

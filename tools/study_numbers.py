@@ -20,8 +20,8 @@ It needs pandas: the extra `docs`.
 
 from __future__ import annotations
 
+import argparse
 import re
-import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -306,7 +306,9 @@ def _short(value: object) -> str:
 
 def main() -> None:
     """Print the numbers of the studies in some folders."""
-    for folder in map(Path, sys.argv[1:]):
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="+", type=Path)
+    for folder in parser.parse_args().folder:
         result = StudyResult(folder)
         study = result.record["study"]
         runs = prepared(study, result.to_dataframe().reset_index())

@@ -6,7 +6,7 @@ their colours: a palette would take colours out of their scales.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -26,8 +26,11 @@ _DPI = 140
 
 def main() -> None:
     """Write the pictures of the studies in some folders."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="+", type=Path)
+    folders = parser.parse_args().folder
     SETTINGS["savefig.dpi"] = _DPI
-    for folder in map(Path, sys.argv[1:]):
+    for folder in folders:
         result = StudyResult(folder)
         study = read_study(result.record["study"])
         space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})

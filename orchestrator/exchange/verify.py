@@ -24,7 +24,7 @@ from orchestrator.master.experiment import (
 )
 from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.plan import make_plan, stages
+from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
@@ -93,7 +93,7 @@ def verify(
     if not 0.0 <= tolerance < 1.0:
         raise InputError(f"tolerance {tolerance:g}: must be at least 0 and less than 1")
     if order is not None:
-        stages(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
+        check_order(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
     outputs = {
         str(PortName(component.name, variable.name)): variable.type
         for component in system.components.values()

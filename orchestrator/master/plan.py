@@ -1,7 +1,8 @@
-"""The plan of a run: checked before any FMU is loaded, with its stages and its identity.
+"""The plan of a run, checked before any FMU is loaded; its stages, and its identity.
 
-Every communication step has stages. Before a stage is stepped its inputs are gathered; the
-outputs of a component are read as soon as it was stepped.
+Every communication step has stages; which ones, if rings are solved, the loaded FMUs decide. Before
+a stage is stepped its inputs are gathered; the outputs of a component are read as soon as it was
+stepped.
 
 - `jacobi`: one stage. All inputs are outputs of t_k.
 - `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
@@ -38,8 +39,8 @@ PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
 #: All that decides the numbers of a run: by names in words, each as text.
 Identity = Mapping[str, str]
 
-#: Rooms whose code makes the rows.
-_ROOMS = ("machine", "system", "formats", "master")
+#: Rooms whose code makes the rows of a plan.
+_ROOMS = ("system", "master")
 
 
 @dataclass(frozen=True)
@@ -70,8 +71,7 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
 
     """
     system.check()
-    # An order of names must have them all.
-    stages(system, experiment.order)
+    check_order(system, experiment.order)
     if experiment.coupling == LINEAR:
         _check_linear(system)
     found = decimations(system, experiment.step)
@@ -127,11 +127,19 @@ def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -
         return [others, *map(list, solved)] if others else list(map(list, solved))
     if isinstance(order, str):
         return in_stages(system, derived_order(system, solved), solved)
-    _check_names(system, order)
+    check_order(system, order)
     return in_stages(system, order, solved)
 
 
-def _check_names(system: System, order: Sequence[str]) -> None:
+def check_order(system: System, order: Order) -> None:
+    """Check that an order that is stated names each component once.
+
+    Raises:
+        InputError: it does not.
+
+    """
+    if isinstance(order, str):
+        return
     for name in order:
         system.component(name)
     twice = [name for i, name in enumerate(order) if name in order[:i]]
@@ -207,7 +215,10 @@ def gathered_connections(
 
 
 def identity(plan: Plan, events: Sequence[object] = (), inputs: str = "") -> Identity:
-    """What makes a run the one that it is: all that decides its rows, and nothing else.
+    """What makes a run the one that it is: all that decides its rows.
+
+    Code counts by whole rooms, comments included: it is better to make a run once too often than to
+    take another one for it. What other rooms decide is in the plan, the events and the inputs.
 
     How the steps are made, in which loop and process, is not in it: the rows are the same. Nor is
     where an FMU lies, or what a scenario is called.
@@ -243,6 +254,11 @@ def _parameters(system: System) -> dict[str, str]:
         for name, value in system.parameters.items()
         if repr(value) != repr(system.components[name.component].starts.get(name.port))
     }
+
+
+def differences(one: Identity, other: Identity) -> list[str]:
+    """What makes two runs two, by the names of an identity."""
+    return sorted(dict(one.items() ^ other.items()))
 
 
 def digest_of(*identities: Identity) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib.metadata import version
 from itertools import compress
 from math import isnan
@@ -38,7 +39,7 @@ from orchestrator.studies.batch.support import digest, setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.indices import INDICES
+from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD
 
@@ -57,6 +58,9 @@ _ACCUMULATED = [
     for index in INDICES
     if index.accumulated
 ]
+
+#: The others: reducers make them of the rows, as they do after a run of FMUs; it takes longer.
+_OF_ROWS = [index for index in INDICES if not index.accumulated]
 
 
 class BatchEngine:
@@ -102,14 +106,17 @@ class BatchEngine:
             job = _job(self._systems[run.scenario], run)
             ends = np.array([_end(job, stop_time) for stop_time in stop_times], END)
             accumulators = new_accumulators(len(ends))
-            made, failure = _made(job, ends, accumulators, _NO_ROWS)
+            rows = _empty_rows(job) if _OF_ROWS else _NO_ROWS
+            made, failure = _made(job, ends, accumulators, rows)
         except InputError as error:
             return [Outcome(run.number, {}, str(error)) for _ in stop_times]
         return [
             Outcome(run.number, {}, failure)
             if end["steps"] > made
-            else Outcome(run.number, _indices(job, end, found))
-            for end, found in zip(ends, accumulators, strict=True)
+            else Outcome(
+                run.number, _indices(job, end, found) | _of_rows(job, stop_time, end, rows)
+            )
+            for stop_time, end, found in zip(stop_times, ends, accumulators, strict=True)
         ]
 
     def setting(self, run: Point) -> Setting:
@@ -129,16 +136,9 @@ class BatchEngine:
 
         """
         job = _job(self._systems[run.scenario], run)
-        rows = np.empty((job.experiment.rows, 1 + len(COLUMNS)))
+        rows = _empty_rows(job)
         made, failure = _made(job, np.empty(0, END), new_accumulators(0), rows)
-        there = [job.is_observed or name not in _ESTIMATES for name in COLUMNS]
-        parameters = {
-            name: job.system.value(name)
-            for component in job.system.components.values()
-            for name in (PortName(component.name, v.name) for v in component.having("parameter"))
-        }
-        header = Header(tuple(compress(COLUMNS, there)), job.experiment, parameters)
-        return Table.of(header, rows[: made + 1, [True, *there]], Ending(failure))
+        return _table(job, rows[: made + 1], failure)
 
 
 def check_systems(systems: Mapping[str, System], kind: str = PYTHON) -> None:
@@ -149,7 +149,7 @@ def check_systems(systems: Mapping[str, System], kind: str = PYTHON) -> None:
 
     """
     for name, system in systems.items():
-        if why := unsupported(system, current_fmus(kind)):
+        if why := unsupported(system, current_fmus(kind)) or _without_column(system):
             raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
         system.check()
 
@@ -227,6 +227,22 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
                 f"{whole.stop_time:g} s"
             )
     return steps, 0.5 * stop_time, whole.time(steps) - LAST_SECONDS
+
+
+def _empty_rows(job: _Job) -> np.ndarray:
+    return np.empty((job.experiment.rows, 1 + len(COLUMNS)))
+
+
+def _table(job: _Job, rows: np.ndarray, failure: str | None = None) -> Table:
+    """Rows of a run, in the columns that it has."""
+    there = [job.is_observed or name not in _ESTIMATES for name in COLUMNS]
+    parameters = {
+        name: job.system.value(name)
+        for component in job.system.components.values()
+        for name in (PortName(component.name, v.name) for v in component.having("parameter"))
+    }
+    header = Header(tuple(compress(COLUMNS, there)), job.experiment, parameters)
+    return Table.of(header, rows[:, [True, *there]], Ending(failure))
 
 
 def _made(
@@ -327,3 +343,25 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
             values.update(zip(columns, members, strict=True))
     # What was never reached is not a number.
     return {name: value for name, value in values.items() if not isnan(value)}
+
+
+@np.errstate(all="ignore")
+def _of_rows(job: _Job, stop_time: float, end: np.void, rows: np.ndarray) -> dict[str, float]:
+    """The other indices of a run that ends at a stop time [s], by their columns."""
+    if not _OF_ROWS:
+        return {}
+    shorter = replace(job.experiment, stop_time=stop_time)
+    table = _table(job._replace(experiment=shorter), rows[: end["steps"] + 1])
+    observer = Indices(chosen=_OF_ROWS)
+    observer.begin(table.header)
+    observer.take(table.rows)
+    return observer.values()
+
+
+def _without_column(system: System) -> str:
+    """An index of a system that the kernel has no columns for, in words; empty: there is none."""
+    for index in _OF_ROWS:
+        for name in index.needs(STANDARD)[0]:
+            if name not in COLUMNS and system.has(port_name(name)):
+                return f"its index {index.name} is of {name}"
+    return ""

@@ -17,7 +17,7 @@ from functools import cached_property
 from hashlib import sha256
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import islice, pairwise
+from itertools import chain, islice, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,7 @@ import numpy as np
 
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.ledger import Ledger, is_changed, locate, move_aside
+from orchestrator.master.plan import differences
 from orchestrator.runs.folder import open_ledger
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space
@@ -264,15 +265,23 @@ def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
         if (folder / STUDY_TABLE).exists() or (folder / _DATABASE).exists():
             raise InputError(f"{folder}: has runs, but no {STUDY_RECORD}; choose another folder")
         return
-    before = dict(read_study_record(folder)["made_of"])
     # As it is read again: JSON knows no tuples and no dates.
     now = json.loads(json.dumps(record["made_of"], default=str))
-    different = [key for key in {**now, **before} if now.get(key) != before.get(key)]
-    if different:
+    if different := _differences(read_study_record(folder)["made_of"], now):
         raise InputError(
             f"{folder} holds another study, which differs in {', '.join(different)}; choose "
             "another folder (--out DIR), or let --force move that one aside"
         )
+
+
+def _differences(before: Mapping[str, Any], now: Mapping[str, Any]) -> list[str]:
+    """In what two studies differ; of the systems, what makes their runs other runs."""
+    found = {key: [key] for key in {**now, **before} if now.get(key) != before.get(key)}
+    old, new = before.get("systems"), now.get("systems", ())
+    # Of a study that an earlier version has begun there is only their digest.
+    if old != new and isinstance(old, list):
+        found["systems"] = [*chain(*map(differences, old, new))] or ["systems"]
+    return list(dict.fromkeys(chain(*found.values())))
 
 
 def _schema(arrow: Any, space: Space, indices: Sequence[str]) -> Any:

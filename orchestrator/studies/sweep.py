@@ -21,7 +21,7 @@ from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS
-from orchestrator.master.plan import PACKAGES, digest_of
+from orchestrator.master.plan import PACKAGES
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
@@ -283,7 +283,7 @@ def _record(
             "engine": means.engine or study.engine,
             **{name: stated[name] for name in _STATED},
             "points": space.digest,
-            "systems": digest_of(*(prepared.identity for prepared in space.prepared.values())),
+            "systems": [dict(prepared.identity) for prepared in space.prepared.values()],
             "version": engine.digest,
         },
         "versions": {"python": sys.version.split()[0]}

@@ -48,7 +48,7 @@ class Index(NamedTuple):
         meaning: what the reference page says.
         needs: what a run must have.
         reducer: takes rows in, for what it is a function of.
-        accumulated: where the batch engine has the same.
+        accumulated: where the batch engine has the same; empty: it makes it of the rows.
         result: that function, also of the number of terms and of the time at the end [s].
         symbol: in formulas, with its members as indices, before the label.
         is_metric: whether metrics.json holds it, or a study only.

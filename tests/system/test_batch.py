@@ -21,12 +21,14 @@ from auv_fmu.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.loading import load, load_scenario
+from orchestrator.studies import batch_engine
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.system.structure import System
+from orchestrator.vehicle.indices import INDICES
 from support.runs import prepared
 from support.texts import tells
 
@@ -180,6 +182,30 @@ def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
         assert batch == fmus
         assert batch.failure is None
         assert ("estimate_error" in batch.indices) == (scenario == "fig4")
+
+
+@pytest.mark.parametrize("name", ["fig4", "fig5-pd"])
+def test_an_index_that_is_not_accumulated_is_made_of_the_rows(monkeypatch, name):
+    """To the last bit what the accumulators hold, for each of several stop times."""
+    batch, _ = engines(name)
+    run = Point(0, name, {"plant.noise.std": 0.001}, 20.01, 0.02)
+    ends = [2.0, 7.5, 20.01]
+    expected = batch.outcomes_at(run, ends)
+    monkeypatch.setattr(batch_engine, "_ACCUMULATED", [])
+    monkeypatch.setattr(batch_engine, "_OF_ROWS", INDICES)
+    assert batch.outcomes_at(run, ends) == expected
+    assert expected[-1].indices.keys() >= {"final_error.x", "late_error"}
+
+
+def test_an_index_of_what_is_not_computed_is_refused(monkeypatch):
+    of_z = INDICES[0]._replace(name="size_of_z", needs=lambda loop: (loop.z, ()))
+    monkeypatch.setattr(batch_engine, "_OF_ROWS", [of_z])
+    with pytest.raises(InputError) as refused:
+        engines("fig4")
+    assert str(refused.value) == (
+        "fig4: its index size_of_z is of controller.z.x, which the batch engine cannot make; "
+        "use --engine fmu"
+    )
 
 
 def test_one_run_gives_what_came_of_shorter_ones():

@@ -116,7 +116,8 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     assert main(command) == 2
     err = capfd.readouterr().err.splitlines()
     assert [line.split("; ")[0] for line in err] == [
-        "auv-fmu: results/mine holds another study, which differs in systems",
+        "auv-fmu: results/mine holds another study, which differs in the FMU of controller, "
+        "the FMU of disturbance, the FMU of planner, the FMU of plant",
         "auv-fmu: results/mine holds another study, which differs in vary, points",
     ]
     assert files(folder)["runs.parquet"] == before["runs.parquet"]
@@ -142,17 +143,21 @@ engine = "{}"
 plant.eta0.y = [0.0, 4.0]
 """
 
-#: Of a scenario, and what the batch engine says of what it does not know.
+#: Of a scenario, what of it then differs, and what the batch engine says of what it does not know.
 CHANGES = {
-    "stop_time = 2.0": "",
-    "stop_time = 1.0\nstep = 0.01": "",
-    'stop_time = 1.0\norder = "jacobi"': "",
+    "stop_time = 2.0": ("stop_time", ""),
+    "stop_time = 1.0\nstep = 0.01": ("step", ""),
+    'stop_time = 1.0\norder = "jacobi"': ("order", ""),
     'stop_time = 1.0\n[components]\ncontroller = "PdController"\n[wires]\n'
-    '"controller.dy" = "plant.dy"': "",
-    "stop_time = 1.0\n[steps]\ncontroller = 0.2": "its controller has a longer step",
-    'stop_time = 1.0\norder = ["plant", "disturbance", "planner", "controller"]': "has order = ",
-    'stop_time = 1.0\n[[events]]\nat = 0.5\nfreeze = "plant.y"': "has events",
-}
+    '"controller.dy" = "plant.dy"': ("the FMU of controller, what feeds controller.dy.x", ""),
+    "stop_time = 1.0\n[steps]\ncontroller = 0.2": (
+        "the step of controller", "its controller has a longer step",
+    ),
+    'stop_time = 1.0\norder = ["plant", "disturbance", "planner", "controller"]': (
+        "order", "has order = ",
+    ),
+    'stop_time = 1.0\n[[events]]\nat = 0.5\nfreeze = "plant.y"': ("the events", "has events"),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("engine", [FMU, *slow(BATCH)])
@@ -164,12 +169,12 @@ def test_another_scenario_of_the_same_name_is_another_study(workplace, capfd, en
     command = ["sweep", "mine.toml", "--kind", "native", "--workers", "1"]
     assert main(command) == 0
     before = contents(folder)
-    for change, unknown in CHANGES.items():
+    for change, (different, unknown) in CHANGES.items():
         own.write_text(change)
         capfd.readouterr()
         assert main(command) == 2, change
         [line] = capfd.readouterr().err.splitlines()
-        words = unknown if engine == BATCH and unknown else "which differs in systems; choose"
+        words = unknown if engine == BATCH and unknown else f"which differs in {different}"
         assert words in line
         assert contents(folder) == before
     own.write_text("title = 'Another'\nstop_time = 1.0\n")

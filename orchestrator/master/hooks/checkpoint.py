@@ -31,7 +31,7 @@ from orchestrator.machine.ledger import move_aside
 from orchestrator.master.fmi.instance import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
 from orchestrator.master.observers.observer import Ending, Header, NotKept
-from orchestrator.master.plan import Identity
+from orchestrator.master.plan import Identity, differences
 
 #: The file that grows, and the one that is replaced.
 _ROWS, _STATE = "rows.bin", "state.json"
@@ -243,7 +243,7 @@ class Checkpoints:
                     f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume goes "
                     "on with it; --force moves it aside and starts over"
                 )
-            if different := sorted(dict(found.of.items() ^ self._run.items())):
+            if different := differences(found.of, self._run):
                 raise InputError(
                     f"{self.folder} is of another run: {', '.join(different)} differ; run that "
                     "one, or let --force move it aside and start over"

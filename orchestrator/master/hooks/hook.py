@@ -97,12 +97,13 @@ class Hooks:
     def __init__(self, run: Run) -> None:
         """Call all hooks of a run first before any step, in their order."""
         self._run = run
-        self._next = dict.fromkeys(run.hooks, 0)
+        # By their places: two hooks may be equal, and one need not be hashable.
+        self._due = [0] * len(run.hooks)
 
     def act(self) -> None:
         """Call those whose time has come, and let the run go on until the next one's."""
-        run = self._run
-        for hook, due in self._next.items():
-            if due <= run.made:
-                self._next[hook] = hook.act(run)
-        run.due = min(self._next.values(), default=NEVER)
+        run, due = self._run, self._due
+        for i, hook in enumerate(run.hooks):
+            if due[i] <= run.made:
+                due[i] = hook.act(run)
+        run.due = min(due, default=NEVER)

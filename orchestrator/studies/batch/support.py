@@ -39,8 +39,8 @@ _VELOCITY = {
 
 
 def digest() -> str:
-    """Of the text of all that is compiled."""
-    return code_of("auv_fmu", __package__)[:16]
+    """Of the text of all that is compiled, of its constants, and of what makes indices of it."""
+    return code_of("auv_fmu", "orchestrator.vehicle", __package__)[:16]
 
 
 def unsupported(system: System, fmus: Path) -> str:

@@ -328,3 +328,16 @@ def test_another_version_is_another_run(monkeypatch):
     assert {name.split()[-1] for name, _ in before.items() - base().identity.items()} == {
         *plan.PACKAGES
     }
+
+
+@pytest.mark.parametrize(
+    ("room", "is_same"), [("system", False), ("master", False), ("machine", True), ("runs", True)]
+)
+def test_code_is_part_of_a_run_where_it_makes_rows(monkeypatch, room, is_same):
+    def commented(path: Path) -> bytes:
+        return read(path) + b"# more" * (path.parent.name == room)
+
+    before, read = base().identity, Path.read_bytes
+    monkeypatch.setattr(plan, "code_of", plan.code_of.__wrapped__)
+    monkeypatch.setattr(Path, "read_bytes", commented)
+    assert (base().identity == before) == is_same

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import make_plan
@@ -81,3 +84,18 @@ def test_a_value_that_is_not_finite_ends_the_run_before_its_row(system: System):
     assert len(table) == 1
     with pytest.raises(InputError, match="sine"):
         simulate_to_end(make_plan(grows, EXPERIMENT))
+
+
+@pytest.mark.parametrize("frozen", [False, True], ids=["not hashable", "equal"])
+def test_every_hook_is_called_whatever_it_is(system: System, frozen: bool):
+    @dataclass(frozen=frozen)
+    class Every:
+        steps: int
+
+        def act(self, run: Run) -> int:
+            called.append((run.made, self.steps))
+            return run.made + self.steps
+
+    called: list[tuple[int, int]] = []
+    simulate_plan(make_plan(system, EXPERIMENT), hooks=[Every(3), Every(4), Every(3)])
+    assert called == [(0, 3), (0, 4), (0, 3), (3, 3), (3, 3), (4, 4), (6, 3), (6, 3), (8, 4)]

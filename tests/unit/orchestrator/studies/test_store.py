@@ -123,6 +123,23 @@ def test_other_study_is_refused(tmp_path):
     assert read_study_record(tmp_path) == json.loads(json.dumps(RECORD))
 
 
+@pytest.mark.parametrize(
+    ("before", "now", "words"),
+    [
+        ([{"the code": "1", "step": "2"}], [{"the code": "1", "step": "3"}], "step"),
+        ([{"step": "1"}, {"step": "1"}], [{"step": "2"}, {"order": "3"}], "step, order"),
+        ([{"step": "1"}], [{"step": "1"}, {"step": "1"}], "systems"),
+        # What an earlier version has kept.
+        ("1234", [{"step": "1"}], "systems"),
+    ],
+)
+def test_what_makes_systems_others_is_named(tmp_path, before, now, words):
+    with open_store(tmp_path, {"made_of": {"systems": before}}, index_columns()):
+        pass
+    record = {"made_of": {"systems": now}}
+    check_refused(f"another study, which differs in {words}; choose", tmp_path, record)
+
+
 def test_folder_is_for_one_process(tmp_path):
     with open_store(tmp_path, RECORD, index_columns()):
         check_refused("another run is writing into", tmp_path)

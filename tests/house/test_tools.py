@@ -1,0 +1,28 @@
+"""The tools say what they do, and take nothing else for it."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+import pytest
+
+TOOLS = sorted((Path(__file__).parents[2] / "tools").glob("*.py"))
+
+#: Packages of the extras `docs` and `studies`.
+NEEDED = ("pandas", "PIL", "pyarrow", "scipy")
+
+
+@pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.stem)
+@pytest.mark.parametrize(("option", "code"), [("--help", 0), ("--unknown", 2)])
+def test_an_option_starts_nothing(tool: Path, option, code, tmp_path, monkeypatch, capsys):
+    for package in NEEDED:
+        pytest.importorskip(package)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [tool.name, option])
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_path(str(tool), run_name="__main__")
+    assert ended.value.code == code
+    assert tool.name in "".join(capsys.readouterr())
+    assert not any(tmp_path.iterdir())
