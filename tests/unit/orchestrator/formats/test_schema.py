@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from copy import deepcopy
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import pytest
-from pydantic import Field, model_validator
+from pydantic import ConfigDict, Field, model_validator
 
 from orchestrator.formats.schema import Names, OneOf, TomlTable, entries, entry, needed
 from orchestrator.machine.errors import Refused
@@ -34,9 +34,9 @@ class Route(TomlTable):
 
 
 class Routes(TomlTable):
-    named = Route
-    model_config = {**TomlTable.model_config, "extra": "allow"}
+    model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Route]
+    named: ClassVar = Route
 
 
 WHOLE: dict[str, Any] = {
