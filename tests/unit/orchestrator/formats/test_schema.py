@@ -71,7 +71,7 @@ def test_what_is_allowed_passes_and_is_left_as_it_is(gone):
         ({"rest": {"length": "far"}}, ["rest length far"]),
         ({"legs": [{"length": 1.0}, {"length": "x"}]}, ["leg 2 length x"]),
         ({"legs": [{"speed": 1.0}]}, ["leg 1 length 1.5"]),
-        ({"legs": []}, ["back"]),
+        ({"legs": []}, ["goes back from nowhere"]),
         ({"times": 0, "pace": "x"}, ["times 0", "pace x"]),
     ],
 )

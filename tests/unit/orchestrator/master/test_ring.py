@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import cos
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from orchestrator.master.fmi.instance import ComponentFailed
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Row
 from orchestrator.system.names import port_name
+from orchestrator.system.units import Linear
 from support.static import Function, Static, static_system
 from support.texts import mentions
 
@@ -74,6 +76,17 @@ def test_a_nonlinear_ring_comes_to_its_solution(folder):
     assert value(row, "a.y") == pytest.approx(DOTTIE, abs=1e-13)
 
 
+def test_what_happens_to_a_value_on_its_way_counts(folder):
+    """y = -3 y + 1."""
+    system = static_system(folder, "ab", BACK)
+    back, there = system.connections
+    system = replace(system, connections=(replace(back, transformation=Linear(-3.0, 1.0)), there))
+    instances = {name: Static(name, lambda u, v: (u, 0.0)) for name in "ab"}
+    row = Row(system, instances)
+    Ring("ab", system, instances, row).close()
+    assert value(row, "b.y") == pytest.approx(0.25, abs=1e-12)
+
+
 def test_whole_numbers_go_round_until_they_rest(folder):
     ring, row, _ = ring_of(
         folder, kind="Integer", a=lambda u, v: (min(u + 2, 7), 0), b=lambda u, v: (u, 0)
@@ -111,6 +124,9 @@ def test_a_ring_is_closed_anew_only_where_something_has_changed(folder):
     assert not ring.renew()
     assert [instances[name].exchanged for name in "ab"] == before
     assert ring.renew(always=True)
+    row.values[row.columns[port_name("a.u")]] = 5.0
+    assert ring.renew()
+    assert value(row, "b.y") == pytest.approx(6.0, abs=1e-12)
     row.values[row.columns[port_name("c.y")]] = 4.0
     assert ring.renew()
     assert value(row, "b.y") == pytest.approx(8.0, abs=1e-12)

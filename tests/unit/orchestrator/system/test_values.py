@@ -52,6 +52,7 @@ def test_other_values_come_back_from_their_texts(number, truth, text):
         found = typed("x", variable(kind), literal(value))
         assert (type(found), found) == (type(value), value)
         assert is_of(variable(kind), value)
+    assert typed("x", variable("Boolean"), str(truth).upper()) is truth
     # The command line cannot tell spaces around a text from its own.
     assert typed("x", variable("String"), literal(text)) == text.strip()
     assert is_of(variable("String"), text)
