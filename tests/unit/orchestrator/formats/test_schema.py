@@ -86,17 +86,6 @@ def test_each_mistake_is_named_once(change, culprits):
             assert mentions(problem, words + (" home" if table is Routes else ""))
 
 
-def test_what_is_missing_is_written_out():
-    class Two(TomlTable):
-        a: int = needed("One.", "1")
-        b: str = needed("Other.", '"x"')
-
-    with pytest.raises(Refused) as error:
-        Two.check("a.toml", {})
-    [problem] = error.value.problems
-    assert mentions(problem, 'a = 1, b = "x"')
-
-
 def test_entries_stand_as_in_the_file():
     found = entries(Route)
     assert list(found) == ["who", "times", "pace", "back", "legs", "rest"]

@@ -26,7 +26,6 @@ from orchestrator.runs.record import (
     loops_in,
     read_record,
     read_result,
-    table_in,
     write_content,
 )
 from orchestrator.system.names import PortName
@@ -112,11 +111,6 @@ def test_a_table_is_read_with_its_record_or_without(folder):
     assert (drawn.label, drawn.z_up) == ("result", False)
 
 
-def test_a_record_of_other_files_says_nothing(folder):
-    (folder / "other.csv").write_text((folder / "result.csv").read_text())
-    assert read_record(folder / "other.csv") == read_record(folder / "below" / "result.csv") == {}
-
-
 @pytest.mark.parametrize(
     "change",
     [
@@ -138,14 +132,6 @@ def test_rows_without_a_step_are_refused(tmp_path, text):
     (tmp_path / "t.csv").write_text(text)
     with pytest.raises(InputError, match=r"t\.csv"):
         read_result(tmp_path / "t.csv")
-
-
-def test_the_table_of_a_folder_is_found_in_either_format(folder):
-    assert table_in(folder) == table_in(folder / "result.csv") == folder / "result.csv"
-    (folder / "result.csv").rename(folder / "result.parquet")
-    assert table_in(folder) == folder / "result.parquet"
-    with pytest.raises(InputError, match="below"):
-        table_in(folder / "below")
 
 
 def test_a_run_lasts_as_long_as_it_does_whatever_the_clock_says(monkeypatch):

@@ -134,11 +134,6 @@ def test_stages_keep_the_order_of_every_feedthrough(graph, random, are_solved):
             assert any((a, stage[0]) in through for a in before)
 
 
-def test_a_ring_stands_where_the_first_of_its_components_does():
-    system = system_of("abcd", [("a", "d"), ("d", "a"), ("b", "c"), ("c", "b")])
-    assert derived_order(system, [["b", "c"], ["a", "d"]]) == ["a", "d", "b", "c"]
-
-
 def test_what_reaches_a_component_is_followed_upstream_to_where_it_may_go():
     system = system_of("abcde", [("a", "b"), ("b", "c"), ("c", "b")], [("d", "a"), ("c", "e")])
     assert ends(reaching(system, "c", set())) == [("a", "b"), ("b", "c"), ("c", "b"), ("d", "a")]

@@ -13,24 +13,21 @@ from hypothesis import strategies as st
 from orchestrator.machine.errors import InputError
 from orchestrator.system.values import (
     StringTable,
-    integer,
     is_finite,
     is_integer,
     is_of,
     literal,
-    real,
     same,
     typed,
-    unit_of,
 )
 from support.texts import mentions
 
 _SLOW, _FAST = SimpleNamespace(name="slow", value="2"), SimpleNamespace(name="fast", value="5")
-_SPEED = SimpleNamespace(unit="m", items=[_SLOW, _FAST])
+_SPEED = SimpleNamespace(items=[_SLOW, _FAST])
 
 
 def variable(kind: str, lower: str | None = None, upper: str | None = None, declared=None):
-    return SimpleNamespace(type=kind, min=lower, max=upper, declaredType=declared, unit=None)
+    return SimpleNamespace(type=kind, min=lower, max=upper, declaredType=declared)
 
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
@@ -101,13 +98,6 @@ def test_limits_themselves_are_taken():
         assert tuple(typed("x", of, value) for value in limits) == limits
 
 
-@pytest.mark.parametrize("text", ["1_0", "\u0661", "", "0x10", "1,5"])
-def test_only_what_every_program_reads_is_a_number(text):
-    for read in (real, integer):
-        with pytest.raises(ValueError):  # noqa: PT011
-            read(text)
-
-
 def test_a_value_of_another_type_is_none_of_the_variable():
     values = {"Real": 1.0, "Integer": 1, "Boolean": True, "String": "1"}
     for kind in values:
@@ -126,12 +116,6 @@ def test_an_fmu_may_round_a_value_by_a_billionth(value, share):
     if is_finite(other) and abs(value) > 1e-300 and abs(abs(share) - 1e-9) > 1e-13:
         assert same(value, other) == (abs(share) < 1e-9)
     assert not same("1", 1) and not same(1, 2) and same(1, 1.0)
-
-
-def test_a_variable_has_its_own_unit_or_its_type_s():
-    assert unit_of(variable("Real", declared=_SPEED)) == "m"
-    assert unit_of(SimpleNamespace(unit="s", declaredType=_SPEED)) == "s"
-    assert unit_of(variable("Real")) is None
 
 
 @given(st.lists(TEXTS), st.lists(TEXTS))
