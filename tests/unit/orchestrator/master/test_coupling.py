@@ -19,7 +19,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import ComponentFailed, Log
 from orchestrator.master.hooks.hook import NEVER
 from orchestrator.master.observers.observer import Header
-from orchestrator.master.plan import planned
+from orchestrator.master.plan import make_plan
 from orchestrator.master.row import Row
 from orchestrator.system.names import port_name
 from support.static import Static, static_system
@@ -91,7 +91,7 @@ def coupled(folder: Path, wires, coupling: str | None = None, steps=(), **functi
     system = replace(system, steps=dict(steps))
     instances = {name: Static(name, function) for name, function in functions.items()}
     row, log = Row(system, instances), Log()
-    plan = planned(system, Experiment(1.0, 0.125, coupling=coupling))
+    plan = make_plan(system, Experiment(1.0, 0.125, coupling=coupling))
     return Coupling(plan, instances, row, log), row, log
 
 

@@ -10,7 +10,7 @@ from typing import TypeAlias
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.system.graph import delayed, derived_order, in_stages, reaching, rings
+from orchestrator.system.graph import delayed_connections, derived_order, in_stages, reaching, rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 
@@ -92,7 +92,7 @@ def test_only_what_opens_a_ring_is_late_in_the_derived_order(graph):
     assert sorted(order) == sorted(names)
     late = {(a, b) for a, b in through if order.index(a) >= order.index(b)}
     assert late == opened(names, through)
-    assert ends(delayed(system, order)) == sorted(late)
+    assert ends(delayed_connections(system, order)) == sorted(late)
 
 
 @given(graphs())
@@ -102,7 +102,7 @@ def test_nothing_is_late_where_rings_are_solved(graph):
     solved = rings(system)
     order = derived_order(system, solved)
     assert sorted(order) == sorted(names)
-    assert delayed(system, order, solved) == []
+    assert delayed_connections(system, order, solved) == []
     for ring in solved:
         first = order.index(ring[0])
         assert order[first : first + len(ring)] == ring

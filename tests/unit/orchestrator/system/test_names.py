@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from orchestrator.machine.errors import InputError
 from orchestrator.system.names import (
     file_name,
-    flattened,
+    flatten,
     listed,
     plain_file_names,
     port_name,
@@ -39,8 +39,8 @@ def test_a_port_name_needs_both_of_its_parts():
 
 def test_keys_may_be_quoted_or_dotted():
     table = {"a": {"b": 1, "c.d": {"e": 2}}, "a.f": 3, "g": {"at": 4}}
-    assert dict(flattened(table)) == {"a.b": 1, "a.c.d.e": 2, "a.f": 3, "g.at": 4}
-    values = dict(flattened(table, lambda value: "at" in value))
+    assert dict(flatten(table)) == {"a.b": 1, "a.c.d.e": 2, "a.f": 3, "g.at": 4}
+    values = dict(flatten(table, lambda value: "at" in value))
     assert values == {"a.b": 1, "a.c.d.e": 2, "a.f": 3, "g": {"at": 4}}
 
 
