@@ -119,7 +119,7 @@ class ClassInstance(Instance):
         self.ports = self.slave._store.ports
         super().__init__(
             {
-                port.name: Variable(reference, port.kind, port.causality)
+                port.name: Variable(reference, port.type, port.causality)
                 for reference, port in enumerate(self.ports)
             }
         )
