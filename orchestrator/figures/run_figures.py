@@ -196,23 +196,23 @@ def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
     return figure
 
 
-def check_figure(kind: str) -> None:
+def check_figure(key: str) -> None:
     """Check before a run that its figure is known.
 
     Raises:
         InputError: it is not.
 
     """
-    if kind not in FIGURES:
-        hint = did_you_mean(kind, FIGURES) or f"; there are {', '.join(FIGURES)}"
-        raise InputError(f"no figure {kind!r}{hint}")
+    if key not in FIGURES:
+        hint = did_you_mean(key, FIGURES) or f"; there are {', '.join(FIGURES)}"
+        raise InputError(f"no figure {key!r}{hint}")
 
 
-def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
+def figure_files(key: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
     """The files that :func:`draw` may write.
 
     Args:
-        kind: key of :data:`FIGURES`.
+        key: of :data:`FIGURES`.
         stem: of their names.
         loops: of the vehicles.
 
@@ -220,13 +220,13 @@ def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> l
     return [
         f"{stem}{vehicle}{suffix}.{ending}"
         for vehicle in suffixes(loops).values()
-        for suffix in FIGURES[kind]
+        for suffix in FIGURES[key]
         for ending in FIGURE_FORMATS
     ]
 
 
 def draw(
-    kind: str,
+    key: str,
     title: str,
     runs: Sequence[Drawn],
     folder: Path,
@@ -238,7 +238,7 @@ def draw(
     Of several vehicles each has its own, together with the vehicle of that name in the other runs.
 
     Args:
-        kind: key of :data:`FIGURES`.
+        key: of :data:`FIGURES`.
         title: heading; empty where there is one beside the figure.
         runs: the run of the scenario, and those it is compared with.
         folder: to write into.
@@ -253,7 +253,7 @@ def draw(
     for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
         of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
         name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
-        notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
+        notes += _drawn(key, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
     return notes
 
 
@@ -264,7 +264,7 @@ def _same(run: Drawn, loop: Loop, i: int) -> Loop:
 
 
 def _drawn(
-    kind: str,
+    key: str,
     title: str,
     runs: Sequence[Drawn],
     folder: Path,
@@ -273,7 +273,7 @@ def _drawn(
 ) -> list[str]:
     """Draw the figures of one vehicle, and say what was left out."""
     notes: list[str] = []
-    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
+    bar = tqdm(FIGURES[key].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
     for suffix, rows in bar:
         if stop():
             break

@@ -148,9 +148,9 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
         folder: to write into.
 
     """
-    kind = section.scenario.figure
-    if kind not in FIGURES:
-        return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
+    key = section.scenario.figure
+    if key not in FIGURES:
+        return [f"no figure: there is none of the name {key!r}{did_you_mean(key, FIGURES)}"]
     runs = [
         Drawn(label, kept_run.table, section.scenario.z_up, kept_run.loops)
         for label, kept_run in zip(section.runs, kept_runs, strict=True)
@@ -160,7 +160,7 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
         return []
     folder.mkdir(parents=True)
     # The heading of the section stands above the figure already.
-    return draw(kind, "", runs, folder, section.name)
+    return draw(key, "", runs, folder, section.name)
 
 
 def section_text(

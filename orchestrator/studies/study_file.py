@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_figures import FIGURE_KINDS, FigureEntry
+from orchestrator.figures.study_figures import CHARTS, FigureEntry
 from orchestrator.figures.study_values import SCENARIO, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
@@ -112,8 +112,8 @@ class StopTimeTable(TomlTable):
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
-    kind: Annotated[str, OneOf(tuple(FIGURE_KINDS))] = needed(
-        "What it is.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
+    kind: Annotated[str, OneOf(tuple(CHARTS))] = needed(
+        "What it is.", " or ".join(f'"{chart}"' for chart in CHARTS)
     )
     x: Names = entry(
         "Value along the horizontal axis; of `bands` also several, a column of panels each; of "
@@ -129,8 +129,8 @@ class FigureTable(TomlTable):
     limits: _Numbers = entry("Lines at values of what is shown.", "none")
 
     @model_validator(mode="after")
-    def _has_what_its_kind_has(self) -> Self:
-        _, needs, may = FIGURE_KINDS[self.kind]
+    def _has_what_its_chart_needs(self) -> Self:
+        _, needs, may = CHARTS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:
@@ -337,7 +337,7 @@ def read_figures(
     if not tables and numbers:
         tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
     by = (SCENARIO,) if is_compared else ()
-    findings, plans = Findings(), []
+    findings, entries = Findings(), []
     for name, table in tables.items():
         with findings.collecting():
             if not _NAME.fullmatch(name):
@@ -345,7 +345,7 @@ def read_figures(
                     f"{where}: figures: {name!r} is no name of a file: letters, digits, -"
                 )
             _check_figure(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
-        plans.append(
+        entries.append(
             FigureEntry(
                 name,
                 table["kind"],
@@ -359,7 +359,7 @@ def read_figures(
             )
         )
     findings.refuse()
-    return tuple(plans)
+    return tuple(entries)
 
 
 def _usual(indices: Sequence[str]) -> list[str]:

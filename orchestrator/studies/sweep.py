@@ -153,13 +153,13 @@ def complete_study(
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     systems = {name: load_scenario(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
-    plans = read_figures(
+    entries = read_figures(
         study.name, study.figures, space.columns, space.has_scenarios, space.indices
     )
     engine = _engine(means.engine or study.engine, space.prepared, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
     with open_store(folder, record, space.indices, means.force) as kept:
-        kept.ledger.check(figure_files(plans))
+        kept.ledger.check(figure_files(entries))
         if not kept.is_done:
             if not len(kept) and (hint := faster(space, engine, means)):
                 say(hint)
@@ -170,7 +170,7 @@ def complete_study(
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(draw_figures(plans, study.title, result, unfinished, legends))
+            notes = list(draw_figures(entries, study.title, result, unfinished, legends))
         for note in notes:
             say(note)
     return result

@@ -165,9 +165,9 @@ def quick(here: Path) -> Iterator[None]:
         return [Path(shutil.copy(path, folder)) for path in found]
 
     def drawn(
-        kind: str, title: str, runs: object, folder: Path, stem: str, **_: object
+        key: str, title: str, runs: object, folder: Path, stem: str, **_: object
     ) -> list[str]:
-        for name in figure_files(kind, stem):
+        for name in figure_files(key, stem):
             (folder / name).write_bytes(b"drawn")
         return []
 
