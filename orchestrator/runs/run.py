@@ -131,7 +131,7 @@ def run_into(
             files.checkpoint_every,
             files.resume,
             files.force,
-            Ledger(folder).identity,
+            Ledger(folder).token,
             say,
         )
         spare = unfinished / _SPARE
