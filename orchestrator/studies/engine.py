@@ -98,7 +98,9 @@ class FmuEngine:
 
         """
         # Compiled loops do not travel: each run takes one where it is made.
-        self._prepared = {name: replace(one, loop=PYTHON_LOOP) for name, one in prepared.items()}
+        self._prepared = {
+            name: replace(one, stepping=PYTHON_LOOP) for name, one in prepared.items()
+        }
         self._loop = loop
 
     @property
@@ -128,8 +130,8 @@ class FmuEngine:
             prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
         )
         indices = Indices(loops_of(system))
-        plan, loop = make_plan(system, experiment), choose_loop(self._loop, experiment)
-        ending = replace(prepared, plan=plan, loop=loop).run([indices])
+        plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
+        ending = replace(prepared, plan=plan, stepping=stepping).run([indices])
         if ending.signals:
             raise KeyboardInterrupt
         if ending.failure is not None:
