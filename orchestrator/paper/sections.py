@@ -184,7 +184,7 @@ def section_text(
     yield from (f"Note: {escape_markdown(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
-    made = {label: kept_runs[run] for label, run in section.runs.items()}
+    made = {label: kept_runs[request] for label, request in section.runs.items()}
     for label, kept_run in made.items():
         if kept_run.failure is not None:
             why = escape_markdown(kept_run.failure)
@@ -201,9 +201,9 @@ def section_text(
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(run)}`"
-        + (f", until {time:g} s" if (time := kept_runs[run].metrics.get("stop_time")) else "")
-        for label, run in section.runs.items()
+        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(request)}`"
+        + (f", until {time:g} s" if (time := kept_runs[request].metrics.get("stop_time")) else "")
+        for label, request in section.runs.items()
     )
     if scenario.ours:
         yield "Ours, not the paper's:"

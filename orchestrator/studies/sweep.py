@@ -117,9 +117,9 @@ def sweep(
         KeyboardInterrupt: Ctrl-C; what is done is kept.
 
     """
-    plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
+    wanted = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return complete_study(plan, means, study_folder(plan, out), sys.argv, progress=progress)
+    return complete_study(wanted, means, study_folder(wanted, out), sys.argv, progress=progress)
 
 
 def study_folder(study: Study, out: str | Path | None) -> Path:
@@ -265,7 +265,7 @@ def _record(
 @contextmanager
 def making_runs(
     engine: Engine,
-    runs: Iterable[Point],
+    points: Iterable[Point],
     *,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -277,7 +277,7 @@ def making_runs(
 
     Args:
         engine: what makes them.
-        runs: to be made.
+        points: to be made.
         scheduler: address of a Dask scheduler; None for processes of this machine.
         workers: how many processes of this machine; None for one a core.
 
@@ -298,7 +298,7 @@ def making_runs(
     else:
         crew = local_workers(workers, engine)
     with crew as of:
-        yield Making(of).outcomes(runs)
+        yield Making(of).outcomes(points)
 
 
 def _complete(
@@ -314,9 +314,9 @@ def _complete(
         name: of the study, for a bar; None: there is no bar.
 
     """
-    runs = (space[number] for number in unfinished.missing(len(space)))
+    points = (space[number] for number in unfinished.missing(len(space)))
     with (
-        making_runs(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
+        making_runs(engine, points, scheduler=means.scheduler, workers=means.workers) as blocks,
         tqdm(
             total=len(space),
             initial=len(unfinished),

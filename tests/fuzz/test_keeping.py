@@ -176,8 +176,10 @@ def quick(here: Path) -> Iterator[None]:
         return drawn(section.scenario.figure, "", made, folder, section.name)
 
     @contextmanager
-    def making(engine: Engine, runs: Iterable[Point], **_: object) -> Iterator[list[list[Outcome]]]:
-        yield [list(engine.outcomes([run])) for run in runs]
+    def making(
+        engine: Engine, points: Iterable[Point], **_: object
+    ) -> Iterator[list[list[Outcome]]]:
+        yield [list(engine.outcomes([point])) for point in points]
 
     with ExitStack() as stack:
         for what, name, instead in (
