@@ -109,7 +109,7 @@ def simulate_plan(
                     with suppress(ComponentFailed):
                         instance.terminate()
             ending = Ending(
-                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+                failure, remark, log.messages, tuple(interrupts.numbers), tuple(run.happened)
             )
             tell(ending)
         return ending
@@ -126,7 +126,7 @@ def simulate_to_end(
 
     """
     ending = simulate_plan(plan, observers, exchange=exchange)
-    if ending.signals:
+    if ending.interrupts:
         raise KeyboardInterrupt
     if ending.failure is not None:
         raise InputError(f"{plan.system.name} {ending.failure}")
@@ -192,7 +192,7 @@ def _advance(
                 hooks.act()
             if monotonic() > blocks.due:
                 blocks.hand_over()
-            if run.interrupts.signals:
+            if run.interrupts.numbers:
                 failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
                 break
     except ComponentFailed as error:

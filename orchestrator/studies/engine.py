@@ -132,7 +132,7 @@ class FmuEngine:
         indices = Indices(loops_of(system))
         plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
         ending = replace(prepared, plan=plan, stepping=stepping).run([indices])
-        if ending.signals:
+        if ending.interrupts:
             raise KeyboardInterrupt
         if ending.failure is not None:
             return Outcome(point.number, {}, ending.failure)
