@@ -284,12 +284,12 @@ def _batch(
     arrow: Any, schema: Any, space: Space, rows: Sequence[tuple[int, bytes, str | None]]
 ) -> Any:
     numbers, indices, failures = zip(*rows, strict=True)
-    scenarios, points = zip(*map(space.point, numbers), strict=True)
+    scenarios, chosen = zip(*map(space.chosen, numbers), strict=True)
     values = np.frombuffer(b"".join(indices)).reshape(len(rows), -1)
     columns = [
         numbers,
         *([scenarios] * space.has_scenarios),
-        *([point[name] for point in points] for name in space.columns),
+        *([one[name] for one in chosen] for name in space.columns),
         *values.T,
         failures,
     ]
