@@ -48,9 +48,9 @@ def processor(function: Callable[[], object]) -> float:
     return timed(function, process_time)
 
 
-def make(engine: BatchEngine, runs: Iterable[Point]) -> None:
+def make(engine: BatchEngine, points: Iterable[Point]) -> None:
     """Make runs and forget them."""
-    deque(engine.outcomes(runs), maxlen=0)
+    deque(engine.outcomes(points), maxlen=0)
 
 
 def straight(setting: Setting, steps: int) -> None:
@@ -62,11 +62,14 @@ def compare(engine: BatchEngine, steps: int, repetitions: int) -> None:
     """Print what a step costs."""
     print(f"medians of {repetitions} repetitions of {steps} steps, processor's time")
     for name in _SCENARIOS:
-        run = Point(0, name, {}, steps * _STEP, _STEP)
-        setting = engine.setting(run)
-        make(engine, [run])
+        point = Point(0, name, {}, steps * _STEP, _STEP)
+        setting = engine.setting(point)
+        make(engine, [point])
         rows = [
-            (processor(partial(straight, setting, steps)), processor(partial(make, engine, [run])))
+            (
+                processor(partial(straight, setting, steps)),
+                processor(partial(make, engine, [point])),
+            )
             for _ in range(repetitions)
         ]
         a, b = (1e6 * median(times) / steps for times in zip(*rows, strict=True))
@@ -81,8 +84,8 @@ def grow(engine: BatchEngine) -> None:
     """Print what runs cost where there are many."""
     print(f"{'runs':>8} {'us a run':>9} {'resident [MB]':>14}")
     for n in _MANY:
-        runs = (Point(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
-        seconds = processor(partial(make, engine, runs))
+        points = (Point(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
+        seconds = processor(partial(make, engine, points))
         print(f"{n:8} {1e6 * seconds / n:9.1f} {resident():14.1f}")
 
 
@@ -93,18 +96,18 @@ def check(n: int) -> None:
         systems = {one: load_scenario(one) for one in study.scenario}
         engine = BatchEngine({one: system for one, (_, system) in systems.items()})
         space = Space(study, systems)
-        runs = [space[number] for number in Random(name).sample(range(len(space)), n)]
-        same = sum(map(is_straight, [engine] * n, runs))
+        points = [space[number] for number in Random(name).sample(range(len(space)), n)]
+        same = sum(map(is_straight, [engine] * n, points))
         print(f"{name:12} {same} of {n} runs end in the same state", flush=True)
 
 
-def is_straight(engine: BatchEngine, run: Point) -> bool:
+def is_straight(engine: BatchEngine, point: Point) -> bool:
     """Whether a run ends in the state in which the straight line ends, which has equal steps."""
-    experiment = Experiment(run.stop_time, run.step, run.order)
-    run = run._replace(stop_time=experiment.time(experiment.full_steps))
-    table = engine.table(run)
-    delayed = run.order == "jacobi"
-    *_, before, last = closed_loop(len(table) - 1, engine.setting(run), delayed)
+    experiment = Experiment(point.stop_time, point.step, point.order)
+    point = point._replace(stop_time=experiment.time(experiment.full_steps))
+    table = engine.table(point)
+    delayed = point.order == "jacobi"
+    *_, before, last = closed_loop(len(table) - 1, engine.setting(point), delayed)
     state = before.controller_state
     theta_hat = getattr(state, "theta_hat", state)
     ends = (*last.vehicles.plant.position, *last.scene.plant.nu, *theta_hat)

@@ -69,12 +69,12 @@ def master_alone(system: System, steps: int) -> float:
         return steps_time(system, steps)
 
 
-def compiled_alone(system: System, steps: int, loop: Stepping) -> float:
+def compiled_alone(system: System, steps: int, stepping: Stepping) -> float:
     """Seconds of the steps of the compiled loop when every function it calls does nothing."""
     # One, which is FMI's warning, is all that this one has to say.
     nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
     with patch.object(LoadedInstance, "_address", lambda *_: nothing):
-        return steps_time(system, _TIMES * steps, loop=loop) / _TIMES
+        return steps_time(system, _TIMES * steps, stepping=stepping) / _TIMES
 
 
 def main() -> None:
@@ -89,7 +89,7 @@ def main() -> None:
         fmus = steps_time(system, given.steps)
         empty = with_empty_steps(system, given.steps)
         master = master_alone(system, given.steps)
-        compiled = steps_time(system, given.steps, loop=fast)
+        compiled = steps_time(system, given.steps, stepping=fast)
         stepper = compiled_alone(system, given.steps, fast)
         rows.append((straight, fmus, empty, master, compiled, stepper))
 

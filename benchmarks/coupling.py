@@ -43,7 +43,7 @@ def _time(system: System, step: float, coupling: str) -> float:
     def run(n: int) -> float:
         experiment = Experiment(n * step, step, coupling=coupling)
         begin = perf_counter()
-        simulate_plan(make_plan(system, experiment), loop=choose_loop("compiled", experiment))
+        simulate_plan(make_plan(system, experiment), stepping=choose_loop("compiled", experiment))
         return perf_counter() - begin
 
     return 1e6 * (run(_STEPS) - run(1)) / (_STEPS - 1)

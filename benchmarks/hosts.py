@@ -60,9 +60,9 @@ def ours(system: System, order: str) -> tuple[Run, float]:
     def run(steps: int) -> float:
         request = Request(stop_time=steps * step, step=step, order=order)
         prepared, table = prepare(Scenario(system.name), system, request), Table()
-        loop = choose_loop("auto", prepared.experiment)
+        stepping = choose_loop("auto", prepared.experiment)
         start = perf_counter()
-        ending = simulate_plan(prepared.plan, [table], loop=loop)
+        ending = simulate_plan(prepared.plan, [table], stepping=stepping)
         seconds = perf_counter() - start
         if ending.failure is not None or len(table) != steps + 1:
             raise InputError(f"{ending.failure or ending.remark}")

@@ -51,14 +51,14 @@ def steps_time(
     system: System,
     steps: int,
     order: Order = ORDERS[0],
-    loop: Stepping = PYTHON_LOOP,
+    stepping: Stepping = PYTHON_LOOP,
     isolation: Isolation | None = None,
 ) -> float:
     """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
 
     def run(n: int) -> None:
         simulate_plan(
-            make_plan(system, Experiment(n * STEP, STEP, order)), [Table()], isolation, loop
+            make_plan(system, Experiment(n * STEP, STEP, order)), [Table()], isolation, stepping
         )
 
     return timed(lambda: run(steps)) - timed(lambda: run(1))

@@ -52,13 +52,13 @@ class Timed(NamedTuple):
     engine: Engine
     digest: str = "timed"
 
-    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
         """Make runs, one after the other."""
-        outcomes = self.engine.outcomes(runs)
-        for run in runs:
+        outcomes = self.engine.outcomes(points)
+        for point in points:
             start = process_time()
             next(outcomes)
-            yield Outcome(run.number, {"seconds": process_time() - start})
+            yield Outcome(point.number, {"seconds": process_time() - start})
 
 
 class Idle(NamedTuple):
@@ -66,10 +66,10 @@ class Idle(NamedTuple):
 
     digest: str = "idle"
 
-    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
         """Make nothing."""
-        for run in runs:
-            yield Outcome(run.number, dict.fromkeys(index_columns(), 0.1 * run.number))
+        for point in points:
+            yield Outcome(point.number, dict.fromkeys(index_columns(), 0.1 * point.number))
 
 
 class Cost(NamedTuple):
@@ -79,9 +79,9 @@ class Cost(NamedTuple):
     wall: float
 
 
-def cost(engine: Engine, runs: Iterable[Point], workers: int) -> Cost:
+def cost(engine: Engine, points: Iterable[Point], workers: int) -> Cost:
     """What runs take when some processes make them."""
-    with making_runs(Timed(engine), iter(runs), workers=workers) as blocks:
+    with making_runs(Timed(engine), iter(points), workers=workers) as blocks:
         for _ in islice(blocks, _WARM * workers):
             pass
         start = perf_counter()

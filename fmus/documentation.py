@@ -109,9 +109,9 @@ def _alike(ports: Sequence[Port]) -> Iterable[list[Port]]:
 
 def _row(ports: Sequence[Port], types: Mapping[str, str]) -> list[str]:
     port, last = ports[0], ports[-1]
-    kind = types.get(port.kind, port.kind)
+    cell = types.get(port.type, port.type)
     name = f"`{port.name}`" if port is last else f"`{port.name}` to `{last.name}`"
-    cells = [name, kind, port.unit or "", port.description]
+    cells = [name, cell, port.unit or "", port.description]
     if port.causality == "parameter":
         starts = [_literal(one.start) for one in ports]
         while len(starts) > 1 and starts[-1] == starts[-2]:

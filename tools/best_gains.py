@@ -42,7 +42,7 @@ class Search:
         assert study.sample and study.stop_time, study.name
         system = load(scenario)
         self._engine = BatchEngine({scenario: system})
-        self._run = Point(0, scenario, study.parameters, study.stop_time.base, STEP)
+        self._point = Point(0, scenario, study.parameters, study.stop_time.base, STEP)
         has = system.components["controller"].variables
         ranges = study.sample.ranges
         self.gains = [name for name in ranges if name.partition(".")[2] in has]
@@ -51,8 +51,8 @@ class Search:
     def indices(self, logarithms: Sequence[float]) -> tuple[float, float]:
         """The largest error late in the run [m], and the largest command [N, N·m]."""
         gains = dict(zip(self.gains, map(exp, logarithms), strict=True))
-        run = self._run._replace(parameters={**self._run.parameters, **gains})
-        [outcome] = self._engine.outcomes([run])
+        point = self._point._replace(parameters={**self._point.parameters, **gains})
+        [outcome] = self._engine.outcomes([point])
         peaks = [outcome.indices[f"peak_command.{name}"] for name in ACTUATORS]
         return outcome.indices["late_error"], max(peaks)
 

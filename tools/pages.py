@@ -98,7 +98,7 @@ def scenarios() -> dict[str, str]:
         (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
     )
     wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
-    figures = ((f"`{kind}`", ", ".join(used)) for kind, used in drawn.items())
+    figures = ((f"`{key}`", ", ".join(used)) for key, used in drawn.items())
     return {
         "entries": _entries(ScenarioFile),
         "path": _entries(PathTable),

@@ -34,9 +34,9 @@ def main() -> None:
         result = StudyResult(folder)
         study = read_study(result.record["study"])
         space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
-        plans = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
+        entries = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
-            list(draw_figures(plans, study.title, result, Path(drawn)))
+            list(draw_figures(entries, study.title, result, Path(drawn)))
             for picture in sorted(Path(drawn).glob("*.png")):
                 file = DOCS / PICTURES / f"{study.name}-{picture.name}"
                 Image.open(picture).convert("RGB").save(file, optimize=True)

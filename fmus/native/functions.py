@@ -159,7 +159,7 @@ class _Translation:
         returns = hints.pop("return")
         self._made = Function(
             c_name(function.__module__, function.__name__),
-            {name: program.shape(kind) for name, kind in hints.items()},
+            {name: program.shape(hint) for name, hint in hints.items()},
             None if returns is type(None) else program.shape(returns),
         )
         self._in_c = Expressions(program, self._path, function.__globals__, self._made)

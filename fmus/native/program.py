@@ -50,25 +50,25 @@ DOUBLE, INTEGER, TEXT = Scalar("double"), Scalar("int"), Scalar("const char *")
 _SCALARS = {float: DOUBLE, int: INTEGER, bool: INTEGER, str: TEXT}
 
 #: Names of tuples that the equations have given them.
-_NAMES = {kind: name for name, kind in vars(vectors).items() if get_origin(kind) is tuple}
+_NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
 
 
-def shape_of(kind: Any) -> Shape:
+def shape_of(hint: Any) -> Shape:
     """What a type is in C.
 
     Raises:
         TypeError: it is nothing there.
 
     """
-    if kind in _SCALARS:
-        return _SCALARS[kind]
-    if get_origin(kind) is tuple:
-        return structure([shape_of(k) for k in get_args(kind)], _NAMES.get(kind))
-    if isinstance(kind, type) and hasattr(kind, "__annotations__"):
-        hints = get_type_hints(kind)
-        parts = tuple((f".{name}", shape_of(hint)) for name, hint in hints.items())
-        return Structure(kind.__name__, parts, kind)
-    raise TypeError(f"{kind} is not a type in the language of equations")
+    if hint in _SCALARS:
+        return _SCALARS[hint]
+    if get_origin(hint) is tuple:
+        return structure([shape_of(part) for part in get_args(hint)], _NAMES.get(hint))
+    if isinstance(hint, type) and hasattr(hint, "__annotations__"):
+        hints = get_type_hints(hint)
+        parts = tuple((f".{name}", shape_of(part)) for name, part in hints.items())
+        return Structure(hint.__name__, parts, hint)
+    raise TypeError(f"{hint} is not a type in the language of equations")
 
 
 def structure(items: list[Shape], name: str | None = None) -> Structure:
@@ -168,9 +168,9 @@ class Program:
         self.functions: dict[FunctionType, Function] = {}
         self._begun: set[FunctionType] = set()
 
-    def shape(self, kind: Any) -> Shape:
+    def shape(self, hint: Any) -> Shape:
         """What a type is in C; its structures are defined."""
-        return self.defined(shape_of(kind))
+        return self.defined(shape_of(hint))
 
     def defined(self, shape: Shape) -> Shape:
         """The shape, whose structures are defined."""

@@ -184,7 +184,7 @@ def tables(package: str) -> str:
         places[name] = f"PARAMETER_AT(model.{_member(path)})"
     references = {
         causality: [
-            i for i, port in enumerate(ports) if (port.causality, port.kind) == (causality, "Real")
+            i for i, port in enumerate(ports) if (port.causality, port.type) == (causality, "Real")
         ]
         for causality in ("input", "output")
     }
@@ -213,7 +213,7 @@ def _row(port: Port, places: Mapping[str, str]) -> str:
     return ", ".join(
         (
             f'"{port.name}"',
-            port.kind.upper(),
+            port.type.upper(),
             port.causality.upper(),
             port.variability.upper(),
             places[port.name],

@@ -153,7 +153,7 @@ def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
             direct = [places[name] for name in port.feedthrough if name in places]
             # fault is false at the start, unless what is set is refused.
             start = [places[name] for name in port.initially]
-            initial = [*direct, *start, *parameters] if port.kind == "Real" else []
+            initial = [*direct, *start, *parameters] if port.type == "Real" else []
             yield Dependency(places[port.name], direct, initial)
 
 
@@ -237,7 +237,7 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
 
 def _variable(reference: int, port: Port) -> Element:
     variable = Element("ScalarVariable", variable_attributes(reference, port))
-    SubElement(variable, port.kind, value_attributes(port))
+    SubElement(variable, port.type, value_attributes(port))
     return variable
 
 

@@ -98,7 +98,7 @@ def _variables(ports: Sequence[Port]) -> Element:
     variables = Element("ModelVariables")
     for place, port in enumerate(ports, start=1):
         attributes = {**variable_attributes(place, port), **value_attributes(port)}
-        variable = SubElement(variables, TYPES[port.kind], attributes)
+        variable = SubElement(variables, TYPES[port.type], attributes)
         if isinstance(port.start, str):
             SubElement(variable, "Start", value=variable.attrib.pop("start"))
     return variables

@@ -36,8 +36,8 @@ def slices(ports: Sequence[Port]) -> dict[str, slice]:
 def _sizes(fields: type) -> dict[str, int]:
     """The fields of a NamedTuple or TypedDict and how many values each holds."""
     return {
-        name: len(get_args(kind)) if get_origin(kind) is tuple else 1
-        for name, kind in get_type_hints(fields).items()
+        name: len(get_args(hint)) if get_origin(hint) is tuple else 1
+        for name, hint in get_type_hints(fields).items()
     }
 
 

@@ -37,7 +37,7 @@ class Port:
         name: structured name, for example `tau.u`.
         causality: `input`, `output`, `parameter`, or `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
-        kind: FMI type: `Real`, `Integer`, `Boolean` or `String`.
+        type: of FMI: `Real`, `Integer`, `Boolean` or `String`.
         unit: of a Real, a key of :data:`fmus.ports.description.UNITS`.
         start: value before anything is set. Outputs have none.
         description: one line.
@@ -51,7 +51,7 @@ class Port:
     name: str
     causality: str
     variability: str
-    kind: str
+    type: str
     description: str
     unit: str | None = None
     start: Value | None = None
@@ -68,14 +68,14 @@ class Port:
             Refusal: it is of another type, not finite, out of range, or not one of the choices.
 
         """
-        if type(value) not in _TYPES[self.kind]:
-            raise Refusal(f"{self.name} = {value!r:.20}: must be a {self.kind}")
+        if type(value) not in _TYPES[self.type]:
+            raise Refusal(f"{self.name} = {value!r:.20}: must be a {self.type}")
         if isinstance(value, str):
             if value not in self.choices:
                 raise Refusal(f"{self.name} = {value!r}: use one of {', '.join(self.choices)}")
         elif not -_LARGEST <= value <= _LARGEST:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
-        elif self.kind == "Integer" and not -(2**31) <= value < 2**31:
+        elif self.type == "Integer" and not -(2**31) <= value < 2**31:
             raise Refusal(f"{self.name} = {value!r:.20}: must fit into 32 bits")
         elif self.minimum is not None and value < self.minimum:
             raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
@@ -143,8 +143,8 @@ def setting(
     maximum: int | None = None,
 ) -> Port:
     """A fixed parameter that is not a Real: it has the type of its start value."""
-    kind = {bool: "Boolean", int: "Integer", str: "String"}[type(start)]
-    about = ("parameter", "fixed", kind, description, None)
+    fmi_type = {bool: "Boolean", int: "Integer", str: "String"}[type(start)]
+    about = ("parameter", "fixed", fmi_type, description, None)
     return Port(name, *about, start, minimum, maximum, choices or {})
 
 

@@ -71,31 +71,31 @@ class Store:
         return [
             reference
             for reference, port in enumerate(self.ports)
-            if port.causality == causality and port.kind == "Real"
+            if port.causality == causality and port.type == "Real"
         ]
 
-    def port(self, reference: int, *kinds: str) -> Port:
+    def port(self, reference: int, *types: str) -> Port:
         """The port of one of some types that has a value reference.
 
         Raises:
             Refusal: there is none.
 
         """
-        if not 0 <= reference < len(self.ports) or self.ports[reference].kind not in kinds:
+        if not 0 <= reference < len(self.ports) or self.ports[reference].type not in types:
             # PythonFMU hands references from 2^31 over as negative numbers.
-            raise Refusal(f"no {kinds[0]} has the value reference {reference % 2**32}")
+            raise Refusal(f"no {types[0]} has the value reference {reference % 2**32}")
         return self.ports[reference]
 
-    def get(self, reference: int, kind: str) -> Value:
+    def get(self, reference: int, fmi_type: str) -> Value:
         """The value of a port.
 
         Raises:
             Refusal: no port with the reference has a value of this type.
 
         """
-        if kind == "Real":
+        if fmi_type == "Real":
             return float(self._value(reference, self.port(reference, *_NUMBERS)))
-        return self._value(reference, self.port(reference, kind))
+        return self._value(reference, self.port(reference, fmi_type))
 
     def _value(self, reference: int, port: Port) -> Value:
         if port is FAULT:
@@ -215,23 +215,23 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             if why:
                 self._answer(Fmi2Status.error, why)
 
-    def _get(self, vrs: list[int], kind: str) -> list[Any]:
+    def _get(self, vrs: list[int], fmi_type: str) -> list[Any]:
         values: list[Value] = []
         for reference in vrs:
             try:
-                values.append(self._store.get(reference, kind))
+                values.append(self._store.get(reference, fmi_type))
             except Refusal as refusal:
                 self._answer(Fmi2Status.error, str(refusal))
-                values.append(MISSING[kind])
+                values.append(MISSING[fmi_type])
         return values
 
-    def _set(self, vrs: list[int], values: Sequence[Value], kind: str) -> None:
+    def _set(self, vrs: list[int], values: Sequence[Value], fmi_type: str) -> None:
         """Take all values of a call, or none."""
         if self._mode == TERMINATED:
-            self._follows(f"fmi2Set{kind}", STEPPING)
+            self._follows(f"fmi2Set{fmi_type}", STEPPING)
             return
         try:
-            ports = [self._store.port(reference, kind) for reference in vrs]
+            ports = [self._store.port(reference, fmi_type) for reference in vrs]
         except Refusal as refusal:
             self._fail(str(refusal))
             return

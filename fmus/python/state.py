@@ -31,26 +31,26 @@ _ROUNDING = 1e-9
 _CHECKSUM = "checksum"
 
 
-def measuring(kind: type) -> Callable[[Any], float]:
+def measuring(hint: type) -> Callable[[Any], float]:
     """A function that gives the Euclidean norm of all floats of a state: NaN if one is NaN.
 
     It runs once a step, and written out it costs a third of a loop.
     """
     names, floats = (f"x{i}" for i in count()), []
 
-    def target(kind: Any) -> str:
-        kinds = _elements(kind)
-        if kinds is not None:
-            return f"({''.join(f'{target(k)}, ' for k in kinds)})"
+    def target(hint: Any) -> str:
+        hints = _elements(hint)
+        if hints is not None:
+            return f"({''.join(f'{target(k)}, ' for k in hints)})"
         name = next(names)
-        if kind is float:
+        if hint is float:
             floats.append(name)
-        elif kind not in _SCALARS:
+        elif hint not in _SCALARS:
             floats.append(f"norm({name})")
         return name
 
     scope: dict[str, Any] = {"hypot": hypot, "norm": _norm}
-    pattern = target(kind)
+    pattern = target(hint)
     norm = f"hypot({', '.join(floats)})" if floats else "0.0"
     text = f"def function(state):\n {pattern} = state\n return {norm}"
     exec(text, scope)
@@ -64,53 +64,53 @@ def _norm(value: Any) -> float:
     return value if isinstance(value, float) else 0.0
 
 
-def _elements(kind: Any) -> list[Any] | None:
+def _elements(hint: Any) -> list[Any] | None:
     """The types of the elements of a tuple that is always of the same length."""
-    if isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields"):
-        hints = get_type_hints(kind)
-        return [hints[name] for name in kind._fields]
-    arguments = get_args(kind)
-    return [*arguments] if get_origin(kind) is tuple and Ellipsis not in arguments else None
+    if isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields"):
+        hints = get_type_hints(hint)
+        return [hints[name] for name in hint._fields]
+    arguments = get_args(hint)
+    return [*arguments] if get_origin(hint) is tuple and Ellipsis not in arguments else None
 
 
-def restored(kind: Any, value: Any) -> Any:
+def restored(hint: Any, value: Any) -> Any:
     """A state, or a part of one, as it was before memory or JSON took it.
 
     Args:
-        kind: its type.
+        hint: of its type.
         value: the state or part, perhaps with lists instead of tuples.
 
     Raises:
         Refusal: it is of another type or length, or not finite.
 
     """
-    kinds = _elements(kind)
-    if kinds is not None:
-        if not isinstance(value, (list, tuple)) or len(value) != len(kinds):
-            raise Refusal(f"{_shown(value)} instead of {len(kinds)} values")
-        made = map(restored, kinds, value)
-        return kind._make(made) if hasattr(kind, "_make") else tuple(made)
-    if _is_union(kind):
-        return _as_one_of(get_args(kind), value)
-    if kind is float and type(value) in (float, int):
+    hints = _elements(hint)
+    if hints is not None:
+        if not isinstance(value, (list, tuple)) or len(value) != len(hints):
+            raise Refusal(f"{_shown(value)} instead of {len(hints)} values")
+        made = map(restored, hints, value)
+        return hint._make(made) if hasattr(hint, "_make") else tuple(made)
+    if _is_union(hint):
+        return _as_one_of(get_args(hint), value)
+    if hint is float and type(value) in (float, int):
         if not abs(value) <= sys.float_info.max:
             raise Refusal("a value is not finite")
         return value
-    if kind in _SCALARS and type(value) is not kind:
-        raise Refusal(f"{_shown(value)} is not of type {kind.__name__}")
+    if hint in _SCALARS and type(value) is not hint:
+        raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
     return frozen(value)
 
 
-def _is_union(kind: Any) -> bool:
+def _is_union(hint: Any) -> bool:
     """Whether a type is `Union[A, B]`, `Optional[A]` or, from Python 3.10, `A | B`."""
-    return get_origin(kind) is Union or type(kind).__name__ == "UnionType"
+    return get_origin(hint) is Union or type(hint).__name__ == "UnionType"
 
 
-def _as_one_of(kinds: tuple[Any, ...], value: Any) -> Any:
+def _as_one_of(hints: tuple[Any, ...], value: Any) -> Any:
     refusals = []
-    for kind in kinds:
+    for hint in hints:
         try:
-            return restored(kind, value)
+            return restored(hint, value)
         except Refusal as refusal:
             refusals.append(str(refusal))
     raise Refusal(", ".join(refusals))
@@ -174,14 +174,14 @@ def _checksum(snapshot: Mapping[str, Any]) -> int:
     return crc32(_text(snapshot))
 
 
-def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -> Snapshot:
+def checked(saved: Mapping[str, Any], identity: str, store: Store, hint: type) -> Snapshot:
     """A copy of a saved state, if it can be one of this component.
 
     Args:
         saved: in memory, or from bytes.
         identity: of the component.
         store: of an instance of it.
-        kind: type of its state.
+        hint: of the type of its state.
 
     Raises:
         Refusal: it belongs to another component or version, or no run can have led to it.
@@ -214,7 +214,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, kind: type) -
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=outputs,
-        state=None if state is None else restored(kind, state),
+        state=None if state is None else restored(hint, state),
         hidden=frozen(saved["hidden"]),
         fault=saved["fault"],
     )

@@ -343,7 +343,7 @@ def _port_of(name: str, known: Collection[str], longest: int) -> str | None:
     return next((ours for ours in (name, plain, *ends) if ours in known), None)
 
 
-def _value(text: str, kind: str, where: str) -> float:
-    words = BOOLEANS if kind == "Boolean" else {}
+def _value(text: str, fmi_type: str, where: str) -> float:
+    words = BOOLEANS if fmi_type == "Boolean" else {}
     word = text.strip().lower()
     return float(words[word]) if word in words else finite(text, f"{where}:")

@@ -171,23 +171,23 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
 }
 
 
-def check_figure(kind: str) -> None:
+def check_figure(key: str) -> None:
     """Check before a run that its figure is known.
 
     Raises:
         InputError: it is not.
 
     """
-    if kind not in FIGURES:
-        hint = did_you_mean(kind, FIGURES) or f"; there are {', '.join(FIGURES)}"
-        raise InputError(f"no figure {kind!r}{hint}")
+    if key not in FIGURES:
+        hint = did_you_mean(key, FIGURES) or f"; there are {', '.join(FIGURES)}"
+        raise InputError(f"no figure {key!r}{hint}")
 
 
-def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
+def figure_files(key: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
     """The files that :func:`.draw` may write.
 
     Args:
-        kind: key of :data:`FIGURES`.
+        key: of :data:`FIGURES`.
         stem: of their names.
         loops: of the vehicles.
 
@@ -195,6 +195,6 @@ def figure_files(kind: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> l
     return [
         f"{stem}{vehicle}{suffix}.{ending}"
         for vehicle in suffixes(loops).values()
-        for suffix in FIGURES[kind]
+        for suffix in FIGURES[key]
         for ending in FIGURE_FORMATS
     ]

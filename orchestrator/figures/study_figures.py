@@ -1,6 +1,6 @@
 """Figures of a study from its runs: a study file says which.
 
-A new one is a function here, which :data:`_DRAW` names, and an entry of :data:`.FIGURE_KINDS`.
+A new one is a function here, which :data:`_DRAW` names, and an entry of :data:`.CHARTS`.
 """
 
 from __future__ import annotations
@@ -103,24 +103,24 @@ def legend(figure: Figure, axes: Axes) -> None:
         figure.legend(handles, labels, loc="outside lower center", ncols=2)
 
 
-def bands(plan: FigureEntry, title: str, runs: Values) -> Figure:
+def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
-    abreast = len(plan.x) if len(plan.x) > 1 else min(_ABREAST, len(plan.show))
-    shown = list(product(plan.show, plan.x))
-    share = "row" if len(plan.x) > 1 else False
+    abreast = len(entry.x) if len(entry.x) > 1 else min(_ABREAST, len(entry.show))
+    shown = list(product(entry.show, entry.x))
+    share = "row" if len(entry.x) > 1 else False
     figure, panels = make_panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=share)
-    parts = list(runs.parts(plan.by))
+    parts = list(runs.parts(entry.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
         bins = bins_of(runs[x], _BINS, are_full=True)
         for (name, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
             _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
-        if value in plan.limits:
-            axes.axhline(plan.limits[value], color="black", linewidth=0.8)
+        if value in entry.limits:
+            axes.axhline(entry.limits[value], color="black", linewidth=0.8)
         axes.margins(x=0)
         spread(axes.xaxis, bins.is_logarithmic)
         spread(axes.yaxis, is_logarithmic(runs[value]))
         axes.set_xlabel(runs.label(x))
-        if x == plan.x[0]:
+        if x == entry.x[0]:
             axes.set_title(runs.label(value))
     for axes in panels.flat[len(shown) :]:
         axes.remove()
@@ -152,22 +152,22 @@ def _draw(
         axes.fill_between(bins.centres, *np.transpose(ends), color=color, alpha=0.2, linewidth=0)
 
 
-def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
+def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """Panels for each value that is shown, with one scale of colours.
 
     The last column that tells runs apart has its values side by side, the others below each other.
     """
-    [x], y = plan.x, plan.y
+    [x], y = entry.x, entry.y
     across, down = bins_of(runs[x], _CELLS), bins_of(runs[y], _CELLS)
-    beside = [name for name, _ in runs.parts(plan.by[-1:])]
-    below = list(runs.parts(plan.by[:-1]))
-    rows = len(plan.show) * len(below)
+    beside = [name for name, _ in runs.parts(entry.by[-1:])]
+    below = list(runs.parts(entry.by[:-1]))
+    rows = len(entry.show) * len(below)
     figure, panels = make_panels(title, rows, len(beside), _ROW, sharex=True, sharey=True)
-    for value, own in zip(plan.show, np.split(panels, len(plan.show)), strict=True):
+    for value, own in zip(entry.show, np.split(panels, len(entry.show)), strict=True):
         drawn: dict[Axes, np.ndarray] = {}
         for row, (name, part) in zip(own, below, strict=True):
             row[0].set_ylabel("\n".join(filter(None, (name, runs.label(y)))))
-            for other, cell in part.parts(plan.by[-1:]):
+            for other, cell in part.parts(entry.by[-1:]):
                 axes = row[beside.index(other)]
                 places = down.places(cell[y]), across.places(cell[x])
                 drawn[axes] = _cells(places, cell[value], (down, across), value in VERDICTS)
@@ -178,8 +178,8 @@ def maps(plan: FigureEntry, title: str, runs: Values) -> Figure:
             )
             axes.set_facecolor(_EMPTY)
             axes.grid(visible=False)
-            if value in plan.limits and min(middles.shape) > 1:
-                edge = [plan.limits[value]]
+            if value in entry.limits and min(middles.shape) > 1:
+                edge = [entry.limits[value]]
                 axes.contour(across.centres, down.centres, middles, edge, colors="white")
         figure.colorbar(image, ax=list(own.flat), label=runs.label(value), extend="both")
     for axes, name in zip(panels[0], beside, strict=True):
@@ -214,21 +214,21 @@ def _norm(values: np.ndarray, is_verdict: bool) -> Any:
     return (LogNorm if is_logarithmic(values) else Normalize)(low, high)
 
 
-def front(plan: FigureEntry, title: str, runs: Values) -> Figure:
+def front(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """Every run a dot; a line through those than which no other is better in both values."""
     figure, [[axes]] = make_panels(title, 1, 1, _SQUARE)
-    [x] = plan.x
+    [x] = entry.x
     for (name, part), colour, style in zip(
-        runs.parts(plan.by), cycle(COLOURS), cycle(STYLES), strict=False
+        runs.parts(entry.by), cycle(COLOURS), cycle(STYLES), strict=False
     ):
-        points = np.column_stack((part[x], part[plan.y]))
+        points = np.column_stack((part[x], part[entry.y]))
         points = points[np.isfinite(points).all(axis=1)]
         axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
         line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
         axes.plot(*pareto_front(points).T, **line)
     spread(axes.xaxis, is_logarithmic(runs[x]))
-    spread(axes.yaxis, is_logarithmic(runs[plan.y]))
-    axes.set(xlabel=runs.label(x), ylabel=runs.label(plan.y))
+    spread(axes.yaxis, is_logarithmic(runs[entry.y]))
+    axes.set(xlabel=runs.label(x), ylabel=runs.label(entry.y))
     legend(figure, axes)
     return figure
 
@@ -246,17 +246,17 @@ def pareto_front(points: np.ndarray) -> np.ndarray:
     return front
 
 
-def influence(plan: FigureEntry, title: str, runs: Values) -> Figure:
+def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """A matrix for each part of the runs: a row for each value, a column for what moves it.
 
     The colour is Spearman's rank correlation: 1 where more of the one always goes with more of the
     other, -1 where it goes with less, 0 where it makes no difference.
     """
-    parts = list(runs.parts(plan.by))
-    height = _LINE * len(plan.show) + _AROUND
+    parts = list(runs.parts(entry.by))
+    height = _LINE * len(entry.show) + _AROUND
     figure, panels = make_panels(title, len(parts), 1, height, sharex=True)
     for axes, (name, part) in zip(panels.flat, parts, strict=True):
-        found = np.array([[_correlation(part[x], part[y]) for x in plan.x] for y in plan.show])
+        found = np.array([[_correlation(part[x], part[y]) for x in entry.x] for y in entry.show])
         image = axes.imshow(found, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
         for (row, column), value in np.ndenumerate(found):
             if abs(value) >= _NOTHING:
@@ -265,8 +265,8 @@ def influence(plan: FigureEntry, title: str, runs: Values) -> Figure:
                     column, row, f"{value:.2f}".replace("0.", "."), color=colour, fontsize="small",
                     ha="center", va="center",
                 )  # fmt: skip
-        axes.set_yticks(range(len(plan.show)), [runs.name(value) for value in plan.show])
-        axes.set_xticks(range(len(plan.x)), [runs.name(value) for value in plan.x], rotation=90)
+        axes.set_yticks(range(len(entry.show)), [runs.name(value) for value in entry.show])
+        axes.set_xticks(range(len(entry.x)), [runs.name(value) for value in entry.x], rotation=90)
         axes.grid(visible=False)
         axes.set_title(name)
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
@@ -283,7 +283,7 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     return float(spearmanr(x[both], y[both]).statistic)
 
 
-#: What draws the figures of a kind.
+#: What draws each chart.
 _DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
     "bands": bands,
     "maps": maps,
@@ -292,13 +292,13 @@ _DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
 }
 
 
-def figure_files(plans: Sequence[FigureEntry]) -> list[str]:
+def figure_files(entries: Sequence[FigureEntry]) -> list[str]:
     """The files that :func:`draw_figures` may write."""
-    return [f"{file_name(plan.name)}.{ending}" for plan in plans for ending in FIGURE_FORMATS]
+    return [f"{file_name(entry.name)}.{ending}" for entry in entries for ending in FIGURE_FORMATS]
 
 
 def draw_figures(
-    plans: Sequence[FigureEntry],
+    entries: Sequence[FigureEntry],
     title: str,
     columns: Columns,
     folder: Path,
@@ -307,7 +307,7 @@ def draw_figures(
     """Draw the figures of a study, as PNG and SVG.
 
     Args:
-        plans: the figures to draw.
+        entries: the figures to draw.
         title: heading; empty where there is one beside the figures.
         columns: of runs.parquet.
         folder: to write into.
@@ -317,16 +317,16 @@ def draw_figures(
         What was left out, and why.
 
     """
-    for plan in plans:
-        runs = Values(columns, plan.labels, legends).where(plan.where)
-        values = (*plan.x, *([plan.y] if plan.y else ()), *plan.show)
+    for entry in entries:
+        runs = Values(columns, entry.labels, legends).where(entry.where)
+        values = (*entry.x, *([entry.y] if entry.y else ()), *entry.show)
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]
         if lacking:
-            yield f"figure {plan.name} left out: no run has {lacking[0]}"
+            yield f"figure {entry.name} left out: no run has {lacking[0]}"
             continue
-        if (parts := len(list(runs.parts(plan.by)))) > _MOST_PARTS:
-            yield f"figure {plan.name} left out: by tells {parts} parts of the runs apart"
+        if (parts := len(list(runs.parts(entry.by)))) > _MOST_PARTS:
+            yield f"figure {entry.name} left out: by tells {parts} parts of the runs apart"
             continue
         with styled():
-            figure = _DRAW[plan.kind](plan, title, runs)
-        save(figure, *(folder / f"{file_name(plan.name)}.{ending}" for ending in FIGURE_FORMATS))
+            figure = _DRAW[entry.chart](entry, title, runs)
+        save(figure, *(folder / f"{file_name(entry.name)}.{ending}" for ending in FIGURE_FORMATS))

@@ -32,19 +32,19 @@ _NORM = re.compile(r"\|(.+)\|")
 _UNIT = re.compile(r" \[([^\]]*)\]$")
 
 
-class FigureKind(NamedTuple):
-    """What a kind of figure needs, and what it may have beside."""
+class Chart(NamedTuple):
+    """What a figure of a study needs, and what it may have beside."""
 
     needs: Sequence[str]
     may: Sequence[str]
 
 
-#: The kinds of figures, by the names that study files have for them.
-FIGURE_KINDS: Mapping[str, FigureKind] = {
-    "bands": FigureKind(("x", "show"), ("by", "where", "limits")),
-    "maps": FigureKind(("x", "y", "show"), ("by", "where", "limits")),
-    "front": FigureKind(("x", "y"), ("by", "where")),
-    "influence": FigureKind(("x", "show"), ("by", "where")),
+#: What figures show, by the names that study files have for it under `kind`.
+CHARTS: Mapping[str, Chart] = {
+    "bands": Chart(("x", "show"), ("by", "where", "limits")),
+    "maps": Chart(("x", "y", "show"), ("by", "where", "limits")),
+    "front": Chart(("x", "y"), ("by", "where")),
+    "influence": Chart(("x", "show"), ("by", "where")),
 }
 
 
@@ -58,7 +58,7 @@ class FigureEntry:
     """
 
     name: str
-    kind: str
+    chart: str
     x: Sequence[str] = ()
     y: str = ""
     show: Sequence[str] = ()

@@ -87,13 +87,13 @@ class Entry(NamedTuple):
     """An entry in words.
 
     Attributes:
-        kind: what its value is.
+        type: what its value is.
         meaning: what it does.
         default: what goes without it.
 
     """
 
-    kind: str
+    type: str
     meaning: str
     default: str
 
@@ -102,7 +102,7 @@ def entries(table: type[TomlTable]) -> dict[str, Entry]:
     """The entries of a table by their keys, in their order."""
     return {
         key: Entry(
-            _kind(field.annotation, field.metadata),
+            _type_in_words(field.annotation, field.metadata),
             field.description or "",
             _extra(field, "without"),
         )
@@ -119,7 +119,7 @@ def _extra(field: FieldInfo, name: str) -> str:
     return str(extra.get(name, "")) if isinstance(extra, dict) else ""
 
 
-def _kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
+def _type_in_words(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     """What a value of a type is, in words."""
     for one in metadata:
         if isinstance(one, str):
@@ -130,15 +130,15 @@ def _kind(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     arguments = get_args(annotation)
     match get_origin(annotation):
         case typing.Annotated:
-            words = _kind(arguments[0], arguments[1:])
+            words = _type_in_words(arguments[0], arguments[1:])
         case typing.Union | types.UnionType:
-            words = ", or ".join(map(_kind, arguments))
+            words = ", or ".join(map(_type_in_words, arguments))
         case typing.Literal:
             words = str(arguments[0]).lower()
         case builtins.list:
-            words = f"list of {_kind(arguments[0])}s"
+            words = f"list of {_type_in_words(arguments[0])}s"
         case builtins.dict:
-            one, *others = _kind(arguments[1]).split(", ")
+            one, *others = _type_in_words(arguments[1]).split(", ")
             words = ", ".join([f"table of {one}s", *others])
         case _:
             words = _WORDS.get(annotation, "table")
@@ -209,14 +209,14 @@ def _problem(table: type[TomlTable], key: str, value: Any) -> str:
     if key not in declared and table.named is None:
         hint = did_you_mean(key, declared) or f"; use {', '.join(declared)}"
         return f"unknown entry {key!r}{hint}"
-    kind = declared[key].kind if key in declared else "table"
-    if kind == _WORDS[float] and isinstance(value, int | float) and not isinstance(value, bool):
-        kind = "finite number"
-    names = re.findall("`(.+?)`", kind)
-    article = "" if names or kind.startswith("true") else "a "
+    wanted = declared[key].type if key in declared else "table"
+    if wanted == _WORDS[float] and isinstance(value, int | float) and not isinstance(value, bool):
+        wanted = "finite number"
+    names = re.findall("`(.+?)`", wanted)
+    article = "" if names or wanted.startswith("true") else "a "
     hint = did_you_mean(value, names) if isinstance(value, str) else ""
     shown = str(value).lower() if isinstance(value, bool) else shortened(repr(value))
-    return f"{key} = {shown}: write {article}{kind.replace('`', '')}{hint}"
+    return f"{key} = {shown}: write {article}{wanted.replace('`', '')}{hint}"
 
 
 def _where(path: Sequence[str | int]) -> str:

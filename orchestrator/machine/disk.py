@@ -172,7 +172,7 @@ def _process_folder() -> TemporaryDirectory[str]:
         descriptor = os.open(folder.name, os.O_RDONLY)
         with suppress(OSError):
             _lock(descriptor)
-            marker = sealed({"folder": Path(folder.name).name, "identity": uuid4().hex})
+            marker = sealed({"folder": Path(folder.name).name, "token": uuid4().hex})
             Path(folder.name, _MARKER).write_text(marker, encoding="utf-8")
     return folder
 

@@ -42,7 +42,7 @@ class Interrupts:
     the loop asks after every step whether there are any.
 
     Attributes:
-        signals: their numbers.
+        numbers: of the signals, in their order.
         hand_over: tells observers of the last rows, before the process is given up.
 
     """
@@ -54,22 +54,22 @@ class Interrupts:
             announce: called at once when a signal comes.
 
         """
-        self.signals: list[int] = []
+        self.numbers: list[int] = []
         self._announce = announce
         self.hand_over: Callable[[], None] = lambda: None
 
     def __bool__(self) -> bool:
         """Whether the work is to end."""
-        return bool(self.signals)
+        return bool(self.numbers)
 
     @property
     def urgent(self) -> bool:
         """Whether it is to end without what takes long: asked twice, or not from the keyboard."""
-        return len(self.signals) > 1 or any(number != signal.SIGINT for number in self.signals)
+        return len(self.numbers) > 1 or any(number != signal.SIGINT for number in self.numbers)
 
     def __str__(self) -> str:
         """The first signal, if it is not one that a user sends."""
-        first = self.signals[0] if self.signals else 0
+        first = self.numbers[0] if self.numbers else 0
         if first not in _ENDS:
             return ""
         name = signal.Signals(first).name
@@ -127,7 +127,7 @@ class Interrupts:
 
     def take(self, number: int, _frame: Any) -> None:
         """Collect a signal: a handler for :func:`signal.signal`."""
-        self.signals.append(number)
+        self.numbers.append(number)
         if self._announce is not None:
             self._announce(self)
 

@@ -3,7 +3,7 @@
 A folder that is written into holds a ledger, `.auv-fmu.json`, with the names and digests of what
 was written there. A file is replaced or removed only if the ledger names it and its bytes are
 those: all others are the user's. What is being written lies in a folder within it whose name is the
-ledger's own random identity.
+ledger's own random token.
 
 Files change all at once. When all are whole and on the disk, the ledger says that they take their
 places: from then on they are what the folder holds. If the process is killed meanwhile, the next
@@ -51,7 +51,7 @@ class Ledger:
 
     Attributes:
         folder: that it is of.
-        identity: random, of the ledger.
+        token: random, of the ledger.
         unfinished: the folder for what is being written.
 
     """
@@ -72,10 +72,10 @@ class Ledger:
         found = self._read()
         self._is_there = found is not None
         found = found or _Content(uuid4().hex, {}, {}, [])
-        self.identity, self._files = found.identity, found.files
+        self.token, self._files = found.identity, found.files
         self._moving, self._leaving = found.moving, found.leaving
-        self.unfinished = folder / f"{_UNFINISHED}{self.identity}"
-        self._partial = folder / f"{_UNFINISHED}{self.identity}.json"
+        self.unfinished = folder / f"{_UNFINISHED}{self.token}"
+        self._partial = folder / f"{_UNFINISHED}{self.token}.json"
         if self._moving:
             self._take_places()
 
@@ -236,12 +236,12 @@ class Ledger:
 
     def _write(self) -> None:
         path = self.folder / LEDGER
-        content = _Content(self.identity, self._files, self._moving, self._leaving)
+        content = _Content(self.token, self._files, self._moving, self._leaving)
         text = sealed(content._asdict())
         if os.path.lexists(path):
             write_whole(path, text, self._partial)
         else:
-            # Nobody knows the identity yet under which the first one could be written.
+            # Nobody knows the token yet under which the first one could be written.
             write_new(path, text)
             sync_to_disk(self.folder)
         self._is_there = True
@@ -261,7 +261,7 @@ class _Content(NamedTuple):
     """What a ledger says.
 
     Attributes:
-        identity: random, of the ledger.
+        identity: the token, by the name that ledgers on disks have for it.
         files: what was written.
         moving: what is about to take its place.
         leaving: what goes when it has.

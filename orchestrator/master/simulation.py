@@ -34,7 +34,7 @@ def simulate_plan(
     plan: Plan,
     observers: Sequence[Observer] = (),
     isolation: Isolation | None = None,
-    loop: Stepping = PYTHON_LOOP,
+    stepping: Stepping = PYTHON_LOOP,
     hooks: Sequence[Hook] = (),
     exchange: Exchange = OURS,
 ) -> Ending:
@@ -44,7 +44,7 @@ def simulate_plan(
         plan: what to run, as :func:`.plan.make_plan` gives it.
         observers: take the rows.
         isolation: run each FMU in a separate process; None: all in this one.
-        loop: makes the steps.
+        stepping: how its steps are made.
         hooks: act between them, in this order.
         exchange: of values.
 
@@ -68,7 +68,7 @@ def simulate_plan(
             )
             # Before their processes are ended: a copy must not do that for the process itself.
             stack.enter_context(surroundings)
-            loop = _possible_loop(loop, instances, log)
+            stepping = _possible_stepping(stepping, instances, log)
             row = Row(system, instances, slow)
             coupling = Coupling(plan, instances, row, log, exchange)
             coupling.initialise()
@@ -76,7 +76,7 @@ def simulate_plan(
                 tuple(map(str, row.columns)),
                 experiment,
                 _parameters(system, instances, log),
-                loop.name,
+                stepping.name,
                 dict.fromkeys(map(str, row.text_ports), row.strings),
                 _units(system, row.columns),
             )
@@ -96,7 +96,7 @@ def simulate_plan(
             order = [name for names in coupling.sequence for name in names]
             remark = None
             try:
-                failure = _advance(run, loop, Hooks(run), order, surroundings)
+                failure = _advance(run, stepping, Hooks(run), order, surroundings)
                 if failure and growth.found not in failure:
                     failure += f"; {growth.found}"
             except NotKept as error:
@@ -110,7 +110,7 @@ def simulate_plan(
                     with suppress(ComponentFailed):
                         instance.terminate()
             ending = Ending(
-                failure, remark, log.messages, tuple(interrupts.signals), tuple(run.happened)
+                failure, remark, log.messages, tuple(interrupts.numbers), tuple(run.happened)
             )
             tell(ending)
         return ending
@@ -127,17 +127,17 @@ def simulate_to_end(
 
     """
     ending = simulate_plan(plan, observers, exchange=exchange)
-    if ending.signals:
+    if ending.interrupts:
         raise KeyboardInterrupt
     if ending.failure is not None:
         raise InputError(f"{plan.system.name} {ending.failure}")
 
 
-def _possible_loop(loop: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:
-    """The loop, or the one in Python where the other has nothing to call."""
+def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:
+    """The stepping, or the one in Python where the other has nothing to call."""
     apart = [name for name, instance in instances.items() if not instance.is_here]
-    if not apart or loop == PYTHON_LOOP:
-        return loop
+    if not apart or stepping == PYTHON_LOOP:
+        return stepping
     log.remark(
         f"{', '.join(apart)}: runs in a separate process, since the FMU allows one instance "
         "per process; steps are made in Python"
@@ -179,7 +179,7 @@ def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
 
 def _advance(
     run: Run,
-    loop: Stepping,
+    stepping: Stepping,
     hooks: Hooks,
     order: Sequence[str],
     surroundings: Surroundings,
@@ -188,12 +188,12 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         hooks.act()
-        for _ in make_steps(loop.steps, run):
+        for _ in make_steps(stepping.steps, run):
             if run.made >= run.due:
                 hooks.act()
             if monotonic() > blocks.due:
                 blocks.hand_over()
-            if run.interrupts.signals:
+            if run.interrupts.numbers:
                 failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
                 break
     except ComponentFailed as error:

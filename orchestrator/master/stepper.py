@@ -100,7 +100,7 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
     )  # fmt: skip
     stages, row, experiment, blocks = run.stages, run.row, run.experiment, run.blocks
     steps = experiment.rows - 1
-    plan = CRun(
+    c_run = CRun(
         (CStage * len(stages))(*map(_laid_out, stages)),
         row.values.ctypes.data,
         len(stages),
@@ -117,7 +117,7 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
         if block.n == block.most:
             blocks.hand_over()
         before = block.n
-        outcome = advance(plan, run.made, min(run.due, steps), _GLANCE, block, failure)
+        outcome = advance(c_run, run.made, min(run.due, steps), _GLANCE, block, failure)
         run.made += block.n - before
         yield
     if outcome == _FAILED:

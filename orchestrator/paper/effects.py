@@ -39,7 +39,7 @@ LAMBDAS = (0.5, 1.0, 1.5, 2.1, 3.0, 4.0)
 _SIGNALS = tuple(rf"$\tau_{k}$" for k in ACTUATORS)
 
 _PRINTED = replace(FIVE, parameters={"controller.printed_jacobian": True})
-_JACOBI, _JACOBI_PD = (replace(run, order="jacobi") for run in (FIVE, FIVE_PD))
+_JACOBI, _JACOBI_PD = (replace(request, order="jacobi") for request in (FIVE, FIVE_PD))
 _NOISY = tuple(Request("fig4", {"plant.noise.std": level}) for level in NOISE_LEVELS)
 _QUICK = tuple(
     QUIET
@@ -49,8 +49,8 @@ _QUICK = tuple(
 )
 _STEPPED = (
     *(
-        run if step == STEP else replace(run, step=step)
-        for run in (FIVE, FIVE_PD)
+        request if step == STEP else replace(request, step=step)
+        for request in (FIVE, FIVE_PD)
         for step in STEPS
     ),
     replace(FIVE_PD, parameters={**FIVE_PD.parameters, "plant.integrator": "rk4"}),

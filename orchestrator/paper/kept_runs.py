@@ -72,20 +72,20 @@ class KeptRuns:
         self._labels: dict[str, str] = {}
         self._kept_runs: dict[str, KeptRun] = {}
 
-    def __getitem__(self, run: Request) -> KeptRun:
+    def __getitem__(self, request: Request) -> KeptRun:
         """What is kept of a run that was made."""
-        return self._kept_runs[self._keys[run]]
+        return self._kept_runs[self._keys[request]]
 
-    def label(self, run: Request) -> str:
+    def label(self, request: Request) -> str:
         """The shortest of the labels that equal runs have."""
-        return self._labels[self._keys[run]]
+        return self._labels[self._keys[request]]
 
     @property
     def labels(self) -> list[str]:
         """Of all runs."""
         return list(self._labels.values())
 
-    def make(self, runs: Iterable[Request], workers: Workers) -> None:
+    def make(self, requests: Iterable[Request], workers: Workers) -> None:
         """Make what is not kept in the folder, the longest first.
 
         Raises:
@@ -94,20 +94,21 @@ class KeptRuns:
 
         """
         with open_ledger(self._folder, self._force) as ledger:
-            self._make(runs, workers, ledger)
+            self._make(requests, workers, ledger)
 
-    def _make(self, runs: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
+    def _make(self, requests: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
         missing: dict[str, tuple[int, Request]] = {}
-        for run in dict.fromkeys(runs):
-            wanted = replace(run, stop_time=self._stop_time or run.stop_time, kind=self._kind)
+        for request in dict.fromkeys(requests):
+            stop_time = self._stop_time or request.stop_time
+            wanted = replace(request, stop_time=stop_time, kind=self._kind)
             try:
                 prepared = prepare_request(wanted)
             except InputError as error:
-                self._keys[run] = key = repr(run)
-                self._labels[key] = run.label
+                self._keys[request] = key = repr(request)
+                self._labels[key] = request.label
                 self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
                 continue
-            self._keys[run] = key = key_of(prepared)
+            self._keys[request] = key = key_of(prepared)
             label = wanted.label
             self._labels[key] = min(label, self._labels.get(key, label), key=len)
             ledger.check([_file(key)])
@@ -116,7 +117,7 @@ class KeptRuns:
             else:
                 missing.setdefault(key, (prepared.experiment.rows, wanted))
         longest_first = sorted(missing.items(), key=lambda item: -item[1][0])
-        tasks = {key: partial(_make, run, key) for key, (_, run) in longest_first}
+        tasks = {key: partial(_make, request, key) for key, (_, request) in longest_first}
         for key, kept_run in workers.results(tasks, "run"):
             self._kept_runs[key] = kept_run
             if kept_run.failure is None:
@@ -142,10 +143,10 @@ def key_of(prepared: Prepared) -> str:
     return digest_of(prepared.identity, kept)[:32]
 
 
-def _make(run: Request, key: str) -> KeptRun:
+def _make(request: Request, key: str) -> KeptRun:
     """Make a run; a task for a worker."""
     try:
-        prepared = prepare_request(run)
+        prepared = prepare_request(request)
         if key_of(prepared) != key:
             raise InputError("FMUs have changed while the report was made; make it anew")
         metrics = Metrics(prepared.loops)

@@ -102,9 +102,9 @@ def write_report(
         with workers() as crew:
             kept_runs.make(
                 [
-                    *(run for section in chapters for run in section.runs.values()),
-                    *(run for claim in CLAIMS for run in claim.runs),
-                    *(run for effect in EFFECTS for run in effect.runs),
+                    *(request for section in chapters for request in section.runs.values()),
+                    *(request for claim in CLAIMS for request in claim.runs),
+                    *(request for effect in EFFECTS for request in effect.runs),
                 ],
                 crew,
             )
@@ -135,12 +135,12 @@ def _draw(
     figures.mkdir()
     tasks: dict[tuple[str, str], Callable[[], Any]] = {}
     for section in chapters:
-        made = [kept_runs[run] for run in section.runs.values()]
+        made = [kept_runs[request] for request in section.runs.values()]
         tasks["section", section.name] = partial(
             draw_section, section, made, figures / section.name
         )
     for effect in EFFECTS:
-        made = [kept_runs[run] for run in effect.runs]
+        made = [kept_runs[request] for request in effect.runs]
         tasks["effect", effect.name] = partial(show_effect, effect.name, made, figures)
     results = dict(crew.results(tasks, "figure"))
     notes = {section.name: results["section", section.name] for section in chapters}
@@ -170,7 +170,7 @@ def _text(
     for effect in EFFECTS:
         yield f"### {effect.title}"
         yield effects[effect.name]
-        yield "\n".join(f"- `auv-fmu run {kept_runs.label(run)}`" for run in effect.runs)
+        yield "\n".join(f"- `auv-fmu run {kept_runs.label(request)}`" for request in effect.runs)
     yield "## Studies of many vehicles"
     yield from shown
     yield "## Gain conditions"
@@ -189,8 +189,8 @@ def _text(
 def _claims(kept_runs: KeptRuns) -> str:
     rows = []
     for claim in CLAIMS:
-        finding = claim.finding([kept_runs[run] for run in claim.runs])
+        finding = claim.finding([kept_runs[request] for request in claim.runs])
         cells = [claim.title, claim.published, finding.ours, finding.verdict]
-        runs = ", ".join(f"`{kept_runs.label(run)}`" for run in claim.runs)
+        runs = ", ".join(f"`{kept_runs.label(request)}`" for request in claim.runs)
         rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
     return table(["claim", "paper", "ours", "verdict", "run"], rows)

@@ -149,9 +149,9 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
         folder: to write into.
 
     """
-    kind = section.scenario.figure
-    if kind not in FIGURES:
-        return [f"no figure: there is none of the name {kind!r}{did_you_mean(kind, FIGURES)}"]
+    key = section.scenario.figure
+    if key not in FIGURES:
+        return [f"no figure: there is none of the name {key!r}{did_you_mean(key, FIGURES)}"]
     runs = [
         Drawn(label, kept_run.table, section.scenario.z_up, kept_run.loops)
         for label, kept_run in zip(section.runs, kept_runs, strict=True)
@@ -161,7 +161,7 @@ def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -
         return []
     folder.mkdir(parents=True)
     # The heading of the section stands above the figure already.
-    return draw(kind, "", runs, folder, section.name)
+    return draw(key, "", runs, folder, section.name)
 
 
 def section_text(
@@ -185,7 +185,7 @@ def section_text(
     yield from (f"Note: {escape_markdown(note)}." for note in notes)
     if scenario.remark:
         yield scenario.remark
-    made = {label: kept_runs[run] for label, run in section.runs.items()}
+    made = {label: kept_runs[request] for label, request in section.runs.items()}
     for label, kept_run in made.items():
         if kept_run.failure is not None:
             why = escape_markdown(kept_run.failure)
@@ -202,9 +202,9 @@ def section_text(
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(run)}`"
-        + (f", until {time:g} s" if (time := kept_runs[run].metrics.get("stop_time")) else "")
-        for label, run in section.runs.items()
+        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(request)}`"
+        + (f", until {time:g} s" if (time := kept_runs[request].metrics.get("stop_time")) else "")
+        for label, request in section.runs.items()
     )
     if scenario.ours:
         yield "Ours, not the paper's:"

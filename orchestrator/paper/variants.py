@@ -365,24 +365,24 @@ def _medians(
     engine: BatchEngine, starts: Sequence[int], block: Sequence[Point]
 ) -> list[np.ndarray]:
     """The numbers of some runs in the middle of those from moved starts; a task for a worker."""
-    return [quantiles_of(engine, run, starts)[QUANTILES.index(0.5)] for run in block]
+    return [quantiles_of(engine, point, starts)[QUANTILES.index(0.5)] for point in block]
 
 
-def quantiles_of(engine: BatchEngine, run: Point, starts: Sequence[int]) -> np.ndarray:
+def quantiles_of(engine: BatchEngine, point: Point, starts: Sequence[int]) -> np.ndarray:
     """The numbers of a run from moved starts, an axis for QUANTILES first; a task for a worker."""
-    found = [numbers_of(engine.table(each), END_TIMES) for each in moved(engine, run, starts)]
+    found = [numbers_of(engine.table(each), END_TIMES) for each in moved(engine, point, starts)]
     quantiles: np.ndarray = np.quantile(found, QUANTILES, axis=0)
     return quantiles
 
 
-def moved(engine: BatchEngine, run: Point, starts: Sequence[int]) -> Iterator[Point]:
+def moved(engine: BatchEngine, point: Point, starts: Sequence[int]) -> Iterator[Point]:
     """A run from starts that are moved by :data:`FARTHEST_START` at most, each by its number."""
-    start = engine.setting(run).plant.eta0[: len(AXES)]
+    start = engine.setting(point).plant.eta0[: len(AXES)]
     for number in starts:
         away = np.random.default_rng(number).uniform(-FARTHEST_START, FARTHEST_START, len(AXES))
         values = zip(AXES, np.add(start, away).tolist(), strict=True)
-        yield run._replace(
-            parameters={**run.parameters, **{f"plant.eta0.{axis}": x for axis, x in values}}
+        yield point._replace(
+            parameters={**point.parameters, **{f"plant.eta0.{axis}": x for axis, x in values}}
         )
 
 

@@ -46,7 +46,7 @@ class Prepared:
         scenario: as its file has it, but for events and inputs of the request.
         plan: the system, and its steps.
         isolation: of the FMUs in processes of their own; None: they run in this one.
-        loop: that makes the steps.
+        stepping: how its steps are made.
         real_time: simulated seconds in a second; None: as many as can be had.
         events: that happen to it.
         input_table: values of inputs over time; None: they keep their values.
@@ -56,7 +56,7 @@ class Prepared:
     scenario: Scenario
     plan: Plan
     isolation: Isolation | None = None
-    loop: Stepping = PYTHON_LOOP
+    stepping: Stepping = PYTHON_LOOP
     real_time: float | None = None
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None
@@ -88,7 +88,7 @@ class Prepared:
 
         """
         return simulate_plan(
-            self.plan, observers, self.isolation, self.loop, [*hooks, *self._hooks()]
+            self.plan, observers, self.isolation, self.stepping, [*hooks, *self._hooks()]
         )
 
     def doubts(self) -> list[str]:
@@ -166,10 +166,10 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         )
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
-    loop = choose_loop(request.loop, experiment, isolation)
+    stepping = choose_loop(request.loop, experiment, isolation)
     if request.real_time is not None:
         check_factor(request.real_time)
-    return Prepared(scenario, plan, isolation, loop, request.real_time, events, input_table)
+    return Prepared(scenario, plan, isolation, stepping, request.real_time, events, input_table)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

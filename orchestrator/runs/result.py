@@ -295,7 +295,7 @@ def simulate(
         result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
         ending = prepared.run([*observers, *kept], kept)
         leave_checkpoints(kept, ending.failure is None)
-    for number in ending.signals:
+    for number in ending.interrupts:
         # Held back while the FMUs computed; now it acts as usual.
         signal.raise_signal(number)
     return result

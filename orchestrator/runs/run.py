@@ -122,7 +122,7 @@ def run_into(
             files.checkpoint_every,
             files.resume,
             files.force,
-            Ledger(folder).identity,
+            Ledger(folder).token,
             say,
         )
         unfinished = _Unfinished(path, folder, done, command, clock, say)

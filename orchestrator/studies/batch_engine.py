@@ -88,54 +88,54 @@ class BatchEngine:
         """Of the equations, and of what compiles them."""
         return digest_of({"equations": digest(), "numba": version("numba")})
 
-    def outcomes(self, runs: Iterable[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Iterable[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order."""
-        for run in runs:
-            [outcome] = self.outcomes_at(run, [run.stop_time])
+        for point in points:
+            [outcome] = self.outcomes_at(point, [point.stop_time])
             yield outcome
 
-    def outcomes_at(self, run: Point, stop_times: Sequence[float]) -> list[Outcome]:
+    def outcomes_at(self, point: Point, stop_times: Sequence[float]) -> list[Outcome]:
         """What would have come out of a run with other stop times, all from one run.
 
         Args:
-            run: to be made.
+            point: to be made.
             stop_times: not later than its own; those before it after whole numbers of steps [s].
 
         """
         try:
-            job = _job(self._systems[run.scenario], run)
+            job = _job(self._systems[point.scenario], point)
             ends = np.array([_end(job, stop_time) for stop_time in stop_times], END)
             accumulators = new_accumulators(len(ends))
             rows = _empty_rows(job) if _OF_ROWS else _NO_ROWS
             made, failure = _made(job, ends, accumulators, rows)
         except InputError as error:
-            return [Outcome(run.number, {}, str(error)) for _ in stop_times]
+            return [Outcome(point.number, {}, str(error)) for _ in stop_times]
         return [
-            Outcome(run.number, {}, failure)
+            Outcome(point.number, {}, failure)
             if end["steps"] > made
             else Outcome(
-                run.number, _indices(job, end, found) | _of_rows(job, stop_time, end, rows)
+                point.number, _indices(job, end, found) | _of_rows(job, stop_time, end, rows)
             )
             for stop_time, end, found in zip(stop_times, ends, accumulators, strict=True)
         ]
 
-    def setting(self, run: Point) -> Setting:
+    def setting(self, point: Point) -> Setting:
         """The setting of the straight line that makes the same numbers as a run.
 
         Raises:
             InputError: the run has no start.
 
         """
-        return _job(self._systems[run.scenario], run).setting
+        return _job(self._systems[point.scenario], point).setting
 
-    def table(self, run: Point) -> Table:
+    def table(self, point: Point) -> Table:
         """A run with its rows, in those columns :data:`.kernel.COLUMNS` that it has.
 
         Raises:
             InputError: it has no start.
 
         """
-        job = _job(self._systems[run.scenario], run)
+        job = _job(self._systems[point.scenario], point)
         rows = _empty_rows(job)
         made, failure = _made(job, np.empty(0, END), new_accumulators(0), rows)
         return _table(job, rows[: made + 1], failure)
@@ -160,7 +160,7 @@ class _Job(NamedTuple):
     system: System
     experiment: Experiment
     setting: Setting
-    plan: RunSteps
+    run_steps: RunSteps
 
     @property
     def is_observed(self) -> bool:
@@ -168,20 +168,20 @@ class _Job(NamedTuple):
         return isinstance(self.setting.controller, Gains)
 
 
-def _job(system: System, run: Point) -> _Job:
+def _job(system: System, point: Point) -> _Job:
     """A run, ready to be made.
 
     Raises:
         InputError: it has no start, or no first step.
 
     """
-    changes = {port_name(name): value for name, value in run.parameters.items()}
+    changes = {port_name(name): value for name, value in point.parameters.items()}
     system = system.with_parameters(changes)
     changed = [system.component(name.component).variable(name.port) for name in changes]
     if any(variable.causality != "parameter" for variable in changed):
         system.check()
-    experiment = Experiment(run.stop_time, run.step, run.order)
-    if run.order not in ORDERS:
+    experiment = Experiment(point.stop_time, point.step, point.order)
+    if point.order not in ORDERS:
         raise InputError(f"the batch engine has the orders {' and '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
@@ -198,7 +198,7 @@ def _job(system: System, run: Point) -> _Job:
     last_parts = (
         splits(setting, stop - full * experiment.step) if experiment.has_short_step else parts
     )
-    plan = RunSteps(
+    run_steps = RunSteps(
         experiment.rows - 1,
         full,
         experiment.step,
@@ -207,7 +207,7 @@ def _job(system: System, run: Point) -> _Job:
         last_parts,
         experiment.order != ORDERS[0],
     )
-    return _Job(system, experiment, setting, plan)
+    return _Job(system, experiment, setting, run_steps)
 
 
 def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
@@ -217,7 +217,7 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
         InputError: the run has no row there.
 
     """
-    whole, steps = job.experiment, job.plan.steps
+    whole, steps = job.experiment, job.run_steps.steps
     if stop_time != whole.stop_time:
         shorter = Experiment(stop_time, whole.step, whole.order)
         steps = shorter.full_steps
@@ -257,14 +257,14 @@ def _made(
     progress = np.empty(1, int)
     # Where an equation raises, the compiled text says no more than that.
     with suppress(ArithmeticError):
-        _run(job, job.plan, ends, accumulators, rows, progress)
+        _run(job, job.run_steps, ends, accumulators, rows, progress)
     made = int(progress[0])
     if made < 0:
         raise InputError(f"initialisation refused: {_why(job)}")
-    if made == job.plan.steps:
+    if made == job.run_steps.steps:
         return made, None
     # What the step that is refused begins with is what a shorter run ends with.
-    shorter = job.plan._replace(steps=made)
+    shorter = job.run_steps._replace(steps=made)
     moment = _run(job, shorter, ends[:0], accumulators[:0], _NO_ROWS, progress)
     return made, f"stopped at t = {moment.t:.12g} s: {_why(job, made, moment)}"
 
@@ -274,16 +274,16 @@ def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
 
     It is what an equation of plain Python raises, or else what is wrong with what it comes to.
     """
-    setting, plan, law = job.setting, job.plan, LAWS[type(job.setting.controller)]
+    setting, run_steps, law = job.setting, job.run_steps, LAWS[type(job.setting.controller)]
     # Noise is too small to make a difference.
     n = (0.0, 0.0, 0.0)
     try:
         if before is None:
             moment = closed_loop.begin(setting, law, n)
-            closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
+            closed_loop.act(setting, law, moment, run_steps.h, run_steps.parts, run_steps.delayed)
         else:
-            h, parts, end = part_of(plan, k)
-            instant = closed_loop.act(setting, law, before, h, parts, plan.delayed)
+            h, parts, end = part_of(run_steps, k)
+            instant = closed_loop.act(setting, law, before, h, parts, run_steps.delayed)
             moment = closed_loop.step(setting, law, instant, h, parts, end, n)
     except (ArithmeticError, ValueError) as error:
         return f"{type(error).__name__}: {error}"
@@ -300,7 +300,7 @@ def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
 
 def _run(
     job: _Job,
-    plan: RunSteps,
+    run_steps: RunSteps,
     ends: np.ndarray,
     accumulators: np.ndarray,
     rows: np.ndarray,
@@ -311,9 +311,9 @@ def _run(
     imported_apart("numba", ".numba_config.yaml")
     from orchestrator.studies.batch.compilation import compile_run  # noqa: PLC0415
 
-    run = compile_run(type(job.setting.controller))  # type: ignore[arg-type]
+    kernel = compile_run(type(job.setting.controller))  # type: ignore[arg-type]
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
-    return run(job.setting, plan, uniform, ends, accumulators, rows, progress)
+    return kernel(job.setting, run_steps, uniform, ends, accumulators, rows, progress)
 
 
 class _Noise(local):

@@ -157,10 +157,10 @@ def _task(block: list[Point], limit: float) -> Answer:
     return answer(_engine[0], block, limit)
 
 
-def answer(engine: Engine, runs: list[Point], limit: float) -> Answer:
+def answer(engine: Engine, points: list[Point], limit: float) -> Answer:
     """Make runs, or the first of them where all take longer than a limit [s]."""
     start, seconds, outcomes = monotonic(), 0.0, []
-    for outcome in engine.outcomes(runs):
+    for outcome in engine.outcomes(points):
         outcomes.append(outcome)
         seconds = monotonic() - start
         if seconds > limit:
@@ -183,25 +183,25 @@ class Making:
         self._crew = crew
         self._pace = float("inf")  # seconds for a step
 
-    def outcomes(self, runs: Iterable[Point]) -> Iterator[list[Outcome]]:
+    def outcomes(self, points: Iterable[Point]) -> Iterator[list[Outcome]]:
         """The outcomes of runs, block by block as they are done."""
         lost: list[Point] = []
-        for block, outcomes in self._made(self._blocks(runs), self._room):
+        for block, outcomes in self._made(self._blocks(points), self._room):
             if outcomes is None:
                 lost.extend(block)
             else:
                 yield outcomes
         # One by one, so that none is blamed for another that ends the process of both.
-        for (run,), outcomes in self._made(([run] for run in lost), lambda: 1):
-            yield outcomes or [Outcome(run.number, {}, FATAL)]
+        for (point,), outcomes in self._made(([point] for point in lost), lambda: 1):
+            yield outcomes or [Outcome(point.number, {}, FATAL)]
 
-    def _blocks(self, runs: Iterable[Point]) -> Iterator[list[Point]]:
+    def _blocks(self, points: Iterable[Point]) -> Iterator[list[Point]]:
         """Runs in their order, as many together as make a task of a good length."""
         block: list[Point] = []
         steps = 0.0
-        for run in runs:
-            block.append(run)
-            steps += run.stop_time / run.step
+        for point in points:
+            block.append(point)
+            steps += point.stop_time / point.step
             if steps * self._pace >= self._seconds or len(block) == _MOST_RUNS:
                 yield block
                 block, steps = [], 0.0
@@ -239,7 +239,7 @@ class Making:
                 seconds, outcomes = answer
                 n = len(outcomes)
                 rests.extend(block[i : i + n] for i in range(n, len(block), n))
-                self._pace = seconds / sum(run.stop_time / run.step for run in block[:n])
+                self._pace = seconds / sum(point.stop_time / point.step for point in block[:n])
 
     def _room(self) -> int:
         return max(1, self._crew.ahead * self._crew.threads)

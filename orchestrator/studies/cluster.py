@@ -122,20 +122,20 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
         # Runs of one process are made one after the other: an FMU is a library of the process.
         self._lock, self._address = Lock(), worker.address
 
-    def answer(self, runs: list[Point], limit: float) -> Answer:
+    def answer(self, points: list[Point], limit: float) -> Answer:
         if __version__ != self._version:
             raise InputError(
                 f"the worker at {self._address} has auv-fmu {__version__}, and the sender of the "
                 f"study {self._version}: install the same version everywhere"
             )
         with self._lock:
-            return answer(self._engine, runs, limit)
+            return answer(self._engine, points, limit)
 
 
-def _task(name: str, runs: bytes, limit: float) -> Answer:
+def _task(name: str, points: bytes, limit: float) -> Answer:
     """Make some runs, pickled so that nothing on the way looks into them."""
     share: _Share = get_worker().plugins[name]
-    return share.answer(pickle.loads(runs), limit)
+    return share.answer(pickle.loads(points), limit)
 
 
 class _Cluster:

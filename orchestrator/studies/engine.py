@@ -76,11 +76,11 @@ class Engine(Protocol):
         """A text in hexadecimal digits."""
         ...
 
-    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Args:
-            runs: of the study that the engine was made for.
+            points: of the study that the engine was made for.
 
         """
         ...
@@ -98,7 +98,9 @@ class FmuEngine:
 
         """
         # Compiled loops do not travel: each run takes one where it is made.
-        self._prepared = {name: replace(one, loop=PYTHON_LOOP) for name, one in prepared.items()}
+        self._prepared = {
+            name: replace(one, stepping=PYTHON_LOOP) for name, one in prepared.items()
+        }
         self._loop = loop
 
     @property
@@ -106,35 +108,35 @@ class FmuEngine:
         """Of the code that says what comes out of rows."""
         return code_of("orchestrator.vehicle", "orchestrator.studies")
 
-    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order.
 
         Raises:
             KeyboardInterrupt: a signal has come to stop it.
 
         """
-        for run in runs:
+        for point in points:
             try:
-                yield self._outcome(run)
+                yield self._outcome(point)
             except InputError as error:
-                yield Outcome(run.number, {}, str(error))
+                yield Outcome(point.number, {}, str(error))
 
-    def _outcome(self, run: Point) -> Outcome:
-        prepared = self._prepared[run.scenario]
+    def _outcome(self, point: Point) -> Outcome:
+        prepared = self._prepared[point.scenario]
         system = prepared.system.with_parameters(
-            {port_name(name): value for name, value in run.parameters.items()}
+            {port_name(name): value for name, value in point.parameters.items()}
         )
         experiment = replace(
-            prepared.experiment, stop_time=run.stop_time, step=run.step, order=run.order
+            prepared.experiment, stop_time=point.stop_time, step=point.step, order=point.order
         )
         indices = Indices(loops_of(system))
-        plan, loop = make_plan(system, experiment), choose_loop(self._loop, experiment)
-        ending = replace(prepared, plan=plan, loop=loop).run([indices])
-        if ending.signals:
+        plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
+        ending = replace(prepared, plan=plan, stepping=stepping).run([indices])
+        if ending.interrupts:
             raise KeyboardInterrupt
         if ending.failure is not None:
-            return Outcome(run.number, {}, ending.failure)
-        return Outcome(run.number, indices.values())
+            return Outcome(point.number, {}, ending.failure)
+        return Outcome(point.number, indices.values())
 
     def __getstate__(self) -> dict[str, Any]:
         """With the FMUs, each once, by their digests.

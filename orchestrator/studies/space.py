@@ -65,7 +65,7 @@ class Space:
         known = _Known([system for _, system in systems.values()])
         self._stop_time, self._scenarios = study.stop_time, tuple(study.scenario)
         self.has_scenarios = len(self._scenarios) > 1
-        self.columns = {name: known.kind(name) for name in study.varied}
+        self.columns = {name: known.value_type(name) for name in study.varied}
         self._grid = {
             name: tuple(known.typed(name, value) for value in values)
             for name, values in study.vary.items()
@@ -104,20 +104,20 @@ class Space:
 
     def _prepared(self, name: str, study: Study, scenario: Scenario, system: System) -> Prepared:
         """The shortest run of a scenario, which can be prepared like any run of it."""
-        _, point = self.point(0)
+        _, chosen = self.chosen(0)
         shortest = study.stop_time and study.stop_time.base + sum(
             min(rate * end for end in self._ends(varied))
             for varied, rate in study.stop_time.per.items()
         )
         values = {
             target: value
-            for target, value in {**self._constants, **point}.items()
+            for target, value in {**self._constants, **chosen}.items()
             if target in self._has[name]
         }
         request = Request(
             parameters=values,
             stop_time=shortest,
-            step=point.get(STEP, study.step),
+            step=chosen.get(STEP, study.step),
             order=study.order,
         )
         prepared = prepare(scenario, system, request)
@@ -137,30 +137,30 @@ class Space:
         """One of the runs."""
         if not 0 <= number < self._n:
             raise IndexError(number)
-        scenario, point = self.point(number)
+        scenario, chosen = self.chosen(number)
         experiment, has = self.prepared[scenario].experiment, self._has[scenario]
         return Point(
             number,
             scenario,
-            {name: value for name, value in {**self._constants, **point}.items() if name in has},
-            self._stop_time.of(point) if self._stop_time else experiment.stop_time,
-            point.get(STEP, experiment.step),
+            {name: value for name, value in {**self._constants, **chosen}.items() if name in has},
+            self._stop_time.of(chosen) if self._stop_time else experiment.stop_time,
+            chosen.get(STEP, experiment.step),
             experiment.order,
         )
 
-    def point(self, number: int) -> tuple[str, dict[str, Any]]:
+    def chosen(self, number: int) -> tuple[str, dict[str, Any]]:
         """The scenario of a run, and what varies, by name."""
         place, scenario = divmod(number, len(self._scenarios))
         combination, sample = divmod(place, len(self._points))
-        point: dict[str, Any] = {}
+        chosen: dict[str, Any] = {}
         for name, values in reversed(self._grid.items()):
             combination, i = divmod(combination, len(values))
-            point[name] = values[i]
+            chosen[name] = values[i]
         shares = iter(self._points[sample].tolist())
         for key, limits in self._ranges.items():
             size = between(limits, next(shares), self.columns[norm_members(key)[0]] is int)
-            point |= zip(norm_members(key), _directed(key, size, shares), strict=True)
-        return self._scenarios[scenario], point
+            chosen |= zip(norm_members(key), _directed(key, size, shares), strict=True)
+        return self._scenarios[scenario], chosen
 
     @property
     def digest(self) -> str:
@@ -175,7 +175,7 @@ class _Known:
     def __init__(self, systems: Sequence[System]) -> None:
         self._systems = systems
 
-    def kind(self, name: str) -> type[Value]:
+    def value_type(self, name: str) -> type[Value]:
         """The type of a value."""
         return float if name == STEP else _TYPES[type_of(self._variable(name))]
 

@@ -2,7 +2,7 @@
 
 Outcomes go into a database beside the study's record, a transaction a block: whatever happens to
 this process, it holds blocks whole and each run once. Each row has a checksum, in which the random
-identity of the database is: so it is told from others and from what was changed. When all runs are
+token of the database is: so it is told from others and from what was changed. When all runs are
 there they are written to one table in their order, and the database goes.
 """
 
@@ -42,7 +42,7 @@ RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
 #: Rows that are written at once.
 _ROWS = 65_536
 
-#: What the names of SQLite's files end with, and where the identity lies in the first [bytes].
+#: What the names of SQLite's files end with, and where the token lies in the first [bytes].
 _ENDS, _PAGES = ("", "-wal", "-shm", "-journal"), 16_384
 
 #: Only this process has the file open, so it needs no shared memory, which network file systems do
@@ -82,7 +82,7 @@ class Store:
             return
         if not self._path.exists():
             with ledger.writing() as unfinished:
-                _make_database(unfinished / _DATABASE, ledger.identity)
+                _make_database(unfinished / _DATABASE, ledger.token)
                 (unfinished / _DATABASE).replace(self._path)
         self._database = sqlite3.connect(self._path)
         for setting in _SETTINGS:
@@ -167,7 +167,7 @@ class Store:
         return outcome.number, np.array(values).tobytes(), outcome.failure
 
     def _checksum(self, number: int, indices: bytes, failure: str | None) -> bytes:
-        return sha256(f"{self.ledger.identity} {number} {failure!r} {indices!r}".encode()).digest()
+        return sha256(f"{self.ledger.token} {number} {failure!r} {indices!r}".encode()).digest()
 
     def _remove_database(self) -> None:
         if self._path.exists():
@@ -175,12 +175,12 @@ class Store:
                 self._path.with_name(f"{_DATABASE}{end}").unlink(missing_ok=True)
 
 
-def _make_database(path: Path, identity: str) -> None:
-    """Make an empty database that bears an identity, where no other process looks for it."""
+def _make_database(path: Path, token: str) -> None:
+    """Make an empty database that bears a token, where no other process looks for it."""
     with closing(sqlite3.connect(path)) as database, database:
-        # First of all, so that the identity is where :func:`_is_ours` looks.
-        database.execute("CREATE TABLE study (identity TEXT)")
-        database.execute("INSERT INTO study VALUES (?)", (identity,))
+        # First of all, so that the token is where :func:`_is_ours` looks.
+        database.execute("CREATE TABLE study (token TEXT)")
+        database.execute("INSERT INTO study VALUES (?)", (token,))
         # Indices as bytes: what is read is what was written, bit for bit.
         database.execute(
             "CREATE TABLE outcomes "
@@ -188,12 +188,12 @@ def _make_database(path: Path, identity: str) -> None:
         )
 
 
-def _is_ours(path: Path, identity: str) -> bool:
-    """Whether a database bears an identity; SQLite could change one that it opens."""
+def _is_ours(path: Path, token: str) -> bool:
+    """Whether a database bears a token; SQLite could change one that it opens."""
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:
-        return identity.encode() in file.read(_PAGES)
+        return token.encode() in file.read(_PAGES)
 
 
 @contextmanager
@@ -259,7 +259,7 @@ def read_study_record(folder: Path) -> dict[str, Any]:
 def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
     folder = ledger.folder
     ledger.check((STUDY_RECORD, STUDY_TABLE))
-    if not _is_ours(folder / _DATABASE, ledger.identity):
+    if not _is_ours(folder / _DATABASE, ledger.token):
         ledger.check(f"{_DATABASE}{end}" for end in _ENDS)
     if not (folder / STUDY_RECORD).exists():
         if (folder / STUDY_TABLE).exists() or (folder / _DATABASE).exists():
@@ -301,12 +301,12 @@ def _batch(
     arrow: Any, schema: Any, space: Space, rows: Sequence[tuple[int, bytes, str | None]]
 ) -> Any:
     numbers, indices, failures = zip(*rows, strict=True)
-    scenarios, points = zip(*map(space.point, numbers), strict=True)
+    scenarios, chosen = zip(*map(space.chosen, numbers), strict=True)
     values = np.frombuffer(b"".join(indices)).reshape(len(rows), -1)
     columns = [
         numbers,
         *([scenarios] * space.has_scenarios),
-        *([point[name] for point in points] for name in space.columns),
+        *([one[name] for one in chosen] for name in space.columns),
         *values.T,
         failures,
     ]

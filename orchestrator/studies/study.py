@@ -85,9 +85,9 @@ class StopTime(NamedTuple):
     base: float
     per: Mapping[str, float]
 
-    def of(self, point: Mapping[str, Any]) -> float:
+    def of(self, chosen: Mapping[str, Any]) -> float:
         """The end of one run."""
-        return self.base + sum(rate * float(point[name]) for name, rate in self.per.items())
+        return self.base + sum(rate * float(chosen[name]) for name, rate in self.per.items())
 
 
 @dataclass(frozen=True)

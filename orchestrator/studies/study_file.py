@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_values import FIGURE_KINDS, SCENARIO, FigureEntry, is_known
+from orchestrator.figures.study_values import CHARTS, SCENARIO, FigureEntry, is_known
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import explain_errors, find_toml, read_text
@@ -109,8 +109,8 @@ class StopTimeTable(TomlTable):
 class FigureTable(TomlTable):
     """A figure: `[figures.NAME]`."""
 
-    kind: Annotated[str, OneOf(tuple(FIGURE_KINDS))] = needed(
-        "Kind of figure.", " or ".join(f'"{kind}"' for kind in FIGURE_KINDS)
+    kind: Annotated[str, OneOf(tuple(CHARTS))] = needed(
+        "Kind of figure.", " or ".join(f'"{chart}"' for chart in CHARTS)
     )
     x: Names = entry(
         "Value along the horizontal axis; for `bands` also several, a column of panels each; for "
@@ -126,8 +126,8 @@ class FigureTable(TomlTable):
     limits: _Numbers = entry("Lines at these values of the columns shown.", "none")
 
     @model_validator(mode="after")
-    def _has_what_its_kind_has(self) -> Self:
-        needs, may = FIGURE_KINDS[self.kind]
+    def _has_what_its_chart_needs(self) -> Self:
+        needs, may = CHARTS[self.kind]
         if missing := [key for key in needs if not getattr(self, key)]:
             raise ValueError(f"lacks {' and '.join(missing)}")
         if more := self.model_fields_set - {"kind", *needs, *may}:
@@ -332,7 +332,7 @@ def read_figures(
     if not tables and numbers:
         tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
     by = (SCENARIO,) if is_compared else ()
-    findings, plans = Findings(), []
+    findings, entries = Findings(), []
     for name, table in tables.items():
         with findings.collecting():
             if not _NAME.fullmatch(name):
@@ -340,7 +340,7 @@ def read_figures(
                     f"{where}: figures: {name!r} cannot be the name of a file: letters, digits, -"
                 )
             _check_figure(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
-        plans.append(
+        entries.append(
             FigureEntry(
                 name,
                 table["kind"],
@@ -354,7 +354,7 @@ def read_figures(
             )
         )
     findings.refuse()
-    return tuple(plans)
+    return tuple(entries)
 
 
 def _usual(indices: Sequence[str]) -> list[str]:

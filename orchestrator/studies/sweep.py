@@ -132,9 +132,9 @@ def sweep(
         KeyboardInterrupt: Ctrl-C; what is done is kept.
 
     """
-    plan = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
+    wanted = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return complete_study(plan, means, study_folder(plan, out), sys.argv, progress=progress)
+    return complete_study(wanted, means, study_folder(wanted, out), sys.argv, progress=progress)
 
 
 def study_folder(study: Study, out: str | Path | None) -> Path:
@@ -168,13 +168,13 @@ def complete_study(
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     systems = {name: load_scenario(name, means.kind) for name in study.scenario}
     space = Space(study, systems)
-    plans = read_figures(
+    entries = read_figures(
         study.name, study.figures, space.columns, space.has_scenarios, space.indices
     )
     engine = _engine(means.engine or study.engine, space.prepared, means)
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
     with open_store(folder, record, space.indices, means.force) as kept:
-        kept.ledger.check(figure_files(plans))
+        kept.ledger.check(figure_files(entries))
         if not kept.is_done:
             if not len(kept) and (hint := faster(space, engine, means)):
                 say(hint)
@@ -185,7 +185,7 @@ def complete_study(
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(draw_figures(plans, study.title, result, unfinished, legends))
+            notes = list(draw_figures(entries, study.title, result, unfinished, legends))
         for note in notes:
             say(note)
     return result
@@ -295,7 +295,7 @@ def _record(
 @contextmanager
 def making_runs(
     engine: Engine,
-    runs: Iterable[Point],
+    points: Iterable[Point],
     *,
     scheduler: str | None = None,
     workers: int | None = None,
@@ -307,7 +307,7 @@ def making_runs(
 
     Args:
         engine: what makes them.
-        runs: to be made.
+        points: to be made.
         scheduler: address of a Dask scheduler; None for processes of this machine.
         workers: how many processes of this machine; None for one a core.
 
@@ -323,7 +323,7 @@ def making_runs(
     else:
         crew = local_workers(workers, engine)
     with crew as of:
-        yield Making(of).outcomes(runs)
+        yield Making(of).outcomes(points)
 
 
 def _complete(
@@ -339,9 +339,9 @@ def _complete(
         name: of the study, for a bar; None: there is no bar.
 
     """
-    runs = (space[number] for number in unfinished.missing(len(space)))
+    points = (space[number] for number in unfinished.missing(len(space)))
     with (
-        making_runs(engine, runs, scheduler=means.scheduler, workers=means.workers) as blocks,
+        making_runs(engine, points, scheduler=means.scheduler, workers=means.workers) as blocks,
         tqdm(
             total=len(space),
             initial=len(unfinished),

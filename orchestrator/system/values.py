@@ -27,7 +27,7 @@ _ROUNDING = 1e-9
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 #: Types in words.
-_KINDS = {
+_IN_WORDS = {
     "Real": "a real number",
     "Boolean": "a Boolean (true or false)",
     "String": "a text in UTF-8",
@@ -60,8 +60,8 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
         items = ", ".join(items_of(variable))
-        kind = f"one of {items}" if items else _KINDS.get(type_of(variable), "an integer")
-        raise InputError(f"{name}{shown}: not {kind}") from None
+        words = f"one of {items}" if items else _IN_WORDS.get(type_of(variable), "an integer")
+        raise InputError(f"{name}{shown}: not {words}") from None
     if isinstance(number, float) and not isfinite(number):
         raise InputError(f"{name}{shown}: must be finite")
     lower, upper = _range(variable)
@@ -158,13 +158,13 @@ def same(wanted: Value, held: Value) -> bool:
 
 def is_of(variable: ModelVariable, value: object) -> bool:
     """Whether a value is one that the variable can have."""
-    kind = type_of(variable)
-    if kind in ("Integer", "Enumeration"):
+    fmi_type = type_of(variable)
+    if fmi_type in ("Integer", "Enumeration"):
         return type(value) is int and is_integer(value)
     if isinstance(value, str):
         # Half of a UTF-16 pair is not text.
-        return kind == "String" and value.encode(errors="ignore").decode() == value
-    return type(value) is {"Real": float, "Boolean": bool}.get(kind)
+        return fmi_type == "String" and value.encode(errors="ignore").decode() == value
+    return type(value) is {"Real": float, "Boolean": bool}.get(fmi_type)
 
 
 def is_integer(number: float) -> bool:

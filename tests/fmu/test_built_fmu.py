@@ -126,7 +126,7 @@ def test_all_numbers_can_be_read_with_the_function_for_reals(fmu: FmuInstance):
     """There are hosts that read all outputs so."""
     fmu.initialise().run(0, 5)
     for name, variable in fmu.variables.items():
-        if variable.kind != "String":
+        if variable.type != "String":
             assert fmu.fmu.getReal([variable.reference]) == [float(fmu.get(name))]
     with pytest.raises(FMICallException):
         fmu.step(-1.0)

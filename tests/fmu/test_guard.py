@@ -96,7 +96,7 @@ def reference(host: Host, name: str) -> int:
 
 def put(host: Host, name: str, value: Any) -> Status:
     port = host.description.find(name)
-    return host.set(port.kind, [port.reference], [value])
+    return host.set(port.type, [port.reference], [value])
 
 
 def in_error(host: Host) -> None:

@@ -123,7 +123,7 @@ def keep(saved: dict[str, Model], call: Call, known: Model) -> None:
 
 
 def _meant(port: Variable, value: Any) -> Any:
-    return bool(value) if port.kind == "Boolean" else value
+    return bool(value) if port.type == "Boolean" else value
 
 
 def _is_tame(port: Variable, value: object) -> bool:

@@ -143,7 +143,7 @@ class Trials:
             for name, value in {**inputs, **said["parameters"]}.items():
                 variable = description.find(name)
                 value = value.encode() if isinstance(value, str) else value
-                host.set(variable.kind, [variable.reference], [value])
+                host.set(variable.type, [variable.reference], [value])
             if mode == "initialising":
                 host.enter()
             assert not host.fault(), "taken with values that are refused"

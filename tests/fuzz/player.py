@@ -16,7 +16,7 @@ from typing import NamedTuple
 from fuzz.model import Model, keep, slot_of
 from support import states
 from support.calls import Call, Saved, make
-from support.raw import KINDS, Host, Library, Status
+from support.raw import TYPES, Host, Library, Status
 from support.status_table import creations, without_an_instance
 from support.trials import CREATIONS
 
@@ -31,7 +31,7 @@ GOOD = "everything as it should be"
 
 #: Calls that the rest of a run depends on, and those that save and free states.
 _MOVING = {
-    *(f"fmi2Set{kind}" for kind in KINDS),
+    *(f"fmi2Set{fmi_type}" for fmi_type in TYPES),
     "fmi2SetupExperiment",
     "fmi2EnterInitializationMode",
     "fmi2ExitInitializationMode",

@@ -120,13 +120,13 @@ def _is_number(value: Any) -> bool:
 
 
 def _fits(fmu: Description, port: Variable, value: Any) -> bool:
-    if port.kind == "String":
+    if port.type == "String":
         return value in choices_of(fmu.name, port.name)
-    if port.kind == "Boolean":
+    if port.type == "Boolean":
         return isinstance(value, bool)
-    if port.kind == "Integer" and not isinstance(value, int):
+    if port.type == "Integer" and not isinstance(value, int):
         return False
-    if not _is_number(value) or (port.kind == "Integer" and not -(2**31) <= value < 2**31):
+    if not _is_number(value) or (port.type == "Integer" and not -(2**31) <= value < 2**31):
         return False
     low, high = port.minimum, port.maximum
     return (low is None or low <= value) and (high is None or value <= high)

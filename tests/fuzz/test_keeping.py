@@ -166,9 +166,9 @@ def quick(here: Path) -> Iterator[None]:
         return [Path(shutil.copy(path, folder)) for path in found]
 
     def drawn(
-        kind: str, title: str, runs: object, folder: Path, stem: str, **_: object
+        key: str, title: str, runs: object, folder: Path, stem: str, **_: object
     ) -> list[str]:
-        for name in figure_files(kind, stem):
+        for name in figure_files(key, stem):
             (folder / name).write_bytes(b"drawn")
         return []
 
@@ -177,8 +177,10 @@ def quick(here: Path) -> Iterator[None]:
         return drawn(section.scenario.figure, "", made, folder, section.name)
 
     @contextmanager
-    def making(engine: Engine, runs: Iterable[Point], **_: object) -> Iterator[list[list[Outcome]]]:
-        yield [list(engine.outcomes([run])) for run in runs]
+    def making(
+        engine: Engine, points: Iterable[Point], **_: object
+    ) -> Iterator[list[list[Outcome]]]:
+        yield [list(engine.outcomes([point])) for point in points]
 
     with ExitStack() as stack:
         for what, name, instead in (

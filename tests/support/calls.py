@@ -27,10 +27,10 @@ from typing import Any, NamedTuple, TypeVar
 from support import states
 from support.raw import (
     C_TYPES,
-    KINDS,
     LAST_SUCCESSFUL_TIME_KIND,
     OF_MODEL_EXCHANGE,
     TERMINATED_KIND,
+    TYPES,
     Description,
     Host,
     Status,
@@ -139,11 +139,11 @@ class Draw:
     def good_value(self, variable: Variable) -> Any:
         """One that a run goes on well with."""
         start, low, high = variable.start, variable.minimum, variable.maximum
-        if variable.kind == "String":
+        if variable.type == "String":
             return self.random.choice(choices_of(self.description.name, variable.name) or (start,))
-        if variable.kind == "Boolean":
+        if variable.type == "Boolean":
             return self.random.randrange(2)
-        if variable.kind == "Integer":
+        if variable.type == "Integer":
             some = (-(2**31), -1, 0, 1, 42, 2**31 - 1) if low is None else (start,)
             return self.random.choice(some)
         spread = trials_of(self.description.name).spread
@@ -156,10 +156,10 @@ class Draw:
         """What a parameter is now."""
         return self.values.get(variable.name, variable.start)
 
-    def settable(self, kind: str) -> list[Variable]:
+    def settable(self, fmi_type: str) -> list[Variable]:
         """Ports that can be set before the initialisation."""
         of = self.description.of
-        return [*of("input", kind), *of("parameter", kind)]
+        return [*of("input", fmi_type), *of("parameter", fmi_type)]
 
 
 #: The case of a Boolean that is no truth value of C.
@@ -209,8 +209,8 @@ def _inputs(draw: Draw) -> list[Variable]:
     return draw.description.of("input", "Real")
 
 
-def _parameters(draw: Draw, variability: str, kind: str = "Real") -> list[Variable]:
-    found = draw.description.of("parameter", kind)
+def _parameters(draw: Draw, variability: str, fmi_type: str = "Real") -> list[Variable]:
+    found = draw.description.of("parameter", fmi_type)
     return [v for v in found if v.variability == variability]
 
 
@@ -218,8 +218,8 @@ def _tunable(draw: Draw) -> list[Variable]:
     return _parameters(draw, "tunable")
 
 
-def _of_kind(draw: Draw, *kinds: str) -> list[Variable]:
-    return [v for v in draw.description.variables if v.kind in kinds]
+def _of_type(draw: Draw, *types: str) -> list[Variable]:
+    return [v for v in draw.description.variables if v.type in types]
 
 
 def _changeable(draw: Draw) -> Variable:
@@ -235,17 +235,17 @@ def _good(found: Callable[[Draw], list[Variable]]) -> Callable[[Draw], Arguments
     return arguments
 
 
-def _value_cases(kind: str) -> None:
+def _value_cases(fmi_type: str) -> None:
     """The cases that are the same for all types."""
-    some: Any = {"Real": 1.0, "Integer": 1, "Boolean": 1, "String": "x"}[kind]
-    others = [other for other in KINDS if other != kind]
+    some: Any = {"Real": 1.0, "Integer": 1, "Boolean": 1, "String": "x"}[fmi_type]
+    others = [other for other in TYPES if other != fmi_type]
     bad = Item(0, some, False)
     for action in ("Get", "Set"):
-        function = f"fmi2{action}{kind}"
+        function = f"fmi2{action}{fmi_type}"
         _case(function, "n = 0, with NULL")(lambda draw: _items(null="both"))
         _case(function, "references NULL, n > 0")(lambda draw: _items(bad, null="references"))
         _case(function, "values NULL, n > 0")(lambda draw: _items(bad, null="values"))
-        if kind == "Real":
+        if fmi_type == "Real":
             _case(function, "n = 2^60")(lambda draw: _items(bad, n=2**60))
         _case(function, "an unknown reference")(
             lambda draw: _items(
@@ -254,38 +254,38 @@ def _value_cases(kind: str) -> None:
             )
         )  # fmt: skip
         # Hosts read Integers and Booleans as Reals.
-        case, kinds = "a port of another type", others
+        case, types = "a port of another type", others
         if function == "fmi2GetReal":
-            case, kinds = "a String", ["String"]
+            case, types = "a String", ["String"]
         _case(function, case)(
-            lambda draw, kinds=kinds: _item(draw.any_of(_of_kind(draw, *kinds)), some, False)
+            lambda draw, types=types: _item(draw.any_of(_of_type(draw, *types)), some, False)
         )
-    _case(f"fmi2Get{kind}", "all ports")(
-        lambda draw: _items(*(Item(v.reference) for v in _of_kind(draw, kind)))
+    _case(f"fmi2Get{fmi_type}", "all ports")(
+        lambda draw: _items(*(Item(v.reference) for v in _of_type(draw, fmi_type)))
     )
 
-    @_case(f"fmi2Set{kind}", "a fixed parameter")
+    @_case(f"fmi2Set{fmi_type}", "a fixed parameter")
     def _fixed(draw: Draw) -> Arguments:
-        variable = draw.any_of(_parameters(draw, "fixed", kind))
+        variable = draw.any_of(_parameters(draw, "fixed", fmi_type))
         found = [draw.good_value(variable) for _ in range(20)]
         others = [value for value in found if value != draw.value(variable)]
         if not others:
             raise Lacking
         return _item(variable, others[0])
 
-    @_case(f"fmi2Set{kind}", SAME)
+    @_case(f"fmi2Set{fmi_type}", SAME)
     def _same(draw: Draw) -> Arguments:
-        variable = draw.any_of(_parameters(draw, "fixed", kind))
+        variable = draw.any_of(_parameters(draw, "fixed", fmi_type))
         return _item(variable, draw.value(variable))
 
-    if kind in ("Real", "Boolean"):
-        _case(f"fmi2Set{kind}", "an output")(
-            lambda draw: _item(draw.any_of(draw.description.of("output", kind)), some, False)
+    if fmi_type in ("Real", "Boolean"):
+        _case(f"fmi2Set{fmi_type}", "an output")(
+            lambda draw: _item(draw.any_of(draw.description.of("output", fmi_type)), some, False)
         )
 
 
-for _kind in KINDS:
-    _value_cases(_kind)
+for _fmi_type in TYPES:
+    _value_cases(_fmi_type)
 _case("fmi2SetReal", "a tunable parameter")(_good(_tunable))
 _case("fmi2SetReal", "an input")(_good(_inputs))
 
@@ -309,7 +309,7 @@ def _many(draw: Draw) -> Arguments:
 
 
 _case("fmi2GetReal", "100,000 times the same")(
-    lambda draw: _items(Item(draw.any_of(_of_kind(draw, "Real")).reference), times=MANY)
+    lambda draw: _items(Item(draw.any_of(_of_type(draw, "Real")).reference), times=MANY)
 )
 
 
@@ -367,13 +367,13 @@ def _unknown_among_good(draw: Draw) -> Arguments:
 @_case("fmi2GetReal", "one bad among good")
 def _one_bad_to_get(draw: Draw) -> Arguments:
     good = draw.any_of(draw.description.of("output", "Real"))
-    texts = [port.reference for port in _of_kind(draw, "String")]
+    texts = [port.reference for port in _of_type(draw, "String")]
     bad = draw.random.choice((UNKNOWN, *texts))
     return _shuffled(draw, Item(good.reference), Item(bad, None, False))
 
 
 _case("fmi2GetReal", "all Integers and Booleans")(
-    lambda draw: _items(*(Item(v.reference) for v in _of_kind(draw, "Integer", "Boolean")))
+    lambda draw: _items(*(Item(v.reference) for v in _of_type(draw, "Integer", "Boolean")))
 )
 
 
@@ -590,15 +590,15 @@ def _encoded(text: str | None) -> bytes | None:
 
 
 def _make_values(host: Host, call: Call, saved: Saved) -> Status:
-    action, kind = call.function[4:7], call.function[7:]
+    action, fmi_type = call.function[4:7], call.function[7:]
     items, null = call.arguments["items"], call.arguments.get("null")
     times = call.arguments.get("times", 1)
     n = len(items) * times
     values = [item.value for item in items] * times
-    if kind == "String":
+    if fmi_type == "String":
         values = [_encoded(value) for value in values]
     references = (c_uint * n)(*[item.reference for item in items] * times)
-    array = (C_TYPES[kind] * n)(*(values if action == "Set" else ()))
+    array = (C_TYPES[fmi_type] * n)(*(values if action == "Set" else ()))
     status = host.call(
         call.function,
         None if null in ("references", "both") else references,
@@ -607,9 +607,9 @@ def _make_values(host: Host, call: Call, saved: Saved) -> Status:
     )
     if action == "Get" and null is None:
         for item, value in zip(items, array, strict=False):
-            wanted = _MISSING[kind]
+            wanted = _MISSING[fmi_type]
             if item.good and status != Status.OK:
-                _, [wanted] = host.get(kind, [item.reference])
+                _, [wanted] = host.get(fmi_type, [item.reference])
             assert (item.good and status == Status.OK) or repr(value) == repr(wanted), (
                 f"{value!r} for {wanted!r}"
             )
@@ -764,5 +764,5 @@ _MADE: dict[str, Callable[[Host, Call, Saved], Status]] = {
     "fmi2SerializeFMUstate": _make_serialise,
     "fmi2DeSerializeFMUstate": _make_deserialise,
     "fmi2DoStep": _make_step,
-    **{f"fmi2{action}{kind}": _make_values for action in ("Get", "Set") for kind in KINDS},
+    **{f"fmi2{action}{fmi_type}": _make_values for action in ("Get", "Set") for fmi_type in TYPES},
 }

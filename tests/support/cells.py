@@ -132,7 +132,7 @@ class Trial:
     def _set(self, values: Mapping[str, float]) -> None:
         for name, value in values.items():
             variable = self.host.description.find(name)
-            assert self.host.set(variable.kind, [variable.reference], [value]) == Status.OK
+            assert self.host.set(variable.type, [variable.reference], [value]) == Status.OK
 
     def _step(self) -> Status:
         status = self.host.step(self.time, H)
@@ -278,7 +278,7 @@ def _content(host: Host) -> object:
 
 
 def _same(variable: Variable, found: object, wanted: object) -> bool:
-    if variable.kind == "String":
+    if variable.type == "String":
         assert isinstance(found, bytes)
         return found.decode() == wanted
-    return bool(found) == bool(wanted) if variable.kind == "Boolean" else found == wanted
+    return bool(found) == bool(wanted) if variable.type == "Boolean" else found == wanted

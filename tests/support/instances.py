@@ -40,7 +40,7 @@ class Variable(NamedTuple):
     """What a host knows of a port."""
 
     reference: int
-    kind: str
+    type: str
     causality: str
 
 
@@ -52,10 +52,10 @@ class Instance(ABC):
         self.time = 0.0
 
     @abstractmethod
-    def write(self, kind: str, references: list[int], values: list[Any]) -> None: ...
+    def write(self, fmi_type: str, references: list[int], values: list[Any]) -> None: ...
 
     @abstractmethod
-    def read(self, kind: str, references: list[int]) -> Sequence[Any]: ...
+    def read(self, fmi_type: str, references: list[int]) -> Sequence[Any]: ...
 
     @abstractmethod
     def advance(self, h: float) -> bool: ...
@@ -64,18 +64,18 @@ class Instance(ABC):
         """Set ports by their names, with two underscores for a dot."""
         for name, value in values.items():
             variable = self.variables[name.replace("__", ".")]
-            self.write(variable.kind, [variable.reference], [value])
+            self.write(variable.type, [variable.reference], [value])
 
     def get(self, name: str) -> Any:
         variable = self.variables[name]
-        return self.read(variable.kind, [variable.reference])[0]
+        return self.read(variable.type, [variable.reference])[0]
 
     def references(self, causality: str) -> list[int]:
         """Of the Real ports, in their order."""
         return [
             variable.reference
             for variable in self.variables.values()
-            if (variable.causality, variable.kind) == (causality, "Real")
+            if (variable.causality, variable.type) == (causality, "Real")
         ]
 
     def outputs(self) -> list[float]:
@@ -119,7 +119,7 @@ class ClassInstance(Instance):
         self.ports = self.slave._store.ports
         super().__init__(
             {
-                port.name: Variable(reference, port.kind, port.causality)
+                port.name: Variable(reference, port.type, port.causality)
                 for reference, port in enumerate(self.ports)
             }
         )
@@ -128,11 +128,11 @@ class ClassInstance(Instance):
         self.slave.enter_initialization_mode()
         self.slave.exit_initialization_mode()
 
-    def write(self, kind: str, references: list[int], values: list[Any]) -> None:
-        getattr(self.slave, f"set_{kind.lower()}")(references, values)
+    def write(self, fmi_type: str, references: list[int], values: list[Any]) -> None:
+        getattr(self.slave, f"set_{fmi_type.lower()}")(references, values)
 
-    def read(self, kind: str, references: list[int]) -> Sequence[Any]:
-        read: Sequence[Any] = getattr(self.slave, f"get_{kind.lower()}")(references)
+    def read(self, fmi_type: str, references: list[int]) -> Sequence[Any]:
+        read: Sequence[Any] = getattr(self.slave, f"get_{fmi_type.lower()}")(references)
         return read
 
     def advance(self, h: float) -> bool:
@@ -173,11 +173,11 @@ class FmuInstance(Instance):
         self.time = 0.0
         return self
 
-    def write(self, kind: str, references: list[int], values: list[Any]) -> None:
-        getattr(self.fmu, f"set{kind}")(references, values)
+    def write(self, fmi_type: str, references: list[int], values: list[Any]) -> None:
+        getattr(self.fmu, f"set{fmi_type}")(references, values)
 
-    def read(self, kind: str, references: list[int]) -> Sequence[Any]:
-        read: Sequence[Any] = getattr(self.fmu, f"get{kind}")(references)
+    def read(self, fmi_type: str, references: list[int]) -> Sequence[Any]:
+        read: Sequence[Any] = getattr(self.fmu, f"get{fmi_type}")(references)
         return read
 
     def advance(self, h: float) -> bool:

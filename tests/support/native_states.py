@@ -115,12 +115,12 @@ def _read(source: _Reader) -> NativeState | None:
 
 
 def _parameter(source: _Reader, port: Port) -> Any:
-    if port.kind == "Real":
+    if port.type == "Real":
         return source.real()
     [number] = struct.unpack("<i", source.bytes(4))
-    if port.kind == "String":
+    if port.type == "String":
         return [*port.choices][number]
-    return bool(number) if port.kind == "Boolean" else number
+    return bool(number) if port.type == "Boolean" else number
 
 
 def resealed(content: bytes) -> bytes:
@@ -160,9 +160,9 @@ def _written(said: NativeState) -> bytes:
     ]
     for port in layout.parameters:
         value = said["parameters"][port.name]
-        if port.kind == "String":
+        if port.type == "String":
             value = [*port.choices].index(value)
-        parts.append(_reals(value) if port.kind == "Real" else struct.pack("<i", value))
+        parts.append(_reals(value) if port.type == "Real" else struct.pack("<i", value))
     parts += [_reals(*said["inputs"]), _reals(*said["outputs"]), _words(said["state"] is not None)]
     if said["state"] is not None:
         for group in said["state"]:

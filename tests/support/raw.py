@@ -43,7 +43,7 @@ class Status(IntEnum):
 
 
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
-KINDS = ("Real", "Integer", "Boolean", "String")
+TYPES = ("Real", "Integer", "Boolean", "String")
 TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
 
 #: What the functions take after the component: a pointer, a number of things, an int or a double.
@@ -55,7 +55,7 @@ SIGNATURES = {
     "Terminate": "",
     "Reset": "",
     "CancelStep": "",
-    **{f"{verb}{kind}": "pnp" for kind in KINDS for verb in ("Get", "Set")},
+    **{f"{verb}{fmi_type}": "pnp" for fmi_type in TYPES for verb in ("Get", "Set")},
     **dict.fromkeys(("GetFMUstate", "SetFMUstate", "FreeFMUstate"), "p"),
     "SerializedFMUstateSize": "pp",
     "SerializeFMUstate": "ppn",
@@ -64,7 +64,7 @@ SIGNATURES = {
     "SetRealInputDerivatives": "pnpp",
     "GetRealOutputDerivatives": "pnpp",
     "DoStep": "ddi",
-    **{f"Get{kind}Status": "ip" for kind in ("", *KINDS)},
+    **{f"Get{fmi_type}Status": "ip" for fmi_type in ("", *TYPES)},
 }
 OF_MODEL_EXCHANGE = {
     "EnterEventMode": "",
@@ -116,7 +116,7 @@ class Variable(NamedTuple):
 
     name: str
     reference: int
-    kind: str
+    type: str
     causality: str
     variability: str
     start: Any
@@ -134,14 +134,15 @@ class Description:
     variables: tuple[Variable, ...]
     kind: str = PYTHON
 
-    def of(self, causality: str, kind: str | None = None) -> list[Variable]:
+    def of(self, causality: str, fmi_type: str | None = None) -> list[Variable]:
         """The variables of a causality."""
-        return [v for v in self.variables if v.causality == causality and kind in (None, v.kind)]
+        found = (v for v in self.variables if v.causality == causality)
+        return [v for v in found if fmi_type in (None, v.type)]
 
     @cached_property
     def names(self) -> dict[tuple[int, str], str]:
         """By value reference and type."""
-        return {(v.reference, v.kind): v.name for v in self.variables}
+        return {(v.reference, v.type): v.name for v in self.variables}
 
     @cached_property
     def fault(self) -> Variable:
@@ -169,19 +170,19 @@ def description_in(root: ElementTree.Element, kind: str) -> Description:
 
 
 def _variable(element: ElementTree.Element) -> Variable:
-    [value] = [child for child in element if child.tag in KINDS]
+    [value] = [child for child in element if child.tag in TYPES]
     return variable(element, value.tag, value, value.get("start"))
 
 
 def variable(
-    element: ElementTree.Element, kind: str, limited: ElementTree.Element, start: str | None
+    element: ElementTree.Element, fmi_type: str, limited: ElementTree.Element, start: str | None
 ) -> Variable:
     """A variable of an element, with the limits of one, and a start value as text."""
-    convert = {"Real": float, "Integer": int, "Boolean": "true".__eq__, "String": str}[kind]
+    convert = {"Real": float, "Integer": int, "Boolean": "true".__eq__, "String": str}[fmi_type]
     return Variable(
         element.attrib["name"],
         int(element.attrib["valueReference"]),
-        kind,
+        fmi_type,
         element.get("causality", "local"),
         element.get("variability", "continuous"),
         None if start is None else convert(start),
@@ -225,12 +226,12 @@ class Message(NamedTuple):
 class _Arrays:
     """What a get call of the same variables needs, made once."""
 
-    def __init__(self, kind: str, variables: Sequence[Variable]) -> None:
-        self.kind = kind
+    def __init__(self, fmi_type: str, variables: Sequence[Variable]) -> None:
+        self.type = fmi_type
         self.names = [variable.name for variable in variables]
         self.n = c_size_t(len(variables))
         self.references = (c_uint * len(variables))(*(v.reference for v in variables))
-        self.values = (C_TYPES[kind] * len(variables))()
+        self.values = (C_TYPES[fmi_type] * len(variables))()
 
 
 class Host:
@@ -247,8 +248,8 @@ class Host:
         self.callbacks = Callbacks(self._logger, *memory, None, None)
         self.component: int | None = None
         self._arrays = {
-            kind: _Arrays(kind, [v for v in self.description.variables if v.kind == kind])
-            for kind in KINDS
+            one: _Arrays(one, [v for v in self.description.variables if v.type == one])
+            for one in TYPES
         }
         self._outputs = _Arrays("Real", self.description.of("output", "Real"))
 
@@ -311,27 +312,30 @@ class Host:
     def step(self, time: float, h: float) -> Status:
         return self.call("fmi2DoStep", c_double(time), c_double(h), 1)
 
-    def set(self, kind: str, references: Sequence[int], values: Sequence[Any]) -> Status:
+    def set(self, fmi_type: str, references: Sequence[int], values: Sequence[Any]) -> Status:
         n = len(references)
         return self.call(
-            f"fmi2Set{kind}", (c_uint * n)(*references), c_size_t(n), (C_TYPES[kind] * n)(*values)
+            f"fmi2Set{fmi_type}",
+            (c_uint * n)(*references),
+            c_size_t(n),
+            (C_TYPES[fmi_type] * n)(*values),
         )
 
-    def get(self, kind: str, references: Sequence[int]) -> tuple[Status, list[Any]]:
+    def get(self, fmi_type: str, references: Sequence[int]) -> tuple[Status, list[Any]]:
         n = len(references)
-        values = (C_TYPES[kind] * n)()
-        status = self.call(f"fmi2Get{kind}", (c_uint * n)(*references), c_size_t(n), values)
+        values = (C_TYPES[fmi_type] * n)()
+        status = self.call(f"fmi2Get{fmi_type}", (c_uint * n)(*references), c_size_t(n), values)
         return status, list(values)
 
     def value(self, variable: Variable) -> Any:
-        status, [value] = self.get(variable.kind, [variable.reference])
+        status, [value] = self.get(variable.type, [variable.reference])
         assert status == Status.OK, f"{variable.name} cannot be read: {status.name}"
         return value
 
     def _read(self, arrays: _Arrays) -> list[Any]:
         """Values of variables; None each, where there are no outputs since there is no start."""
-        status = self.call(f"fmi2Get{arrays.kind}", arrays.references, arrays.n, arrays.values)
-        if status == Status.Error and arrays.kind == "Real":
+        status = self.call(f"fmi2Get{arrays.type}", arrays.references, arrays.n, arrays.values)
+        if status == Status.Error and arrays.type == "Real":
             return [None] * len(arrays.names)
         assert status == Status.OK, f"values cannot be read: {status.name}"
         return list(arrays.values)

@@ -48,8 +48,8 @@ def run_table(
 ) -> Table:
     """All rows of a run, however it ends."""
     table = Table()
-    how = choose_loop(loop, experiment, isolation)
-    simulate_plan(make_plan(system, experiment), [table], isolation, how, hooks)
+    stepping = choose_loop(loop, experiment, isolation)
+    simulate_plan(make_plan(system, experiment), [table], isolation, stepping, hooks)
     return table
 
 

@@ -21,20 +21,20 @@ class Toy(NamedTuple):
 
     seconds: float = 0.0
 
-    def outcomes(self, runs: Sequence[Point]) -> Iterator[Outcome]:
-        for run in runs:
-            time.sleep(run.parameters.get("toy.seconds", self.seconds))
-            if run.parameters.get("toy.talks"):
+    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
+        for point in points:
+            time.sleep(point.parameters.get("toy.seconds", self.seconds))
+            if point.parameters.get("toy.talks"):
                 os.write(1, b"out of a run\n")
                 os.write(2, b"out of a run\n")
-            if run.parameters.get("toy.fatal"):
+            if point.parameters.get("toy.fatal"):
                 os.kill(os.getpid(), signal.SIGKILL)
-            yield outcome(run, os.getpid())
+            yield outcome(point, os.getpid())
 
 
-def outcome(run: Point, process: int = 0) -> Outcome:
+def outcome(point: Point, process: int = 0) -> Outcome:
     """What a run comes to."""
-    return Outcome(run.number, {"square": run.parameters["toy.x"] ** 2, "process": process})
+    return Outcome(point.number, {"square": point.parameters["toy.x"] ** 2, "process": process})
 
 
 def run(number: int, parameters: Mapping[str, Any] = {}) -> Point:
@@ -47,6 +47,6 @@ def numbers_and_squares(blocks: Iterable[Sequence[Outcome]]) -> list[tuple[int, 
     return sorted((made.number, made.indices.get("square")) for block in blocks for made in block)
 
 
-def expected(runs: Iterable[Point]) -> list[tuple[int, Any]]:
+def expected(points: Iterable[Point]) -> list[tuple[int, Any]]:
     """What is to come of them."""
-    return [(run.number, outcome(run).indices["square"]) for run in runs]
+    return [(point.number, outcome(point).indices["square"]) for point in points]

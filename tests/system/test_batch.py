@@ -89,9 +89,9 @@ def _row(before: Instant, now: Instant, tau: tuple[float, ...]) -> list[float]:
     return [*values, *state, *before.signals.tau, *before.command, *tau, *before.tau_w]
 
 
-def compare_with_straight_line(engine: BatchEngine, run: Point) -> None:
-    table = engine.table(run)
-    straight = straight_rows(engine.setting(run), len(table) - 1, run.order == "jacobi")
+def compare_with_straight_line(engine: BatchEngine, point: Point) -> None:
+    table = engine.table(point)
+    straight = straight_rows(engine.setting(point), len(table) - 1, point.order == "jacobi")
     different = np.argwhere(bits(table.rows) != bits(straight))
     # Where nothing is drawn, what is zero is not of a sign.
     different = [at for at in different if table.rows[*at] != straight[*at]]

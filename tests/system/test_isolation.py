@@ -260,7 +260,8 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
     thread.start()
     assert begun.wait(60.0)
     assert (
-        len(simulate_plan(make_plan(talkative, Experiment(STEP, STEP)), loop=steps).messages) == 101
+        len(simulate_plan(make_plan(talkative, Experiment(STEP, STEP)), stepping=steps).messages)
+        == 101
     )
     gc.collect()
     go_on.set()

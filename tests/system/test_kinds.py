@@ -108,7 +108,7 @@ def varied(scenario: str) -> st.SearchStrategy[dict[str, float]]:
         (f"{instance}.{port.name}", port)
         for instance, name in FMUS_OF[scenario].items()
         for port in component(name).ports
-        if port.causality == "parameter" and port.kind == "Real"
+        if port.causality == "parameter" and port.type == "Real"
     ]
     factors = st.floats(0.3, 3.0) | st.floats(0.9, 1.1) | st.sampled_from([1e-9, 1e6, 1e150, 1e300])
     chosen = st.lists(st.tuples(st.sampled_from(ports), factors), min_size=1, max_size=6)

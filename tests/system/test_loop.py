@@ -232,7 +232,7 @@ def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
     assert 8 <= len(table) <= 9
     assert table.failure == f"interrupted at t = {table.time[-1]:g} s"
     assert np.array_equal(table.time, np.arange(len(table)) * H)
-    assert len(table.ending.signals) == 1
+    assert len(table.ending.interrupts) == 1
 
 
 @pytest.mark.parametrize("loop", LOOPS)

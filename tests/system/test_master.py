@@ -126,7 +126,7 @@ class Impatient(Table):
 def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, loop: str):
     """In a run that would take minutes."""
     result, experiment = Impatient(), Experiment(1e4, 0.02)
-    simulate_plan(make_plan(system, experiment), [result], loop=choose_loop(loop, experiment))
+    simulate_plan(make_plan(system, experiment), [result], stepping=choose_loop(loop, experiment))
     assert result.failure is not None
     assert "interrupted at t =" in result.failure
     assert 1 < len(result) < 500_000

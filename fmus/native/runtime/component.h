@@ -16,7 +16,7 @@
 
 #include "host.h"
 
-typedef enum { REAL, INTEGER, BOOLEAN, STRING } kind;
+typedef enum { REAL, INTEGER, BOOLEAN, STRING } fmi_type;
 
 typedef struct instance instance;
 
@@ -32,7 +32,7 @@ typedef struct {
 
 /* What it calls things. */
 typedef struct {
-    string kinds[STRING + 1]; /* types of values */
+    string types[STRING + 1]; /* of values */
     string token;             /* what tells an FMU from others */
 } names;
 
@@ -87,15 +87,15 @@ static string get_string(call *this, uint32_t reference);
 /* All values of a call are taken, or none: they are set one by one between the beginning and the
  * end of a setting. */
 typedef struct setting setting;
-static setting begin_setting(call *this, kind kind, const uint32_t references[], size_t n);
+static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n);
 static void set_value(setting *it, uint32_t reference, double number, string text);
 static void end_setting(setting *it);
 
 static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]);
 
-/* References for a type that no port has; `kind` is the version's name of it. */
-static void get_unknown(call *this, string kind, const uint32_t references[], size_t n);
-static void set_unknown(call *this, string kind, const uint32_t references[], size_t n);
+/* References for a type that no port has; `type` is the version's name of it. */
+static void get_unknown(call *this, string type, const uint32_t references[], size_t n);
+static void set_unknown(call *this, string type, const uint32_t references[], size_t n);
 
 static void take_step(call *this, double time, double step);
 

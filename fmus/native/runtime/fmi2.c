@@ -33,7 +33,7 @@ typedef struct {
 } callbacks;
 
 static const names version = {
-    .kinds = {"Real", "Integer", "Boolean", "String"},
+    .types = {"Real", "Integer", "Boolean", "String"},
     .token = "GUID",
 };
 
@@ -116,9 +116,9 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
 #define SET(name, type, wrong, action)                                                           \
     ANSWER(name, NOT_AFTER_ERROR, wrong,                                                         \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
-#define SET_EACH(name, type, kind, wrong, number, text)                                          \
-    SET(name, type, wrong, {                                                                     \
-        setting it = begin_setting(&this, kind, r, n);                                           \
+#define SET_EACH(name, c_type, type, wrong, number, text)                                        \
+    SET(name, c_type, wrong, {                                                                   \
+        setting it = begin_setting(&this, type, r, n);                                           \
         FOR_EACH(set_value(&it, r[i], number, text));                                            \
         end_setting(&it);                                                                        \
     })

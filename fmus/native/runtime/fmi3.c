@@ -9,7 +9,7 @@
 #include "component.h"
 
 static const names version = {
-    .kinds = {"Float64", "Int32", "Boolean", "String"},
+    .types = {"Float64", "Int32", "Boolean", "String"},
     .token = "instantiation token",
 };
 
@@ -160,12 +160,12 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
         return end(&this);                                                                       \
     }
 
-#define SET(name, type, kind, wrong, number, text)                                               \
-    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const type v[],           \
+#define SET(name, c_type, type, wrong, number, text)                                             \
+    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const c_type v[],         \
                           size_t n_v) {                                                          \
         call this = begin(handle, #name, NOT_AFTER_ERROR);                                       \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong)) {                \
-            setting it = begin_setting(&this, kind, r, n);                                       \
+            setting it = begin_setting(&this, type, r, n);                                       \
             for (size_t i = 0; i < n; i++) set_value(&it, r[i], number, text);                   \
             end_setting(&it);                                                                    \
         }                                                                                        \
@@ -202,30 +202,30 @@ EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, cons
 
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 
-static int get_none(void *handle, string function, string kind, const uint32_t r[], size_t n,
+static int get_none(void *handle, string function, string type, const uint32_t r[], size_t n,
                     string wrong) {
     call this = begin(handle, function, ALWAYS);
-    if (GOES_ON(this, wrong)) get_unknown(&this, kind, r, n);
+    if (GOES_ON(this, wrong)) get_unknown(&this, type, r, n);
     return end(&this);
 }
 
-static int set_none(void *handle, string function, string kind, const uint32_t r[], size_t n,
+static int set_none(void *handle, string function, string type, const uint32_t r[], size_t n,
                     string wrong) {
     call this = begin(handle, function, NOT_AFTER_ERROR);
-    if (GOES_ON(this, wrong)) set_unknown(&this, kind, r, n);
+    if (GOES_ON(this, wrong)) set_unknown(&this, type, r, n);
     return end(&this);
 }
 
-#define NO_VARIABLE(kind, type)                                                                  \
-    EXPORT int FMI3(fmi3Get##kind)(void *handle, const uint32_t r[], size_t n, type v[],         \
+#define NO_VARIABLE(type, c_type)                                                                \
+    EXPORT int FMI3(fmi3Get##type)(void *handle, const uint32_t r[], size_t n, c_type v[],       \
                                    size_t n_v) {                                                 \
         string wrong = wrong_numbers(n, r, v, n_v);                                              \
         for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = 0;                                \
-        return get_none(handle, "fmi3Get" #kind, #kind, r, n, wrong);                            \
+        return get_none(handle, "fmi3Get" #type, #type, r, n, wrong);                            \
     }                                                                                            \
-    EXPORT int FMI3(fmi3Set##kind)(void *handle, const uint32_t r[], size_t n, const type v[],   \
+    EXPORT int FMI3(fmi3Set##type)(void *handle, const uint32_t r[], size_t n, const c_type v[], \
                                    size_t n_v) {                                                 \
-        return set_none(handle, "fmi3Set" #kind, #kind, r, n, wrong_numbers(n, r, v, n_v));      \
+        return set_none(handle, "fmi3Set" #type, #type, r, n, wrong_numbers(n, r, v, n_v));      \
     }
 
 NO_VARIABLE(Float32, float)

@@ -43,7 +43,7 @@ typedef struct {
 
 typedef struct {
     string name;
-    kind kind;
+    fmi_type type;
     causality causality;
     variability variability;
     size_t place; /* among the inputs or outputs, or of a parameter in its structure */

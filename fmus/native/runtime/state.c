@@ -87,7 +87,7 @@ static void put_run(writer *to, const run *it) {
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality != PARAMETER) continue;
         double number = parameter(&it->parameters, &ports[i]);
-        if (ports[i].kind == REAL) {
+        if (ports[i].type == REAL) {
             put_real(to, number);
         } else {
             put_word(to, (uint32_t)(int32_t)number);
@@ -201,14 +201,14 @@ static int good_values(const double values[], size_t n, const uint32_t reference
 }
 
 static int take_parameter(reader *from, parameter_values *values, const port *port, message *why) {
-    double number = port->kind == REAL ? take_real(from) : (int32_t)take_word(from);
-    if (port->kind == BOOLEAN && number != 0.0 && number != 1.0) {
+    double number = port->type == REAL ? take_real(from) : (int32_t)take_word(from);
+    if (port->type == BOOLEAN && number != 0.0 && number != 1.0) {
         return compose(why, "%s: must be a Boolean", port->name);
     }
-    if (port->kind == STRING && text_of(port, number) == NULL) {
+    if (port->type == STRING && text_of(port, number) == NULL) {
         return compose(why, "%s: is not one of the choices", port->name);
     }
-    if (port->kind != STRING && !in_range(port, number, why)) return 0;
+    if (port->type != STRING && !in_range(port, number, why)) return 0;
     put_parameter(values, port, number);
     return 1;
 }

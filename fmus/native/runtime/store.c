@@ -27,9 +27,9 @@ static const port *port_at(uint32_t reference) {
 }
 
 /* The port of a type that has a value reference. */
-static const port *port_of(uint32_t reference, kind kind) {
+static const port *port_of(uint32_t reference, fmi_type type) {
     const port *port = port_at(reference);
-    return port != NULL && port->kind == kind ? port : NULL;
+    return port != NULL && port->type == type ? port : NULL;
 }
 
 /* The text that a number stands for; NULL: none. */
@@ -72,7 +72,7 @@ static double parameter(const parameter_values *values, const port *port) {
     const char *place = (const char *)values + port->place;
     double real;
     int integer;
-    if (port->kind == REAL) {
+    if (port->type == REAL) {
         memcpy(&real, place, sizeof real);
         return real;
     }
@@ -82,7 +82,7 @@ static double parameter(const parameter_values *values, const port *port) {
 
 static void put_parameter(parameter_values *values, const port *port, double number) {
     char *place = (char *)values + port->place;
-    if (port->kind == REAL) {
+    if (port->type == REAL) {
         memcpy(place, &number, sizeof number);
     } else {
         int integer = (int)number;
@@ -92,25 +92,25 @@ static void put_parameter(parameter_values *values, const port *port, double num
 
 /* Getting */
 
-static void get_unknown(call *this, string kind, const uint32_t references[], size_t n) {
+static void get_unknown(call *this, string type, const uint32_t references[], size_t n) {
     message why;
     for (size_t i = 0; i < n; i++) {
-        compose(&why, NO_PORT, kind, references[i]);
+        compose(&why, NO_PORT, type, references[i]);
         refuse_to_get(this, &why);
     }
 }
 
 /* The value of a port as a number; 0.0, if no port of the type has the reference. */
-static double number_of(call *this, uint32_t reference, kind kind) {
+static double number_of(call *this, uint32_t reference, fmi_type type) {
     const run *run = &this->instance->run;
     const port *port = port_at(reference);
-    if (port == NULL || (port->kind != kind && (kind != REAL || port->kind == STRING))) {
-        get_unknown(this, version.kinds[kind], &reference, 1);
+    if (port == NULL || (port->type != type && (type != REAL || port->type == STRING))) {
+        get_unknown(this, version.types[type], &reference, 1);
         return 0.0;
     }
     if (port->causality == PARAMETER) return parameter(&run->parameters, port);
     if (port->causality == INPUT) return run->inputs.values[port->place];
-    if (port->kind == BOOLEAN) return run->fault;
+    if (port->type == BOOLEAN) return run->fault;
     return run->moments[run->now].outputs.values[port->place];
 }
 
@@ -168,25 +168,25 @@ struct setting {
     input_values inputs;
 };
 
-static void set_unknown(call *this, string kind, const uint32_t references[], size_t n) {
+static void set_unknown(call *this, string type, const uint32_t references[], size_t n) {
     message why;
     if (n == 0 || !can_set(this)) return;
-    compose(&why, NO_PORT, kind, references[0]);
+    compose(&why, NO_PORT, type, references[0]);
     fail(this, &why);
 }
 
-static setting begin_setting(call *this, kind kind, const uint32_t references[], size_t n) {
+static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n) {
     const run *run = &this->instance->run;
     setting it;
     it.call = this;
     it.good = can_set(this);
     it.tunes = 0;
     for (size_t i = 0; i < n && it.good; i++) {
-        const port *port = port_of(references[i], kind);
+        const port *port = port_of(references[i], type);
         if (port != NULL) {
             it.tunes |= port->causality == PARAMETER;
         } else {
-            set_unknown(this, version.kinds[kind], &references[i], 1);
+            set_unknown(this, version.types[type], &references[i], 1);
             it.good = 0;
         }
     }

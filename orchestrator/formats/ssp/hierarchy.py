@@ -260,10 +260,10 @@ class Builder:
         return leaf
 
     def _component(self, content: Element, name: str) -> Component | None:
-        source, kind = content.get("source"), content.get("type", _FMU)
+        source, its_type = content.get("source"), content.get("type", _FMU)
         implementation = content.get("implementation", "any")
-        if kind != _FMU:
-            why = f"a component of type {kind!r} is not supported; only FMUs are"
+        if its_type != _FMU:
+            why = f"a component of type {its_type!r} is not supported; only FMUs are"
         elif source is None:
             why = "a component without a source, which cannot be run"
         elif implementation not in ("any", "CoSimulation"):

@@ -293,11 +293,11 @@ class Bindings:
             )
 
     def _content(
-        self, element: Element, owner: Leaf | Bus | Group, where: str, inline: str, kind: str
+        self, element: Element, owner: Leaf | Bus | Group, where: str, inline: str, media_type: str
     ) -> Element | None:
         """What an element holds, itself or in the file that it names."""
-        stated = element.get("type", kind)
-        if stated != kind:
+        stated = element.get("type", media_type)
+        if stated != media_type:
             self._archive.problem(f"{where}: parameters of type {stated!r} are not supported")
             return None
         source = element.get("source")

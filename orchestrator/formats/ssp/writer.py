@@ -113,8 +113,9 @@ def structure_xml(system: System) -> bytes:
         element = _add_component(elements, component, position, source, system.left_open)
         if component.name in parameter_sources:
             bindings = _add(element, "ssd:ParameterBindings")
-            source, kind = parameter_sources[component.name], "application/x-ssp-parameter-set"
-            _add(bindings, "ssd:ParameterBinding", source=source, type=kind)
+            source = parameter_sources[component.name]
+            media_type = "application/x-ssp-parameter-set"
+            _add(bindings, "ssd:ParameterBinding", source=source, type=media_type)
         if component.name in system.steps:
             hint = str(system.steps[component.name])
             _add(_annotation(element, _LIBCOSIM), "osp:StepSizeHint", value=hint)
@@ -187,8 +188,8 @@ def _add_component(
     source: str,
     left_open: Collection[PortName],
 ) -> Element:
-    kind = "application/x-fmu-sharedlibrary"
-    element = _add(elements, "ssd:Component", name=component.name, source=source, type=kind)
+    media_type = "application/x-fmu-sharedlibrary"
+    element = _add(elements, "ssd:Component", name=component.name, source=source, type=media_type)
     connectors = _add(element, "ssd:Connectors")
     for variable in component.description.modelVariables:
         # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends

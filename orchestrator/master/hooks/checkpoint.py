@@ -3,7 +3,7 @@
 A folder holds two files. All rows so far are in the one that grows. The other is replaced as a
 whole, once the rows are on the disk: it says how many of them count, with their digest, and holds
 the states of the FMUs and whatever else a run knows, with a checksum over all. A process may be
-killed at any time: what it leaves is its last checkpoint. A random identity in both files tells
+killed at any time: what it leaves is its last checkpoint. A random token in both files tells
 them from files of the user's.
 
 Observers have no state there. A run that is resumed tells them all rows again, from the first on,
@@ -39,20 +39,20 @@ _ROWS, _STATE = "rows.bin", "state.json"
 #: A number in the file of rows, and how many rows are read at once.
 _NUMBER, _AT_ONCE = np.dtype("<f8"), 4096
 
-#: The first bytes of that file, before an identity, and how long both are together.
+#: The first bytes of that file, before a token, and how long both are together.
 _TITLE, _BEGIN = b"auv-fmu rows ", 64
 
 
-def begins(path: Path, identity: str) -> bool:
-    """Whether a file of rows bears an identity."""
+def begins(path: Path, token: str) -> bool:
+    """Whether a file of rows bears a token."""
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:
-        return file.read(_BEGIN) == _head(identity)
+        return file.read(_BEGIN) == _head(token)
 
 
-def _head(identity: str) -> bytes:
-    return (_TITLE + identity.encode()).ljust(_BEGIN - 1) + b"\n"
+def _head(token: str) -> bytes:
+    return (_TITLE + token.encode()).ljust(_BEGIN - 1) + b"\n"
 
 
 class RowLog:
@@ -61,14 +61,12 @@ class RowLog:
     Rows that are there after those that count are compared with what comes in their place.
     """
 
-    def __init__(
-        self, path: Path, identity: str, width: int, kept: int = 0, digest: str = ""
-    ) -> None:
+    def __init__(self, path: Path, token: str, width: int, kept: int = 0, digest: str = "") -> None:
         """Make the file, or go on after the first rows of one that is there.
 
         Args:
             path: of the file.
-            identity: that it begins with.
+            token: that it begins with.
             width: numbers in a row.
             kept: how many of its rows count.
             digest: of these.
@@ -81,10 +79,10 @@ class RowLog:
         self._digest, self._after = sha256(), 0
         if not kept:
             self._file = path.open("x+b")
-            self._file.write(_head(identity))
+            self._file.write(_head(token))
             return
         row = width * _NUMBER.itemsize
-        if is_whole := begins(path, identity):
+        if is_whole := begins(path, token):
             for rows in self.kept():
                 self._digest.update(rows.astype(_NUMBER, copy=False).tobytes())
         if not is_whole or self._digest.hexdigest() != digest:
@@ -152,7 +150,7 @@ class _Stored(NamedTuple):
     """What the file that is replaced holds.
 
     Attributes:
-        identity: random, of both files.
+        identity: the token of both files, by the name that files on disks have for it.
         every: for how many seconds a checkpoint was written [s].
         of: the run.
         time, made: how far the run had come [s], and in how many steps; None: no row counts yet.
@@ -220,9 +218,9 @@ class Checkpoints:
 
         """
         check_every(every)
-        self.folder, self._run, self._every = folder, identity, every
+        self.folder, self._identity, self._every = folder, identity, every
         self._found = self._look(resume, force)
-        self._identity = self._found.identity if self._found else token or uuid4().hex
+        self._token = self._found.identity if self._found else token or uuid4().hex
         self._log: Log | None = None
         self.time: float | None = None if self._found is None else self._found.time
 
@@ -243,7 +241,7 @@ class Checkpoints:
                     f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume goes "
                     "on with it; --force moves it aside and starts over"
                 )
-            if different := differences(found.of, self._run):
+            if different := differences(found.of, self._identity):
                 raise InputError(
                     f"{self.folder} is of another run: {', '.join(different)} differ; run that "
                     "one, or let --force move it aside and start over"
@@ -269,7 +267,7 @@ class Checkpoints:
             rows.unlink(missing_ok=True)
         else:
             self._known, digest = found.made + 1, found.rows
-        self._row_log = RowLog(rows, self._identity, width, self._known, digest)
+        self._row_log = RowLog(rows, self._token, width, self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows, except the ones that are told again."""
@@ -302,10 +300,10 @@ class Checkpoints:
     def remove(self) -> None:
         """Remove the files that a finished run no longer needs."""
         found, rows = _read(self.folder), self.folder / _ROWS
-        if found is not None and found.identity == self._identity:
+        if found is not None and found.identity == self._token:
             # While there are rows, there is the proof that they are ours.
             self._store()
-            if begins(rows, self._identity):
+            if begins(rows, self._token):
                 rows.unlink()
             (self.folder / _STATE).unlink()
         self._partial.unlink(missing_ok=True)
@@ -333,10 +331,10 @@ class Checkpoints:
 
     @property
     def _partial(self) -> Path:
-        return self.folder / f".auv-fmu-{self._identity}.json"
+        return self.folder / f".auv-fmu-{self._token}.json"
 
     def _store(self, **more: Any) -> None:
-        content = _Stored(self._identity, self._every, dict(self._run), **more)
+        content = _Stored(self._token, self._every, dict(self._identity), **more)
         write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
 
     def _resume(self, run: Run, found: _Stored) -> None:

@@ -86,7 +86,7 @@ class Ending:
         failure: why it failed, or None.
         remark: why it ended early though it has not failed, or None.
         messages: what the FMUs logged with status warning or worse.
-        signals: to stop that have come meanwhile.
+        interrupts: numbers of the signals to stop that have come meanwhile.
         events: that have happened, in their order.
 
     """
@@ -94,7 +94,7 @@ class Ending:
     failure: str | None = None
     remark: str | None = None
     messages: tuple[str, ...] = ()
-    signals: tuple[int, ...] = ()
+    interrupts: tuple[int, ...] = ()
     events: tuple[Occurrence, ...] = ()
 
 

@@ -62,11 +62,11 @@ def _pure(name: str) -> Any:
     return function
 
 
-def _places(kind: Any, place: str = "value") -> list[str]:
+def _places(numba_type: Any, place: str = "value") -> list[str]:
     """Expressions for all numbers of a nested tuple of some type."""
-    if not isinstance(kind, types.BaseTuple):
+    if not isinstance(numba_type, types.BaseTuple):
         return [place]
-    parts: Any = kind
+    parts: Any = numba_type
     return [one for i, part in enumerate(parts) for one in _places(part, f"{place}[{i}]")]
 
 

@@ -70,7 +70,7 @@ class Done(NamedTuple):
 
 def run(
     setting: Setting,
-    plan: RunSteps,
+    run_steps: RunSteps,
     generator: np.random.Generator,
     ends: np.ndarray,
     accumulators: np.ndarray,
@@ -81,7 +81,7 @@ def run(
 
     Args:
         setting: of the loop.
-        plan: its steps.
+        run_steps: its steps.
         generator: of uniform numbers.
         ends: of the accumulators, as :data:`END` says.
         accumulators: to be filled.
@@ -97,7 +97,7 @@ def run(
     progress[0] = -1
     n, spare = normals(generator, noisy, (False, 0.0))
     moment = closed_loop.begin(setting, law, n)
-    first = closed_loop.act(setting, law, moment, plan.h, plan.parts, plan.delayed)
+    first = closed_loop.act(setting, law, moment, run_steps.h, run_steps.parts, run_steps.delayed)
     driven, _ = plant.begin(setting.plant, first.tau, setting.plant.current)
     done = done_in(first, driven.tau)
     if not (is_sound(moment) and nought(done) == 0.0):
@@ -112,11 +112,11 @@ def run(
         if len(rows):
             fill(rows[k], moment, done)
         progress[0] = k
-        if k == plan.steps:
+        if k == run_steps.steps:
             break
-        h, parts, end = part_of(plan, k)
+        h, parts, end = part_of(run_steps, k)
         n, spare = normals(generator, noisy, spare)
-        instant = closed_loop.act(setting, law, moment, h, parts, plan.delayed)
+        instant = closed_loop.act(setting, law, moment, h, parts, run_steps.delayed)
         begun, before = moment, done.tau
         moment = closed_loop.step(setting, law, instant, h, parts, end, n)
         done = done_in(instant, moment.vehicles.plant.tau)
@@ -131,11 +131,11 @@ def run(
     return moment
 
 
-def part_of(plan: RunSteps, k: int) -> tuple[float, Splits, float]:
+def part_of(run_steps: RunSteps, k: int) -> tuple[float, Splits, float]:
     """Length of step k of a run [s], what it is split into, and when it ends [s]."""
-    if k < plan.full:
-        return plan.h, plan.parts, (k + 1) * plan.h
-    return plan.stop - k * plan.h, plan.last_parts, plan.stop
+    if k < run_steps.full:
+        return run_steps.h, run_steps.parts, (k + 1) * run_steps.h
+    return run_steps.stop - k * run_steps.h, run_steps.last_parts, run_steps.stop
 
 
 def done_in(instant: Instant, tau: Vector3) -> Done:

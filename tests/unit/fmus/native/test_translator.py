@@ -182,13 +182,13 @@ def ports(package: str) -> list[Port]:
 @every
 def test_ports_are_those_of_the_declaration(package: str):
     for row, port in zip(rows(package), ports(package), strict=True):
-        assert (row["name"], row["kind"]) == (port.name, port.kind.upper())
+        assert (row["name"], row["kind"]) == (port.name, port.type.upper())
         assert row["causality"] == port.causality.upper()
         assert row["variability"] == port.variability.upper()
         for bound, none in (("minimum", "-DBL_MAX"), ("maximum", "DBL_MAX")):
             limit = getattr(port, bound)
             assert row[bound] == none if limit is None else float(row[bound]) == limit
-        if port.kind != "String":
+        if port.type != "String":
             assert float(row["start"]) == float(port.start or 0.0)
 
 
@@ -239,7 +239,7 @@ def at(model: Any, member: str) -> Any:
 def test_choices_are_the_texts_and_the_numbers_of_the_equations():
     text = tables("fmus.observer_controller")
     described = [row for row in rows("fmus.observer_controller") if row["kind"] == "STRING"]
-    declared = [port for port in ports("fmus.observer_controller") if port.kind == "String"]
+    declared = [port for port in ports("fmus.observer_controller") if port.type == "String"]
     for row, port in zip(described, declared, strict=True):
         [choices] = re.findall(rf"choice {row['choices']}\[\] = \{{(.*)\}};", text)
         numbers = re.findall(r'\{"(\w+)", (\d+)\}', choices)

@@ -142,7 +142,7 @@ def test_outputs_and_fixed_parameters_cannot_be_set_during_the_run(driver):
     assert driver.outputs() == before
     refusals = 1
     for port in driver.ports:
-        if port.causality == "parameter" and port.variability == "fixed" and port.kind == "Real":
+        if port.causality == "parameter" and port.variability == "fixed" and port.type == "Real":
             driver.set(**{port.name.replace(".", "__"): port.start + 1.0})
             refusals += 1
             assert driver.get(port.name) == port.start
@@ -153,7 +153,7 @@ def test_outputs_and_fixed_parameters_cannot_be_set_during_the_run(driver):
 def test_integers_and_truth_values_can_be_read_as_numbers(driver):
     """There are hosts that read all outputs with fmi2GetReal."""
     for reference, port in enumerate(driver.ports):
-        if port.kind != "String":
+        if port.type != "String":
             [number] = driver.slave.get_real([reference])
             assert type(number) is float
             assert number == driver.get(port.name)
@@ -182,7 +182,7 @@ def set_a_fixed_parameter(slave) -> None:
     reference, port = next(
         (reference, port)
         for reference, port in enumerate(slave.ports)
-        if (port.variability, port.kind) == ("fixed", "Real")
+        if (port.variability, port.type) == ("fixed", "Real")
     )
     slave.set_real([reference], [port.start + 1.0])
 

@@ -34,7 +34,7 @@ def columns():
     }
 
 
-def plan(**figure):
+def entry(**figure):
     [read] = read_figures("mine.toml", {"f": figure}, VARIED, True)
     return read
 
@@ -42,7 +42,7 @@ def plan(**figure):
 def test_bands_are_medians_and_shares():
     runs = columns()
     figure = bands(
-        plan(kind="bands", x="disturbance.A_f", show=["late_error", "lost"]), "", Values(runs)
+        entry(kind="bands", x="disturbance.A_f", show=["late_error", "lost"]), "", Values(runs)
     )
     for axes, middle in zip(figure.axes, (np.median, lambda e: np.mean(~(e <= 1.0))), strict=True):
         for line, scenario in zip(axes.get_lines(), ("fig5", "fig5-pd"), strict=True):
@@ -58,7 +58,7 @@ def test_bands_are_medians_and_shares():
 def test_maps_are_medians_and_grey_where_no_run_has_any():
     runs = columns()
     figure = maps(
-        plan(kind="maps", x="disturbance.A_f", y="disturbance.A_d", show="late_error"),
+        entry(kind="maps", x="disturbance.A_f", y="disturbance.A_d", show="late_error"),
         "", Values(runs, legends=LEGENDS),
     )  # fmt: skip
     proposed, pd, _ = figure.axes
@@ -87,7 +87,7 @@ def test_influence_knows_more_less_and_nothing():
     runs = columns()
     runs["final_error.x"] = -np.exp(runs["disturbance.A_d"] / 10)
     show = ["peak_command.u", "final_error.x", "largest_drift"]
-    figure = influence(plan(kind="influence", x=list(VARIED), show=show), "", Values(runs))
+    figure = influence(entry(kind="influence", x=list(VARIED), show=show), "", Values(runs))
     matrix = np.ma.filled(figure.axes[0].get_images()[0].get_array(), np.nan)
     np.testing.assert_allclose(matrix, [[1, 0], [0, -1], [np.nan, np.nan]], atol=1e-12)
 
@@ -99,10 +99,10 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
         "effort": {"kind": "front", "x": "peak_command.u", "y": "late_error"},
     }
     figures["many"] = figures["error"] | {"by": ["disturbance.A_f", "disturbance.A_d"]}
-    plans = read_figures("mine.toml", figures, VARIED, True)
+    entries = read_figures("mine.toml", figures, VARIED, True)
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()
-        assert list(draw_figures(plans, "A_f and A_d", columns(), folder)) == [
+        assert list(draw_figures(entries, "A_f and A_d", columns(), folder)) == [
             "figure drift left out: no run has largest_drift",
             "figure many left out: by tells 25 parts of the runs apart",
         ]

@@ -31,7 +31,7 @@ def test_what_a_process_has_claimed_is_kept_from_others_until_it_is_killed(tmp_p
 
 
 def marker(folder: str) -> str:
-    return sealed({"folder": folder, "identity": "0" * 32})
+    return sealed({"folder": folder, "token": "0" * 32})
 
 
 def test_folders_that_no_process_has_made_stay(tmp_path: Path, monkeypatch):

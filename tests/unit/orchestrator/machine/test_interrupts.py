@@ -115,4 +115,4 @@ def test_signals_after_the_last_context_change_nothing(number, of_process):
     finally:
         for n, handler in before.items():
             signal.signal(n, handler)
-    assert interrupts.signals == [number]
+    assert interrupts.numbers == [number]

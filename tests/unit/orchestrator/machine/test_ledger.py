@@ -114,7 +114,7 @@ def test_a_forged_ledger_moves_nothing_from_elsewhere(tmp_path: Path, link):
 
 
 def test_no_link_is_written_through(tmp_path: Path):
-    """The identity of a ledger that somebody brings is known to that somebody."""
+    """The token of a ledger that somebody brings is known to that somebody."""
     (tmp_path / "precious").write_text("mine")
     (tmp_path / "r").mkdir()
     content = {"identity": "0" * 32, "files": {}, "moving": {}, "leaving": []}

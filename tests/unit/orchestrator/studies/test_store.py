@@ -35,7 +35,7 @@ class Toys:
     def __len__(self):
         return self.runs
 
-    def point(self, number: int):
+    def chosen(self, number: int):
         return f"scenario {number % 2}", {"toy.x": 0.1 * number, "toy.name": str(number)}
 
 
@@ -79,7 +79,7 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     assert [row["run"] for row in rows] == [0, 1, 2, 3]
     assert [row["failure"] for row in rows] == [None, "stopped at t = 1 s: it would", None, None]
     for number, row in enumerate(rows):
-        assert (row["scenario"], {k: row[k] for k in Toys(4).columns}) == Toys(4).point(number)
+        assert (row["scenario"], {k: row[k] for k in Toys(4).columns}) == Toys(4).chosen(number)
     assert rows[2] | outcome(2).indices == rows[2]
     assert all(rows[1][name] is None for name in index_columns())
     assert rows[0]["time_to_reach"] is None

@@ -194,30 +194,30 @@ def test_unknown_name_and_missing_file_are_one_line():
 VARIED = {"plant.eta0.z": float, "controller.k_d": float, "controller.observer": str}
 
 
-def plans(is_compared=True, **figures):
+def entries(is_compared=True, **figures):
     return read_figures("mine.toml", figures, VARIED, is_compared)
 
 
 def test_names_may_stand_alone_or_in_lists():
     figure = {"kind": "bands", "x": "plant.eta0.z", "show": ["late_error", "lost"]}
     labels = {"plant": {"eta0": {"z": "depth [m]"}}}
-    [plan] = plans(far={**figure, "limits": {"late_error": 1.0}}, labels=labels)
-    assert (plan.name, plan.x, plan.show) == ("far", ["plant.eta0.z"], ["late_error", "lost"])
-    assert plan.limits == {"late_error": 1.0}
-    assert plan.labels == {"plant.eta0.z": "depth [m]"}
+    [entry] = entries(far={**figure, "limits": {"late_error": 1.0}}, labels=labels)
+    assert (entry.name, entry.x, entry.show) == ("far", ["plant.eta0.z"], ["late_error", "lost"])
+    assert entry.limits == {"late_error": 1.0}
+    assert entry.labels == {"plant.eta0.z": "depth [m]"}
 
 
 def test_scenarios_are_told_apart_unless_the_file_says_otherwise():
     front = {"kind": "front", "x": "peak_command", "y": "late_error"}
-    assert plans(f=front)[0].by == ["scenario"]
-    assert plans(f={**front, "by": []})[0].by == []
-    assert plans(is_compared=False, f=front)[0].by == []
+    assert entries(f=front)[0].by == ["scenario"]
+    assert entries(f={**front, "by": []})[0].by == []
+    assert entries(is_compared=False, f=front)[0].by == []
 
 
 def test_a_file_that_says_nothing_has_a_figure_of_all_numbers_that_vary():
-    [plan] = plans()
-    assert plan.kind == "influence"
-    assert plan.x == ["plant.eta0.z", "controller.k_d"]
+    [entry] = entries()
+    assert entry.chart == "influence"
+    assert entry.x == ["plant.eta0.z", "controller.k_d"]
     assert read_figures("mine.toml", {}, {}, False) == ()
 
 
@@ -236,13 +236,13 @@ def test_a_file_that_says_nothing_has_a_figure_of_all_numbers_that_vary():
 )
 def test_mistakes_are_told_in_a_line(figure, complaint):
     with pytest.raises(InputError, match=f"^mine.toml: figures: f: .*{complaint}") as error:
-        plans(f=figure)
+        entries(f=figure)
     assert "\n" not in str(error.value)
 
 
 def test_a_figure_is_named_as_a_file_can_be():
     with pytest.raises(InputError, match="cannot be the name of a file"):
-        plans(**{"../mine": BANDS})
+        entries(**{"../mine": BANDS})
 
 
 #: As the command line and the pages name them.

@@ -122,7 +122,9 @@ def test_what_is_never_reached_is_not_there():
 def test_closed_loop_has_all_of_them():
     _, system = load_scenario("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
-    simulate_plan(make_plan(system, experiment), [observer], loop=choose_loop("auto", experiment))
+    simulate_plan(
+        make_plan(system, experiment), [observer], stepping=choose_loop("auto", experiment)
+    )
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 
