@@ -28,7 +28,7 @@ from pathlib import Path
 import pandas as pd
 from scipy.stats import binomtest, spearmanr
 
-from orchestrator.studies.store import StudyResult
+from orchestrator.studies.study_result import StudyResult
 
 #: Columns that are made of others, by study, in the language of pandas.
 _MADE = {

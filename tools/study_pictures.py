@@ -16,8 +16,8 @@ from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study_file import read_figures, read_study
+from orchestrator.studies.study_result import StudyResult
 from pages import DOCS, PICTURES
 
 #: Pictures are 1,000 pixels wide.

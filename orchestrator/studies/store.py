@@ -13,31 +13,31 @@ import os
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
-from functools import cached_property
 from hashlib import sha256
 from importlib import import_module
-from importlib.util import find_spec
 from itertools import chain, islice, pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.machine.ledger import Ledger, is_changed, locate, move_aside
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.ledger import Ledger, move_aside
 from orchestrator.master.plan import differences
 from orchestrator.runs.folder import open_ledger
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space
+from orchestrator.studies.study_result import (
+    FAILURE,
+    RUN,
+    SCENARIO,
+    STUDY_RECORD,
+    STUDY_TABLE,
+    read_study_record,
+)
 
-if TYPE_CHECKING:
-    import pandas as pd
-
-#: The table of all runs, the record beside it, and what there is until all runs are done.
-STUDY_TABLE, STUDY_RECORD, _DATABASE = "runs.parquet", "study.json", "unfinished.sqlite"
-
-#: Columns of the table before and after what varies and the indices.
-RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
+#: What there is until all runs are done.
+_DATABASE = "unfinished.sqlite"
 
 #: Rows that are written at once.
 _ROWS = 65_536
@@ -242,20 +242,6 @@ def explain_write_errors(folder: Path) -> Iterator[None]:
         ) from error
 
 
-def read_study_record(folder: Path) -> dict[str, Any]:
-    """The record of a study.
-
-    Raises:
-        InputError: there is none.
-
-    """
-    path = folder / STUDY_RECORD
-    try:
-        return dict(json.loads(locate(path).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError, RecursionError) as error:
-        raise InputError(f"{path}: not the record of a study: {reason(error)}") from error
-
-
 def _check_same(ledger: Ledger, record: Mapping[str, Any]) -> None:
     folder = ledger.folder
     ledger.check((STUDY_RECORD, STUDY_TABLE))
@@ -316,93 +302,3 @@ def _batch(
         for column, field in zip(columns, schema, strict=True)
     ]
     return arrow.record_batch(arrays, schema=schema)
-
-
-class StudyResult(Mapping[str, np.ndarray]):
-    """The runs of a study that is done, by column.
-
-    `result["plant.eta0.z"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. What a run does not have is nan; `result["failure"]` is None where a run came to its
-    end.
-
-    Attributes:
-        folder: that holds them.
-
-    """
-
-    def __init__(self, folder: Path) -> None:
-        """Open the table in a folder.
-
-        Raises:
-            InputError: there is none.
-
-        """
-        self.folder = folder
-        for path in (folder / STUDY_TABLE, folder / STUDY_RECORD):
-            if not locate(path).is_file():
-                raise InputError(f"{folder}: holds no finished study: no {path.name}")
-            if is_changed(path):
-                raise InputError(f"{path}: damaged, or changed since the study wrote it")
-
-    @cached_property
-    def _table(self) -> Any:
-        path = self.folder / STUDY_TABLE
-        try:
-            table = import_module("pyarrow.parquet").read_table(locate(path))
-        except (OSError, ValueError) as error:
-            raise InputError(f"{path}: not the table of a study: {reason(error)}") from error
-        if table.num_rows != (n := self.record.get("runs")):
-            raise InputError(f"{path}: holds {table.num_rows} runs of {n}")
-        return table
-
-    @cached_property
-    def record(self) -> dict[str, Any]:
-        """What study.json holds."""
-        return read_study_record(self.folder)
-
-    @property
-    def runs(self) -> int:
-        """How many there are."""
-        return int(self._table.num_rows)
-
-    @property
-    def failed(self) -> int:
-        """How many of them have failed."""
-        return int(self.runs - self._table[FAILURE].null_count)
-
-    def __iter__(self) -> Iterator[str]:
-        """The names of the columns."""
-        return iter(self._table.column_names)
-
-    def __len__(self) -> int:
-        """How many columns there are."""
-        return int(self._table.num_columns)
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"<StudyResult {self.folder.name}: {self.runs} runs, {self.failed} failed>"
-
-    def __getitem__(self, column: str) -> np.ndarray:
-        """The values of one column.
-
-        Raises:
-            KeyError: there is no such column; the text has a suggestion.
-
-        """
-        names = self._table.column_names
-        if column not in names:
-            raise KeyError(f"no column {column!r}{did_you_mean(str(column), names)}")
-        values: np.ndarray = self._table[column].to_numpy()
-        return values
-
-    def to_dataframe(self) -> pd.DataFrame:
-        """All columns as a pandas DataFrame, with the number of the run as its index.
-
-        Raises:
-            ImportError: pandas is not installed.
-
-        """
-        if find_spec("pandas") is None:
-            raise ImportError("to_dataframe needs pandas: pip install pandas")
-        frame: pd.DataFrame = self._table.to_pandas().set_index(RUN)
-        return frame

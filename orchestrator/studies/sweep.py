@@ -30,9 +30,10 @@ from orchestrator.studies.batch_engine import BatchEngine, check_systems
 from orchestrator.studies.blocks import Making, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
+from orchestrator.studies.store import Store, open_store
 from orchestrator.studies.study import BATCH, ENGINES, FMU, Study
 from orchestrator.studies.study_file import read_figures, read_study, study_of
+from orchestrator.studies.study_result import StudyResult, read_study_record
 from orchestrator.system.structure import System
 
 #: Packages whose versions the runs and their table depend on.
