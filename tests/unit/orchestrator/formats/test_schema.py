@@ -90,6 +90,6 @@ def test_entries_stand_as_in_the_file():
     found = entries(Route)
     assert list(found) == ["who", "times", "pace", "back", "legs", "rest"]
     assert found["back"].meaning == "Whether back." and found["back"].default == "no"
-    assert mentions(found["times"].kind, "1 1,000") and mentions(found["pace"].kind, "slow fast")
+    assert mentions(found["times"].type, "1 1,000") and mentions(found["pace"].type, "slow fast")
     # An entry that may be left out may not be nothing: TOML has no word for it.
-    assert not any("None" in one.kind for one in found.values())
+    assert not any("None" in one.type for one in found.values())
