@@ -121,7 +121,7 @@ def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         prog="auv-fmu",
         description="Co-simulate an autonomous underwater vehicle with limited torque and "
         "without velocity sensors, from FMI 2.0 components.",
-        epilog="Exit status: 0; 1 if a simulation failed, with the rows it had kept; 2 for bad "
+        epilog="Exit status: 0 on success; 1 if a simulation failed (its rows are kept); 2 for bad "
         "usage or input; 130 if ended by Ctrl-C.",
     )
     parser.add_argument("--version", action="version", version=__version__)
