@@ -87,10 +87,12 @@ class Growth:
             ComponentFailed: one does.
 
         """
-        run.blocks.hand_over()
-        if self.found:
-            raise ComponentFailed(self.found)
         last = run.experiment.rows - 1
+        # A run that is resumed begins between two looks.
+        if run.made % _LOOK == 0 or run.made == last:
+            run.blocks.hand_over()
+            if self.found:
+                raise ComponentFailed(self.found)
         return min(run.made - run.made % _LOOK + _LOOK, last) if run.made < last else NEVER
 
 

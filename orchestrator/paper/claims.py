@@ -227,7 +227,6 @@ def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
         return Finding(f"|e| does not come to {REACHED:g} m", "none")
     least = [found.least_effort for found in approaches]
     pairs = list(zip(approaches, published, strict=True))
-    pairs = list(zip(approaches, published, strict=True))
     soonest = [found.soonest(effort) for found, effort in pairs]
     took = ", and ".join(
         f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in approaches

@@ -95,9 +95,9 @@ def make_folder(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         yield
     finally:
-        with suppress(OSError):
+        for path in new:
             # Fails where there is something in it.
-            for path in new:
+            with suppress(OSError):
                 path.rmdir()
 
 

@@ -161,9 +161,8 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     plan = make_plan(system, experiment)
     with findings.collecting():
-        events = read_events(
-            scenario.name, scenario.events, replace(system, step=step), input_table
-        )
+        followed = input_table.targets if input_table else ()
+        events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
     stepping = choose_loop(request.loop, experiment, isolation)
@@ -188,11 +187,12 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     companion, system = load_scenario(scenario.compare, request.kind)
     if scenario.digest and companion.digest:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
-    played = prepared.input_table.targets if prepared.input_table else ()
+    inputs = scenario.inputs or companion.inputs
+    followed = set(map(system.named, inputs.content[0])) if inputs else ()
     shared = {
         target: value
         for target, value in {**scenario.parameters, **request.values}.items()
-        if system.has(target) and target not in played
+        if system.has(target) and system.named(target) not in followed
     }
     steps = {
         name: step
@@ -206,8 +206,8 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         step=scenario.step,
         order=scenario.order,
         coupling=scenario.coupling,
-        events=shared_events(own or scenario.events, system),
-        inputs=scenario.inputs or companion.inputs,
+        events=shared_events(own or scenario.events, system, followed),
+        inputs=inputs,
     )
     wanted = replace(request, parameters=shared, steps=steps, events=None, inputs=None)
     return [prepared, prepare(same, system, wanted)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -20,7 +20,6 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, flatten, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
@@ -36,7 +35,7 @@ def read_events(
     where: object,
     tables: Sequence[Mapping[str, Any]],
     system: System,
-    input_table: InputTable | None = None,
+    followed: Collection[PortName] = (),
 ) -> tuple[Event, ...]:
     """The events of a run.
 
@@ -44,21 +43,16 @@ def read_events(
         where: they are written, for messages.
         tables: as :func:`.scenario.check_events` has found them good.
         system: that they happen to.
-        input_table: that some of its inputs follow.
+        followed: its inputs that follow a table.
 
     Raises:
         InputError: an event cannot happen to this system.
 
     """
     findings, events = Findings(), []
-    followed = input_table.targets if input_table else ()
     for number, table in enumerate(tables, start=1):
         try:
-            event = _event(table, system)
-            for port, _ in event.action.inputs if isinstance(event.action, Set) else ():
-                if port in followed:
-                    raise InputError(f"{port} follows a table of inputs: override it")
-            events.append(event)
+            events.append(_event(table, system, followed))
         except InputError as error:
             findings.problem(f"{where}: event {number}: {error}")
     findings.refuse()
@@ -66,13 +60,13 @@ def read_events(
 
 
 def shared_events(
-    tables: Sequence[Mapping[str, Any]], system: System
+    tables: Sequence[Mapping[str, Any]], system: System, followed: Collection[PortName]
 ) -> tuple[Mapping[str, Any], ...]:
-    """The events that can happen to another system as well."""
+    """The events that can happen to another system as well; arguments as of :func:`read_events`."""
 
     def can_happen(table: Mapping[str, Any]) -> bool:
         try:
-            _event(table, system)
+            _event(table, system, followed)
         except InputError:
             return False
         return True
@@ -80,15 +74,19 @@ def shared_events(
     return tuple(filter(can_happen, tables))
 
 
-def _event(table: Mapping[str, Any], system: System) -> Event:
+def _event(table: Mapping[str, Any], system: System, followed: Collection[PortName]) -> Event:
     [key] = [key for key in table if key in ACTIONS]
     start = system.start_time or 0.0
     if table.get("at", start) < start:
         raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
     text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
+    action = ACTIONS[key](table[key], system)
+    for port, _ in action.inputs if isinstance(action, Set) else ():
+        if port in followed:
+            raise InputError(f"{port} follows a table of inputs: override it")
     return Event(
         text,
-        ACTIONS[key](table[key], system),
+        action,
         table.get("label", text),
         table.get("at"),
         _condition(table["when"], system) if "when" in table else None,

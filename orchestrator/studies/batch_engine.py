@@ -25,7 +25,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import digest_of
+from orchestrator.master.plan import code_of, digest_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.studies.batch.kernel import (
     COLUMNS,
@@ -85,8 +85,9 @@ class BatchEngine:
 
     @property
     def digest(self) -> str:
-        """Of the equations, and of what compiles them."""
-        return digest_of({"equations": digest(), "numba": version("numba")})
+        """Of the equations, of what compiles them, and of what makes indices of them."""
+        made_by = code_of("orchestrator.vehicle", "orchestrator.studies")
+        return digest_of({"equations": digest(), "numba": version("numba"), "indices": made_by})
 
     def outcomes(self, points: Iterable[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order."""

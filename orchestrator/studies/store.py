@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.figures.study_values import FAILURE, SCENARIO
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import Ledger, move_aside
 from orchestrator.master.plan import differences
@@ -28,9 +29,7 @@ from orchestrator.runs.folder import open_ledger
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space
 from orchestrator.studies.study_result import (
-    FAILURE,
     RUN,
-    SCENARIO,
     STUDY_RECORD,
     STUDY_TABLE,
     read_study_record,

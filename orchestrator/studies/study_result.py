@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from orchestrator.figures.study_values import FAILURE
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.ledger import is_changed, locate
 
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
 #: The table of all runs, and the record beside it.
 STUDY_TABLE, STUDY_RECORD = "runs.parquet", "study.json"
 
-#: Columns of the table before and after what varies and the indices.
-RUN, SCENARIO, FAILURE = "run", "scenario", "failure"
+#: The first column of the table.
+RUN = "run"
 
 
 def read_study_record(folder: Path) -> dict[str, Any]:

@@ -116,3 +116,13 @@ def test_references_that_differ_are_said(workplace, capsys):
         assert read_scenario(name).compare
         assert main(["run", name, "--stop-time", "1", "--no-figures", "--kind", "native"]) == 0
         assert "its reference" not in capsys.readouterr().err
+
+
+def test_an_event_of_the_scenario_leaves_a_table_of_the_companion_alone(workplace):
+    """Both have the input, but only in the companion does it follow a table."""
+    Path("tide.csv").write_text("time,plant.water.x\n0.0,0.25\n")
+    Path("other.toml").write_text('title = "other"\n[inputs]\nfile = "tide.csv"\n')
+    event = '[[events]]\nat = 0.5\nset = { "plant.water.x" = 0.3 }\n'
+    ours, theirs = runs_of(f'compare = "other.toml"\n{event}')
+    assert set(ours["plant.water.x"]) == {0.0, 0.3}
+    assert set(theirs["plant.water.x"]) == {0.25}

@@ -153,6 +153,17 @@ def test_a_delayed_ring_that_grows_without_bound_ends_the_run(
     assert len(table.rows) == 1 + steps
 
 
+def test_a_resumed_ring_that_grows_ends_at_the_same_step(folder, tmp_path):
+    plan = make_plan(ring(folder, 1.5, 1.0), Experiment(200.0, H, coupling="delay"))
+    kept = Checkpoints(tmp_path, {}, 30.0, resume=False)
+    simulate_plan(plan, [kept], hooks=[kept])
+    again, kept = Table(), Checkpoints(tmp_path, {}, 30.0, resume=True)
+    assert kept.time == 30.0
+    ending = simulate_plan(plan, [again, kept], hooks=[kept])
+    assert "grows without bound" in str(ending.failure)
+    assert len(again.rows) == 513
+
+
 @pytest.mark.parametrize("growth", [0.0, 0.3, -0.3])
 def test_what_grows_as_it_should_is_let_grow(folder, growth):
     """A ramp, and exponentials of time, on a ring that is delayed."""

@@ -39,7 +39,7 @@ _VELOCITY = {
 
 
 def digest() -> str:
-    """Of the text of all that is compiled, of its constants, and of what makes indices of it."""
+    """Of the text of all that is compiled, and of the constants that it takes."""
     return code_of("auv_fmu", "orchestrator.vehicle", __package__)[:16]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from orchestrator.figures import study_figures, study_values
 from orchestrator.figures.study_figures import bands, draw_figures, influence, maps, pareto_front
 from orchestrator.figures.study_values import Values
 from orchestrator.studies.study_file import read_figures
@@ -109,3 +110,7 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
     found = contents(tmp_path / "a")
     assert found.keys() == {"error.png", "error.svg", "effort.png", "effort.svg"}
     assert found == contents(tmp_path / "b")
+
+
+def test_each_chart_is_drawn():
+    assert study_figures._DRAW.keys() == study_values.CHARTS.keys()

@@ -16,7 +16,7 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import LEDGER, RECORD, locate
-from orchestrator.runs.folder import open_ledger, replace_files
+from orchestrator.runs.folder import make_folder, open_ledger, replace_files
 from support.machine import contents, ended, forked, killed_at
 
 
@@ -308,3 +308,16 @@ def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
     with replace_files(tmp_path / "r") as unfinished:
         (unfinished / "fig4.ssp").write_text("exported")
     assert files(tmp_path / "r") == {"a.csv", RECORD, "fig4.ssp"}
+
+
+def test_new_folders_that_stay_empty_go_again(tmp_path):
+    new, below = tmp_path / "new", tmp_path / "new" / "below"
+    with make_folder(below):
+        below.rmdir()
+    assert not new.exists()
+    with pytest.raises(OSError, match="long"), make_folder(below / ("x" * 300)):
+        pass
+    assert not new.exists()
+    with make_folder(below):
+        (new / "kept").touch()
+    assert [*new.iterdir()] == [new / "kept"]

@@ -18,6 +18,7 @@ from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.runs import record
 from orchestrator.runs.record import (
     Stopwatch,
+    check_gives_states,
     checkpoints_of,
     content_of,
     ending_in,
@@ -29,7 +30,9 @@ from orchestrator.runs.record import (
     write_content,
 )
 from orchestrator.system.names import PortName
+from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop
+from support.linear import SINE, linear, system_of
 from support.texts import mentions
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
@@ -163,3 +166,12 @@ def test_checkpoints_go_with_a_whole_run_and_else_are_named(tmp_path, monkeypatc
     assert mentions(line, "2.5 outer") and str(tmp_path) not in line and removed == []
     leave_checkpoints(checkpoints, True, lines.append)
     assert removed == ["outer/inner", "outer"] and len(lines) == 1
+
+
+def test_an_fmu_without_a_state_is_named(tmp_path: Path):
+    def system(can: bool) -> System:
+        return system_of({"sine": linear(tmp_path, can=can)}, {"sine": SINE}, {})
+
+    check_gives_states(system(can=True))
+    with pytest.raises(InputError, match="sine"):
+        check_gives_states(system(can=False))

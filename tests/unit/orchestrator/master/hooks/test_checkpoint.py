@@ -15,7 +15,6 @@ from orchestrator.master.hooks.checkpoint import Checkpoints, RowLog, interval_i
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import make_plan
 from orchestrator.master.simulation import simulate_plan
-from orchestrator.runs.record import check_gives_states
 from orchestrator.system.structure import System
 from support.linear import SINE, Part, linear, system_of
 
@@ -79,12 +78,6 @@ def test_an_interval_is_positive_and_finite(tmp_path: Path, every: float):
     with pytest.raises(InputError, match=f"{every:g} s"):
         Checkpoints(tmp_path, OURS, every, resume=False)
     assert interval_in(tmp_path) is None
-
-
-def test_an_fmu_without_a_state_is_named(tmp_path: Path):
-    check_gives_states(parts(tmp_path))
-    with pytest.raises(InputError, match="sine"):
-        check_gives_states(parts(tmp_path, can=False))
 
 
 ROWS = np.random.default_rng(1).normal(size=(10_000, 3))
