@@ -60,7 +60,7 @@ def read_events(
 
 
 def shared_events(
-    tables: Sequence[Mapping[str, Any]], system: System, followed: Collection[PortName]
+    tables: Sequence[Mapping[str, Any]], system: System, followed: Collection[PortName] = ()
 ) -> tuple[Mapping[str, Any], ...]:
     """The events that can happen to another system as well; arguments as of :func:`read_events`."""
 
