@@ -62,7 +62,7 @@ def test_what_comes_to_an_end_or_is_slow_may_grow(values):
         assert not grows(values(np.arange(5000.0)))
 
 
-def test_growth_is_looked_for_every_512_rows_and_at_the_last_but_one():
+def test_growth_is_looked_for_after_every_512_steps_and_the_last_one():
     growth = Growth([PORT])
     handed: list[int] = []
     run = SimpleNamespace(
@@ -75,7 +75,10 @@ def test_growth_is_looked_for_every_512_rows_and_at_the_last_but_one():
         run.made = growth.act(run)
     assert looks == handed == [0, 512, 1024, 1300]
     growth.found = "b.u grows"
-    run.made = 1
+    # As after a resumption.
+    run.made = 300
+    assert growth.act(run) == 512
+    run.made = 512
     with pytest.raises(ComponentFailed, match=r"b\.u"):
         growth.act(run)
 
