@@ -35,7 +35,7 @@ from orchestrator.studies.batch.kernel import (
     new_accumulators,
     part_of,
 )
-from orchestrator.studies.batch.support import digest, setting_of, unsupported
+from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -86,8 +86,8 @@ class BatchEngine:
     @property
     def digest(self) -> str:
         """Of the equations, of what compiles them, and of what makes indices of them."""
-        made_by = code_of("orchestrator.vehicle", "orchestrator.studies")
-        return digest_of({"equations": digest(), "numba": version("numba"), "indices": made_by})
+        code = code_of("auv_fmu", "orchestrator.vehicle", "orchestrator.studies")
+        return digest_of({"code": code, "numba": version("numba")})
 
     def outcomes(self, points: Iterable[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order."""
