@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import sysconfig
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -10,6 +9,8 @@ from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_void_p
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
+
+import fmpy
 
 from orchestrator.machine import cache as user_cache
 from orchestrator.machine.children import compile_library, find_compiler, find_fast_compiler
@@ -178,7 +179,7 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
                 # Another process was first.
                 return library
             content = compile_library(found, *_FLAGS, str(_SOURCE))
-            name = "stepper" + (".dll" if sys.platform == "win32" else ".so")
+            name = f"stepper{fmpy.sharedLibraryExtension}"
             [place] = user_cache.write_cached(_CATEGORY, _key(), {name: content})
         return _loaded(place)
     except OSError as error:

@@ -168,10 +168,11 @@ def check_place(folder: Path) -> None:
     # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
     # loader, which has PythonFMU's library beside it, does that for it.
     loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
+    within_drive = folder.relative_to(folder.anchor).as_posix()
     if (
         runs_python(folder)
         and not loader
-        and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII))
+        and (odd := re.sub(r"[\w./~-]| ", "", within_drive, flags=re.ASCII))
     ):
         raise InputError(
             f"temporary folder {str(folder)!r}: PythonFMU cannot handle {odd[0]!r} in it; set "
