@@ -21,7 +21,7 @@ from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.values import real
+from orchestrator.system.values import real, type_of
 
 #: A ring is at rest where what arrives at each input differs by no more than this, relatively or
 #: absolutely; what brings it nearer is done until it is within rounding.
@@ -173,7 +173,7 @@ class Ring:
             {
                 self._columns[PortName(component.name, variable.name)]: variable
                 for variable in component.having(causality)
-                if variable.type == "Real"
+                if type_of(variable) == "Real"
             }
             for causality in ("input", "output")
         )
@@ -327,7 +327,7 @@ def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[float, float]) -> 
 def _is_real(system: System, connection: Connection) -> bool:
     """Whether a connection goes from a Real to a Real."""
     return all(
-        system.components[end.component].variables[end.port].type == "Real"
+        type_of(system.components[end.component].variables[end.port]) == "Real"
         for end in (connection.source, connection.target)
     )
 

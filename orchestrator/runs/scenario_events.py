@@ -23,7 +23,7 @@ from orchestrator.master.hooks.events import (
 from orchestrator.system.names import PortName, flatten, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import INTEGERS, finite, is_finite, literal, type_of, typed
+from orchestrator.system.values import TYPES, finite, is_finite, literal, type_of, typed
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -219,11 +219,11 @@ def _value(system: System, port: PortName, route: Connection | None, value: Any)
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
     """What is added to an input where a signal is biased."""
     variable = system.component(port.component).variable(port.port)
-    if type_of(variable) not in ("Real", "Integer"):
-        raise InputError(f"{port} is of type {type_of(variable)}: nothing can be added to it")
-    least, most = INTEGERS
+    of = TYPES[variable.type]
+    if of.family not in ("Real", "Integer") or of.is_wide:
+        raise InputError(f"{port} is of type {variable.type}: nothing can be added to it")
     if not is_finite(value) or (
-        type_of(variable) == "Integer" and (value != int(value) or abs(value) > most - least)
+        of.family == "Integer" and (value != int(value) or abs(value) > of.most - of.least)
     ):
         raise InputError(f"{port}: {value!r} cannot be added to it")
     match route:
