@@ -22,7 +22,6 @@ from orchestrator.master.experiment import (
     Order,
     format_order,
 )
-from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
@@ -30,7 +29,7 @@ from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import BOOLEANS, finite
+from orchestrator.system.values import BOOLEANS, finite, type_of
 
 #: How many names of a list are said where not all are.
 _FIRST = 5
@@ -95,15 +94,14 @@ def verify(
     if order is not None:
         check_order(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
     outputs = {
-        str(PortName(component.name, variable.name)): variable.type
+        str(PortName(component.name, variable.name)): type_of(variable)
         for component in system.components.values()
         for variable in component.having("output")
-        if variable.type in FMI_TYPES
     }
     known = {
-        str(PortName(component.name, variable.name))
+        str(PortName(component.name, variable))
         for component in system.components.values()
-        for variable in component.description.modelVariables
+        for variable in component.variables
     }
     table = read_table(path, outputs, known)
     if not len(table.time) or not table.time[-1] > 0.0:

@@ -13,7 +13,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import listed
 from orchestrator.system.units import BASE_UNITS, Unit, Units, unit_of_port
-from orchestrator.system.values import FMI2_NAMES, items_of, type_of
+from orchestrator.system.values import family_of, items_of, type_of
 
 #: An enumeration's values by the names of its items.
 Items: TypeAlias = Mapping[str, int]
@@ -311,7 +311,7 @@ class Builder:
         causality = connector.get("kind")
         for stated in connector:
             if stated.tag not in _NO_TYPES:
-                of = FMI2_NAMES.get(stated.tag, stated.tag)
+                of = family_of(stated.tag)
                 unit, items = self._definitions.unit(stated), self._definitions.items(stated)
                 return Connector(causality, of, unit, items)
         return Connector(causality)

@@ -191,7 +191,7 @@ def _add_component(
     media_type = "application/x-fmu-sharedlibrary"
     element = _add(elements, "ssd:Component", name=component.name, source=source, type=media_type)
     connectors = _add(element, "ssd:Connectors")
-    for variable in component.description.modelVariables:
+    for variable in component.variables.values():
         # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends
         # at from another's source. Parameter sets reach variables without a connector.
         is_text = variable.causality == "parameter" and variable.type == "String"
@@ -214,7 +214,7 @@ def _add_enumerations(root: Element, system: System) -> None:
     enumerations = {
         variable.declaredType.name: variable.declaredType.items
         for component in system.components.values()
-        for variable in component.description.modelVariables
+        for variable in component.variables.values()
         if type_of(variable) == "Enumeration" and variable.declaredType is not None
     }
     if not enumerations:
