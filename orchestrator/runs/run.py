@@ -390,6 +390,10 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
     patterns = [pattern.strip() for pattern in wanted.split(",") if pattern.strip()]
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
+    for name, component in system.components.items():
+        for variable, why in component.left_alone.items():
+            if f"{name}.{variable}" in patterns:
+                raise InputError(f"--columns: {name}.{variable} {why}")
     if is_companion:
         return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
     return matching(names, patterns)

@@ -23,7 +23,7 @@ from orchestrator.master.hooks.events import (
 from orchestrator.system.names import PortName, flatten, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import TYPES, finite, is_finite, literal, type_of, typed
+from orchestrator.system.values import TYPES, Value, finite, is_finite, literal, type_of, typed
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -196,8 +196,8 @@ def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple
 def _altered(
     values: Mapping[str, Any],
     system: System,
-    arriving: Callable[[System, PortName, Connection | None, Any], float],
-) -> tuple[tuple[PortName, float], ...]:
+    arriving: Callable[[System, PortName, Connection | None, Any], Value],
+) -> tuple[tuple[PortName, Value], ...]:
     """The inputs that some signals reach, with what arrives there of their values."""
     return tuple(
         (route.target if route else port, arriving(system, port, route, one))
@@ -207,13 +207,13 @@ def _altered(
     )
 
 
-def _value(system: System, port: PortName, route: Connection | None, value: Any) -> float:
+def _value(system: System, port: PortName, route: Connection | None, value: Any) -> Value:
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
-    number = float(typed(str(port), variable, _text(value)))
+    found = typed(str(port), variable, _text(value))
     if route is None or route.transformation is None:
-        return number
-    return _arrived(port, route, value, route.transformation(number))
+        return found
+    return _arrived(port, route, value, route.transformation(float(found)))
 
 
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
@@ -254,7 +254,7 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":
-                inputs.append((port, float(typed(str(port), variable, _text(one)))))
+                inputs.append((port, typed(str(port), variable, _text(one))))
             elif variable.variability != "tunable":
                 raise InputError(
                     f"{port} is a {variable.variability} parameter: it cannot change during a run"

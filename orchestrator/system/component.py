@@ -186,6 +186,11 @@ class Component:
         """Why others cannot be connected, set or recorded, by name."""
         return self._variables.left_alone
 
+    @property
+    def remainder(self) -> str:
+        """Which variables are left alone, in words."""
+        return f"leaves {shortened(', '.join(self.left_alone))} alone: not supported"
+
     @cached_property
     def _variables(self) -> Variables:
         return variables_of(self.description)

@@ -38,6 +38,11 @@ class Type(NamedTuple):
         """Whether it has integers that no double is."""
         return self.family == "Integer" and self.most > EXACT
 
+    @property
+    def stands(self) -> bool:
+        """Whether numbers of a row may stand for its values, and are not the values themselves."""
+        return self.c_type is None or self.is_wide
+
 
 def _real(c_type: Any) -> Type:
     most = float(np.finfo(np.dtype(c_type)).max)
@@ -235,14 +240,25 @@ def is_of(variable: ModelVariable, value: object) -> bool:
         # Half of a UTF-16 pair is not text.
         return family == "String" and value.encode(errors="ignore").decode() == value
     if type(value) is int:
-        return family in ("Integer", "Enumeration") and is_integer(value, variable.type)
+        of = TYPES[variable.type]
+        return family in ("Integer", "Enumeration") and of.least <= value <= of.most
     return type(value) is {"Real": float, "Boolean": bool}.get(family)
 
 
-def is_integer(number: float, fmi_type: str = "Integer") -> bool:
-    """Whether a number is one of the integers of a type."""
-    _, _, least, most = TYPES[fmi_type]
-    return least <= number <= most and number == int(number)
+def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
+    """Which numbers of a row a variable of a type can hold, apart from any that are not finite."""
+    of = TYPES[fmi_type]
+    if of.family == "Boolean":
+        # FMI 2.0 has integers for them.
+        of = TYPES["Integer"]
+    if of.c_type in (None, ctypes.c_double):
+        return np.ones(np.shape(numbers), dtype=bool)
+    fit = (of.least <= numbers) & (numbers <= of.most)
+    if of.family != "Real":
+        fit &= numbers == np.trunc(numbers)
+    if of.is_wide:
+        fit |= np.abs(numbers) >= _BEYOND
+    return np.asarray(fit)
 
 
 def unit_of(variable: ModelVariable) -> str | None:
@@ -316,3 +332,34 @@ class StringTable:
         """Take on the texts of another process, with their numbers."""
         self._texts = list(state)
         self._numbers = {text: number for number, text in enumerate(self._texts)}
+
+
+class Standing(NamedTuple):
+    """What the numbers of a column of the row stand for.
+
+    Attributes:
+        fmi_type: of the values.
+        strings: that know them.
+
+    """
+
+    fmi_type: str
+    strings: StringTable
+
+    @property
+    def c_type(self) -> Any:
+        """Of the values; None: they are texts."""
+        return TYPES[self.fmi_type].c_type
+
+    def value(self, number: float) -> str | int:
+        """The text or the integer that a number stands for.
+
+        Raises:
+            ValueError: it stands for none.
+
+        """
+        return self.strings.text(number) if self.c_type is None else self.strings.integer(number)
+
+    def number(self, value: str | int) -> float:
+        """The number that stands for a value."""
+        return self.strings.stand_in(value)

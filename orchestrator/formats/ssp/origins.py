@@ -377,10 +377,8 @@ class Bindings:
                 continue
             if name in found:
                 self._archive.note(f"{where}: {name} appears twice in a parameter set")
-            unit, items = known.unit(value), known.items(value)
-            found[name] = {
-                index: Given(text, unit, items) for index, text in zip(indices, texts, strict=True)
-            }
+            of = known.unit(value), known.items(value)
+            found[name] = {i: Given(text, *of) for i, text in zip(indices, texts, strict=True)}
         return found
 
 

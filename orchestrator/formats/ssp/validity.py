@@ -74,7 +74,12 @@ def _schema(name: str) -> etree.XMLSchema:
 
 
 def _put_into_1_0(document: etree._Element) -> None:
-    """Leave out of a file of SSP 2.0 what 1.0 does not have, or put its like in its place."""
+    """Leave out of a file of SSP 2.0 what 1.0 does not have, or put its like in its place.
+
+    Args:
+        document: its root element; lines stay what they are.
+
+    """
     document.set("version", VERSIONS[0])
     for element in list(document.iter(*(f"{{{namespace}}}*" for namespace in NAMESPACES))):
         name, parent = etree.QName(element), element.getparent()

@@ -281,7 +281,7 @@ def _add_enumerations(root: Element, system: System) -> None:
     enumerations = {
         variable.declaredType.name: variable.declaredType.items
         for component in system.components.values()
-        for variable in component.description.modelVariables
+        for variable in component.variables.values()
         if type_of(variable) == "Enumeration" and variable.declaredType is not None
     }
     if not enumerations:
