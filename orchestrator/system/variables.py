@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from itertools import product
 from math import prod
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -13,7 +14,7 @@ from fmpy.model_description import ModelDescription, ModelVariable
 from orchestrator.system.values import TYPES
 
 #: An array has no more elements than this: each is a column.
-_MOST_ELEMENTS = 1_000_000
+MOST_ELEMENTS = 1_000_000
 
 #: What stands between the start values of an array of texts: no text holds it.
 _BETWEEN = "\0"
@@ -46,7 +47,8 @@ def variables_of(description: ModelDescription) -> Variables:
         elif variable.alias is not None:
             other_names[variable.name] = f"is another name of {variable.alias.name}: use that one"
         elif variable.shape:
-            other_names[variable.name] = f"is an array: name an element, as {_name(variable, 0)}"
+            first = next(element_names(variable.name, variable.shape), "there is none")
+            other_names[variable.name] = f"is an array: name an element, as {first}"
             known |= {element.name: element for element in _elements(variable)}
         else:
             known[variable.name] = variable
@@ -59,18 +61,21 @@ def _reason(variable: ModelVariable) -> str:
         return f"is of type {variable.type}, which is not supported"
     if variable.clocks:
         return "belongs to a Clock, and Clocks are not supported"
-    if prod(variable.shape or ()) > _MOST_ELEMENTS:
-        return f"is an array of more than {_MOST_ELEMENTS:,} elements"
+    if prod(variable.shape or ()) > MOST_ELEMENTS:
+        return f"is an array of more than {MOST_ELEMENTS:,} elements"
     return ""
 
 
-def _name(variable: ModelVariable, place: int) -> str:
-    """The name of an element by FMI's naming convention: indices begin with 1."""
-    indices = []
-    for length in reversed(variable.shape):
-        place, index = divmod(place, length)
-        indices.append(str(index + 1))
-    return f"{variable.name}[{','.join(reversed(indices))}]"
+def element_names(array: str, shape: Sequence[int]) -> Iterator[str]:
+    """The names of an array's elements by FMI's naming convention, in their order.
+
+    Args:
+        array: its name.
+        shape: its lengths, of which indices begin with 1; empty: it is a scalar.
+
+    """
+    for indices in product(*(range(1, length + 1) for length in shape)):
+        yield f"{array}[{','.join(map(str, indices))}]" if indices else array
 
 
 def _elements(variable: ModelVariable) -> Iterator[ModelVariable]:
@@ -79,9 +84,9 @@ def _elements(variable: ModelVariable) -> Iterator[ModelVariable]:
     if len(starts) == 1:
         # It is for all.
         starts *= n
-    for place in range(n):
+    for place, name in enumerate(element_names(variable.name, variable.shape)):
         element = copy(variable)
-        element.name = _name(variable, place)
+        element.name = name
         element.start = starts[place] if place < len(starts) else None
         yield element
 
