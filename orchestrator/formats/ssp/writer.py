@@ -53,7 +53,7 @@ def ssp_bytes(system: System) -> bytes:
     with ZipFile(archive, "w") as content:
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
         for name, source in _parameter_sources(system).items():
-            values = _parameter_set_xml(system, system.components[name])
+            values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
         for fmu, source in _sources(system).items():
             content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
@@ -72,14 +72,15 @@ def _parameter_sources(system: System) -> dict[str, str]:
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 
-def _parameter_set_xml(system: System, component: Component) -> bytes:
-    """The values that a system sets in one component, as an SSV."""
-    root = Element(_tag("ssv:ParameterSet"), name=PARAMETER_SET, version=_version(component))
+def parameter_set_xml(
+    component: Component, values: Mapping[str, Value], name: str = PARAMETER_SET
+) -> bytes:
+    """Values of one component by the names of its variables, as an SSV."""
+    root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")
-    values = system.parameters_of(component.name)
-    for name in dict.fromkeys(array_of(component.variable(name)) for name in values):
-        members = component.arrays.get(name) or [component.variable(name)]
-        element = _add(parameters, "ssv:Parameter", name=name)
+    for port in dict.fromkeys(array_of(component.variable(port)) for port in values):
+        members = component.arrays.get(port) or [component.variable(port)]
+        element = _add(parameters, "ssv:Parameter", name=port)
         texts = [_text(component, member, values) for member in members]
         value = _add(element, f"ssv:{members[0].type}")
         if not members[0].shape or type_of(members[0]) not in ("String", "Enumeration"):
