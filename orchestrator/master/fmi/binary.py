@@ -86,6 +86,7 @@ class Library:
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,
                     unzipDirectory=str(folder),
+                    libraryPath=str(binary_of(component, folder)),
                 )
         except Exception as error:
             raise InputError(
@@ -132,10 +133,15 @@ def check_place(folder: Path) -> None:
 
 
 def binary_of(component: Component, folder: Path) -> Path:
-    """Where the library of an unpacked FMU for this machine is, if it has one."""
+    """Where the library of an unpacked FMU for this machine is, if it has one.
+
+    fmpy knows only the old names of platforms, which FMI 2.0.4 has for x86, and some tools for ARM.
+    """
     identifier = component.description.coSimulation.modelIdentifier
     name = f"{identifier}{fmpy.sharedLibraryExtension}"
-    return Path(folder, "binaries", _platform(component), name)
+    platforms = _platform(component), fmpy.platform_tuple
+    old, named = (Path(folder, "binaries", platform, name) for platform in platforms)
+    return named if named.is_file() else old
 
 
 def _platform(component: Component) -> str:
