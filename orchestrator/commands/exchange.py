@@ -157,9 +157,10 @@ def _hosts(options: argparse.Namespace) -> int:
     _, system = load_scenario(options.scenario, options.kind, options.fmi)
     step = reference.step or DEFAULT_STEP
     system = replace(system, name=reference.name, stop_time=reference.stop_time, step=step)
+    verdicts = compare(system, hosts, options.steps, step, reference=reference, told=say)
     show(f"{'host':15} {'version':32} {'order':42} {'deviation':>9} {'us/step':>8}  worst port")
     agree = True
-    for verdict in compare(system, hosts, options.steps, step, reference=reference, told=say):
+    for verdict in verdicts:
         host = HOSTS[verdict.host]
         order = f"{host.initial}: {host.order}"
         if verdict.failure is not None:

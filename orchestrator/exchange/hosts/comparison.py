@@ -9,7 +9,7 @@ import pickle
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -159,40 +159,44 @@ def compare(
         reference: the same system as our master can run it; None: as it is.
         told: hears what takes its time before a run.
 
+    Raises:
+        InputError: there are no such steps.
+
     """
     ours, start = reference or system, system.start_time or 0.0
+    asked = Experiment(start + steps * step, step, JACOBI, start)
+    names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
 
     @cache
-    def expected(order: str, initial: str) -> tuple[Experiment, dict[str, np.ndarray]]:
+    def expected(order: str, initial: str) -> tuple[Experiment, np.ndarray]:
         way, table = next(ways(ours, read_order(order), initial)), Table()
-        experiment = Experiment(start + steps * step, step, way.order, start, way.coupling)
+        experiment = replace(asked, order=way.order, coupling=way.coupling)
         simulate_to_end(make_plan(ours, experiment), [table], way.exchange)
-        names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
-        return experiment, dict(zip(names, table.group(*names)[1:].T, strict=True))
+        return experiment, table.group(*names)[1:]
 
-    for name in hosts:
+    def verdict(name: str) -> Verdict:
         host = HOSTS[name]
         label = host.label()
         if label is None:
             failure = "not installed: pip install 'auv-fmu[hosts]'"
-            yield Verdict(name, host.package, failure=failure)
-            continue
+            return Verdict(name, host.package, failure=failure)
         try:
             experiment, table = expected(host.order, host.initial)
             rows, seconds, reading = _ran(host, label, system, experiment, told)
         except InputError as error:
-            yield Verdict(name, label, failure=str(error))
-            continue
-        deviations = np.abs(rows - np.column_stack([*table.values()])).max(axis=0)
+            return Verdict(name, label, failure=str(error))
+        deviations = np.abs(rows - table).max(axis=0)
         worst = int(deviations.argmax())
-        yield Verdict(
+        return Verdict(
             name,
             label,
             float(deviations[worst]),
-            [*table][worst],
+            names[worst],
             steps / seconds,
             steps / (seconds + reading),
         )
+
+    return map(verdict, hosts)
 
 
 def _ran(
@@ -204,7 +208,7 @@ def _ran(
         InputError: it does not run.
 
     """
-    fmi = max(component.description.fmiVersion for component in system.components.values())
+    fmi = here.fmi_of(system)
     if fmi[0] not in host.fmi:
         raise InputError(f"does not run FMI {fmi}")
     python = Path(sys.executable)

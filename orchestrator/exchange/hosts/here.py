@@ -13,7 +13,7 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import fmpy
 import numpy as np
@@ -60,6 +60,11 @@ def real_outputs(system: System) -> list[tuple[str, str, int]]:
         for variable in component.having("output")
         if variable.type in _NUMBERS
     ]
+
+
+def fmi_of(system: System) -> str:
+    """The newest version of FMI that FMUs of a system have."""
+    return max(str(one.description.fmiVersion) for one in system.components.values())
 
 
 def check_parameters(system: System, host: str) -> None:
@@ -140,11 +145,27 @@ def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy = importlib.import_module("ecospy")
-    [path] = write_ssp(system, folder)
     names = _names(system, "::")
-    with ecospy.EcosSimulation(step_size=experiment.step, ssp_path=str(path)) as simulation:
-        simulation.init(**({"parameter_set": PARAMETER_SET} if system.parameters else {}))
+    parameter_set = {"parameter_set": PARAMETER_SET} if system.parameters else {}
+    with _ecos_simulation(ecospy, system, experiment, folder) as simulation:
+        simulation.init(**parameter_set)
         return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], experiment)
+
+
+def _ecos_simulation(ecospy: Any, system: System, experiment: Experiment, folder: Path) -> Any:
+    """A simulation of ecos: it reads no SSP 2.0, so with FMI 3.0 its calls say what is in one."""
+    if fmi_of(system) == "2.0":
+        [path] = write_ssp(system, folder)
+        return ecospy.EcosSimulation(experiment.step, ssp_path=str(path))
+    structure = ecospy.EcosSimulationStructure()
+    for name, component in system.components.items():
+        structure.add_model(name, component.fmu)
+    for wire in system.connections:
+        source, target = (f"{end.component}::{end.port}" for end in (wire.source, wire.target))
+        structure.make_real_connection(source, target)
+    values = {f"{name.component}::{name.port}": x for name, x in system.parameters.items()}
+    structure.add_parameter_set(PARAMETER_SET, values)
+    return ecospy.EcosSimulation(experiment.step, structure=structure)
 
 
 def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
