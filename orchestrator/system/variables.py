@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from functools import lru_cache
 from math import prod
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -35,14 +36,18 @@ class Variables(NamedTuple):
     other_names: Mapping[str, str]
 
 
+@lru_cache(maxsize=256)
 def variables_of(description: ModelDescription) -> Variables:
     """The variables of an FMU."""
     known: dict[str, ModelVariable] = {}
     left_alone: dict[str, str] = {}
     other_names: dict[str, str] = {}
+    names = {variable.name for variable in description.modelVariables}
     for variable in description.modelVariables:
         if reason := _reason(variable):
             left_alone[variable.name] = reason
+        elif variable.shape and _name(variable, 0) in names:
+            left_alone[variable.name] = f"has the element {_name(variable, 0)}, as another variable"
         elif variable.alias is not None:
             other_names[variable.name] = f"is another name of {variable.alias.name}: use that one"
         elif variable.shape:
