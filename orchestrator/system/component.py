@@ -103,6 +103,10 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         found = read_description(folder)
     except InputError:
         raise
+    except KeyError as error:
+        raise InputError(
+            f"{fmu}: not a readable FMU: it refers to {error}, but has none"
+        ) from error
     except Exception as error:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
     implementation = found.description.coSimulation

@@ -64,6 +64,8 @@ def _reason(variable: ModelVariable) -> str:
         return f"is of type {variable.type}, which is not supported"
     if variable.clocks:
         return "belongs to a Clock, and Clocks are not supported"
+    if any(length < 1 for length in variable.shape or ()):
+        return "is an array without elements"
     if prod(variable.shape or ()) > _MOST_ELEMENTS:
         return f"is an array of more than {_MOST_ELEMENTS:,} elements"
     return ""
