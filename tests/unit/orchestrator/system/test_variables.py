@@ -26,7 +26,7 @@ _VARIABLES = """
 <Int32 name="of_c" valueReference="8" causality="output" clocks="7"/>
 <Float64 name="y" valueReference="9" causality="output"><Dimension start="2"/>
   <Alias name="z"/></Float64>
-<Float64 name="none" valueReference="10" causality="input" start="1"><Dimension start="0"/></Float64>
+<Int8 name="none" valueReference="10" causality="input" start="1"><Dimension start="0"/></Int8>
 """
 
 
