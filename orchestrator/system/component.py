@@ -104,9 +104,8 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
     except InputError:
         raise
     except KeyError as error:
-        raise InputError(
-            f"{fmu}: not a readable FMU: it refers to {error}, but has none"
-        ) from error
+        why = f"it refers to {error}, which is not there"
+        raise InputError(f"{fmu}: not a readable FMU: {why}") from error
     except Exception as error:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
     implementation = found.description.coSimulation

@@ -128,6 +128,8 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
         assert stated is not None
         gives = stated.get("providesDirectionalDerivatives")
         description.coSimulation.providesDirectionalDerivative = gives in ("true", "1")
+        # A capability of FMI 2.0.
+        description.coSimulation.canInterpolateInputs = False
     elements = {element.get("name"): element for element in root.findall("ModelVariables/*")}
     for variable in description.modelVariables:
         element = elements.get(variable.name)
