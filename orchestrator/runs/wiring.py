@@ -126,7 +126,7 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
     outputs = components[start].variables
     if group in components[to].variables and source_group in outputs:
         return [Connection(PortName(start, source_group), PortName(to, group))]
-    members = [name for name in inputs if name.startswith(f"{group}.")]
+    members = [name for name in inputs if name.startswith((f"{group}.", f"{group}["))]
     if group in inputs and not members:
         raise InputError(
             f"wire {source} -> {target}: {target} is one input, and {start} has no port "
@@ -138,7 +138,8 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
             f'{did_you_mean(group, inputs)}; a scenario removes a wire with "{target}" = false '
             "under [wires]"
         )
-    if source_group in outputs and not any(name.startswith(f"{source_group}.") for name in outputs):
+    group_of = f"{source_group}.", f"{source_group}["
+    if source_group in outputs and not any(name.startswith(group_of) for name in outputs):
         raise InputError(
             f"wire {source} -> {target}: {source} is one port, and {target} a group of inputs; "
             f"wire one of them{did_you_mean(group, members)}"
