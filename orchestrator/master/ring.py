@@ -345,9 +345,8 @@ def _grain(system: System, connection: Connection) -> float:
 
 def _near(held: float, variable: ModelVariable) -> float:
     """A value of an input beside the one that it has."""
-    change = _CHANGE.get(variable.type, _SMALL) * max(
-        abs(held), abs(_number(variable.nominal, 1.0)) or 1.0
-    )
+    share = _CHANGE_OF_FLOAT32 if variable.type == "Float32" else _CHANGE
+    change = share * max(abs(held), abs(_number(variable.nominal, 1.0)) or 1.0)
     return held + (change if held + change <= _number(variable.max, inf) else -change)
 
 

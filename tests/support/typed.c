@@ -54,7 +54,7 @@ static const struct {
     BOTH(float64), BOTH(float32), BOTH(int8), BOTH(uint8), BOTH(int16), BOTH(uint16), BOTH(int32),
     BOTH(uint32), BOTH(int64), BOTH(uint64), BOTH(enumeration), BOTH(boolean), BOTH(string),
 };
-enum { V = 6, W = 7, U = 15, Y = 16 };
+enum { V = 6, W = 7, U = 15 };
 
 fmi3Instance fmi3InstantiateCoSimulation(
     fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
@@ -70,6 +70,12 @@ fmi3Instance fmi3InstantiateCoSimulation(
     it->end_at = it->early_at = HUGE_VAL;
     it->gain[0] = it->gain[1] = it->u_enumeration = 1;
     it->n = N;
+    it->v[2] = 0.5;
+    for (int i = 0; i < ROWS * N; i++)
+        it->m[i / N][i % N] = i + 1;
+    strcpy(it->names[0], "a");
+    strcpy(it->names[1], "b");
+    strcpy(it->u_string, "said");
     return it;
 }
 
@@ -238,7 +244,7 @@ fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference
     for (size_t i = 0; i < n_unknowns; found += places[unknowns[i++]].n) {
         const fmi3Float64 *by = seed;
         for (size_t j = 0; j < n_knowns; by += places[knowns[j++]].n) {
-            if (unknowns[i] == Y && knowns[j] == U)
+            if (knowns[j] >= U && unknowns[i] == knowns[j] + 1)
                 found[0] += by[0];
             if (unknowns[i] == W && knowns[j] == V)
                 for (size_t k = 0; k < ROWS * N; k++)

@@ -51,11 +51,9 @@ from orchestrator.master.fmi.transfer import (
 from orchestrator.system.component import Component
 from orchestrator.system.values import TYPES
 
-#: What only FMUs of FMI 2.0 with some capability need, and some of the others lack.
-_OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
-
-#: What all FMUs of FMI 3.0 for co-simulation need.
-_NEEDED = re.compile(
+#: What FMUs need: of FMI 2.0 all except what goes with a capability, of FMI 3.0 what a run does.
+_NEEDED_IN_2 = re.compile(r"(?!.*(FMUstate|Derivative|Status|CancelStep|DebugLogging)).*")
+_NEEDED_IN_3 = re.compile(
     r"fmi3(InstantiateCoSimulation|FreeInstance|EnterInitializationMode|ExitInitializationMode|"
     r"DoStep|Terminate|Reset|[GS]et((Float|U?Int)\d+|Boolean|String))"
 )
@@ -97,19 +95,17 @@ class _Slave:
     Attributes:
         prefix: of the names of functions.
         platform: what it calls the folder of this machine's libraries.
+        needed: the functions that no FMU may lack.
 
     """
 
     prefix: str
     platform: str
+    needed: re.Pattern[str]
     dll: Any
     component: Any
     instanceName: str
     _functions: Mapping[str, Any]
-
-    def is_optional(self, name: str) -> bool:
-        """Whether an FMU may lack a function."""
-        raise NotImplementedError
 
     def moved(self, fmi_type: str) -> Moved:
         """How values of a type are moved."""
@@ -117,7 +113,7 @@ class _Slave:
 
     def _loadFunctions(self) -> None:
         dll = self.dll
-        self.dll = _Lenient(dll, self.is_optional)
+        self.dll = _Lenient(dll, self.needed)
         super()._loadFunctions()  # type: ignore[misc]
         self.dll = dll
 
@@ -201,6 +197,19 @@ class _Slave:
         arguments = ((fmi2ValueReference * n)(*references), n, values)
         self._call(f"{self.prefix}{name}", self.component, *arguments, *self._counted(len(values)))
 
+    def derivatives(
+        self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], n: int
+    ) -> list[float]:
+        """How n values of some variables change with others."""
+        found: list[float] = self.getDirectionalDerivative(  # type: ignore[attr-defined]
+            unknowns, knowns, seed, *self._counted(n)
+        )
+        return found
+
+    def returned_at(self) -> float | None:
+        """The time at which it has returned from that step, which it had to make in full [s]."""
+        return None
+
     def _counted(self, n: int) -> tuple[int, ...]:
         """The arguments that say how many values there are."""
         return ()
@@ -209,14 +218,14 @@ class _Slave:
 class _Lenient:
     """A library in which optional functions are found that are not there."""
 
-    def __init__(self, dll: Any, is_optional: Callable[[str], bool]) -> None:
-        self._dll, self._is_optional = dll, is_optional
+    def __init__(self, dll: Any, needed: re.Pattern[str]) -> None:
+        self._dll, self._needed = dll, needed
 
     def __getattr__(self, name: str) -> Any:
         try:
             return getattr(self._dll, name)
         except AttributeError:
-            if not self._is_optional(name):
+            if self._needed.fullmatch(name):
                 raise
             return lambda *_: fmi2Error
 
@@ -227,11 +236,7 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
     By the beginning of the class's name fmpy knows the version.
     """
 
-    prefix, platform = "fmi2", fmpy.platform
-
-    def is_optional(self, name: str) -> bool:
-        """Whether an FMU may lack a function."""
-        return any(part in name for part in _OPTIONAL)
+    prefix, platform, needed = "fmi2", fmpy.platform, _NEEDED_IN_2
 
     def moved(self, fmi_type: str) -> Moved:
         """How values of a type are moved."""
@@ -248,13 +253,6 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
         """Set up the experiment, and enter that mode."""
         self.setupExperiment(startTime=start_time)
         self.enterInitializationMode()
-
-    def derivatives(
-        self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], n: int
-    ) -> list[float]:
-        """How n values of some variables change with others."""
-        found: list[float] = self.getDirectionalDerivative(unknowns, knowns, seed)
-        return found
 
     def stepping(self, component: Component) -> tuple[Callable[..., int], Stepped]:
         """Its doStep, and the same for the compiled loop."""
@@ -285,19 +283,11 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
         ended: bool = self.getBooleanStatus(fmi2Terminated)
         return float(self.getRealStatus(fmi2LastSuccessfulTime)) if ended else None
 
-    def returned_at(self) -> float | None:
-        """FMI 2.0 knows no such thing."""
-        return None
-
 
 class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
     """An FMU of FMI 3.0 that may lack functions that co-simulation without events does not need."""
 
-    prefix, platform = "fmi3", fmpy.platform_tuple
-
-    def is_optional(self, name: str) -> bool:
-        """Whether an FMU may lack a function."""
-        return not _NEEDED.fullmatch(name)
+    prefix, platform, needed = "fmi3", fmpy.platform_tuple, _NEEDED_IN_3
 
     def moved(self, fmi_type: str) -> Moved:
         """How values of a type are moved."""
@@ -332,13 +322,6 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
         """Set up the experiment, and enter that mode."""
         self.enterInitializationMode(startTime=start_time)
 
-    def derivatives(
-        self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], n: int
-    ) -> list[float]:
-        """How n values of some variables change with others."""
-        found: list[float] = self.getDirectionalDerivative(unknowns, knowns, seed, n)
-        return found
-
     def stepping(self, component: Component) -> tuple[Callable[..., int], Stepped]:
         """Its doStep, and the same for the compiled loop."""
         self._told = told = CTold()
@@ -366,16 +349,9 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
         return float(told.last) if told.early else None
 
 
-#: The functions of FMUs by their version of FMI.
-SLAVES: Mapping[str, type[FMU2OfOthers | FMU3OfOthers]] = {
-    "2.0": FMU2OfOthers,
-    "3.0": FMU3OfOthers,
-}
-
-
 def slave_class(component: Component) -> type[FMU2OfOthers | FMU3OfOthers]:
     """The functions of a component's version."""
-    return SLAVES[component.description.fmiVersion]
+    return FMU3OfOthers if component.description.fmiMajorVersion == 3 else FMU2OfOthers
 
 
 #: What hears an instance, by the environments that FMUs hand back with every message.
