@@ -6,11 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
 from itertools import product
 from math import prod
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from orchestrator.machine.errors import InputError
 from orchestrator.system.values import TYPES
 
 #: An array has no more elements than this: each is a column.
@@ -136,3 +138,51 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
         if variable.shape and variable.type == "String":
             texts = [start.get("value", "") for start in element.findall("Start")]
             variable.start = _BETWEEN.join(texts) if texts else None
+
+
+#: Matching rules of terminals: those with which all members are connected, and the other one.
+COMPLETE, BUS = ("plug", "sequence"), "bus"
+
+
+class Terminal(NamedTuple):
+    """Variables that are connected as one thing.
+
+    Attributes:
+        rule: which of its members are connected: all of a plug, by their names; of a bus the ones
+            that the other terminal has; all of a sequence, by their places, which are its names.
+        members: names of variables by the names of the members.
+
+    """
+
+    rule: str
+    members: Mapping[str, str]
+
+
+def terminals_of(folder: Path) -> dict[str, Terminal]:
+    """The terminals of an unpacked FMU by their names; one within another has a dotted name.
+
+    Raises:
+        InputError: the file that lists them cannot be read.
+
+    """
+    file = folder / "terminalsAndIcons" / "terminalsAndIcons.xml"
+    if not file.is_file():
+        return {}
+    try:
+        root = ElementTree.parse(file).getroot()
+    except ElementTree.ParseError as error:
+        raise InputError(f"{file.name} is not well-formed XML: {error}") from None
+    return dict(_terminals(root.find("Terminals"), ""))
+
+
+def _terminals(parent: ElementTree.Element | None, outer: str) -> Iterator[tuple[str, Terminal]]:
+    for element in () if parent is None else parent.findall("Terminal"):
+        name, rule = outer + element.get("name", ""), element.get("matchingRule", "")
+        members = [
+            (member.get("memberName", ""), member.get("variableName", ""))
+            for member in element.findall("TerminalMemberVariable")
+        ]
+        if rule == "sequence":
+            members = [(str(place), variable) for place, (_, variable) in enumerate(members)]
+        yield name, Terminal(rule, dict(members))
+        yield from _terminals(element, f"{name}.")

@@ -78,7 +78,7 @@ def _parameter_set_xml(system: System, component: Component) -> bytes:
     parameters = _add(root, "ssv:Parameters")
     values = system.parameters_of(component.name)
     for name in dict.fromkeys(array_of(component.variable(name)) for name in values):
-        members = component.arrays.get(name) or [component.variable(name)]
+        members = component.elements(name)
         element = _add(parameters, "ssv:Parameter", name=name)
         texts = [_text(component, member, values) for member in members]
         value = _add(element, f"ssv:{members[0].type}")
@@ -171,7 +171,7 @@ def _whole(
     source, target = starts.variable(start.port), ends.variable(end.port)
     if not source.shape or source.shape != target.shape:
         return set()
-    members = zip(starts.arrays[array_of(source)], ends.arrays[array_of(target)], strict=True)
+    members = zip(starts.elements(array_of(source)), ends.elements(array_of(target)), strict=True)
     found = {
         replace(
             connection,
