@@ -170,6 +170,8 @@ def _joined(
     for one, other in ((end, begin), (begin, end)):
         if one.rule not in (*COMPLETE, BUS):
             raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
+        if one.flows:
+            raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
         missing = [member for member in one.members if member not in other.members]
         if one.rule in COMPLETE and missing:
             raise InputError(f"a terminal lacks the member {listed(missing)}")

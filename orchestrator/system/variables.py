@@ -140,6 +140,8 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
             variable.start = _BETWEEN.join(texts) if texts else None
 
 
+_MEMBER = "TerminalMemberVariable"
+
 #: Matching rules of terminals: those with which all members are connected, and the other one.
 COMPLETE, BUS = ("plug", "sequence"), "bus"
 
@@ -151,11 +153,13 @@ class Terminal(NamedTuple):
         rule: which of its members are connected: all of a plug, by their names; of a bus the ones
             that the other terminal has; all of a sequence, by their places, which are its names.
         members: names of variables by the names of the members.
+        flows: members that are no signals: sums and signs count as well where these are joined.
 
     """
 
     rule: str
     members: Mapping[str, str]
+    flows: Sequence[str]
 
 
 def terminals_of(folder: Path) -> dict[str, Terminal]:
@@ -180,9 +184,15 @@ def _terminals(parent: ElementTree.Element | None, outer: str) -> Iterator[tuple
         name, rule = outer + element.get("name", ""), element.get("matchingRule", "")
         members = [
             (member.get("memberName", ""), member.get("variableName", ""))
-            for member in element.findall("TerminalMemberVariable")
+            for member in element.findall(_MEMBER)
         ]
         if rule == "sequence":
             members = [(str(place), variable) for place, (_, variable) in enumerate(members)]
-        yield name, Terminal(rule, dict(members))
+        flows = [
+            member.get("variableName") or member.get("inStreamVariableName", "")
+            for member in element
+            if member.tag == "TerminalStreamMemberVariable"
+            or (member.tag == _MEMBER and member.get("variableKind") != "signal")
+        ]
+        yield name, Terminal(rule, dict(members), flows)
         yield from _terminals(element, f"{name}.")

@@ -90,6 +90,7 @@ def test_a_bus_takes_what_both_have_and_a_sequence_goes_by_places(tmp_path: Path
         (_terminal("s", "plug", p="b_q", q="b_q", r="b_r"), "b.s a.t p 1 2"),
         (_terminal("s", "plug", p="b_r", q="b_q", r="b_r"), "a.a_p b.b_r output"),
         (_terminal("s", "plug", p="b_z", q="b_q", r="b_r"), "b b_z"),
+        (_PLUG["b"].replace('"signal"', '"inflow"', 1), "b.s a.t b_r signals"),
         ("<Terminal", "b terminalsAndIcons.xml XML"),
     ],
 )
