@@ -189,7 +189,7 @@ def _terminals(parent: ElementTree.Element | None, outer: str) -> Iterator[tuple
         if rule == "sequence":
             members = [(str(place), variable) for place, (_, variable) in enumerate(members)]
         flows = [
-            member.get("variableName") or member.get("inStreamVariableName", "")
+            member.get("variableName") or member.get("inStreamVariableName") or ""
             for member in element
             if member.tag == "TerminalStreamMemberVariable"
             or (member.tag == _MEMBER and member.get("variableKind") != "signal")
