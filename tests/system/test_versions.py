@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,8 +26,11 @@ from orchestrator.system.units import Linear
 from support import others, typed
 from support.others import WAYS
 from support.runs import run_table
+from support.runs import system_of as closed_loop_of
+from support.settings import NAMES
 from support.small_fmus import connected
 from support.texts import mentions
+from support.tiers import slow
 
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
@@ -149,6 +153,20 @@ def test_it_ends_the_run_at_its_last_successful_time(fmu, way):
 def test_a_step_that_it_does_not_make_is_a_failure(fmu, way, values, words):
     table = run(typed.system_of(fmu, parameters=values), **way)
     assert mentions(table.failure, words)
+
+
+@EVERY_WAY
+@pytest.mark.parametrize("old", [(), ("AuvPlant", "MotionPlanner"), *slow(("ObserverController",))])
+def test_our_loop_has_the_same_rows_in_both_versions(native, dist3, tmp_path, way, old):
+    for name in NAMES:
+        shutil.copy((native if name in old else dist3) / f"{name}.fmu", tmp_path)
+    ours, theirs = (
+        run_table(closed_loop_of(folder, "fig4"), Experiment(4.0, 0.02), **how)
+        for folder, how in ((native, {}), (tmp_path, way))
+    )
+    assert theirs.failure is None and len(theirs) == 201
+    assert theirs.columns == ours.columns and theirs.header.parameters == ours.header.parameters
+    assert theirs.rows.tobytes() == ours.rows.tobytes()
 
 
 def feeding(tmp_path: Path, fmu: Path, source: str, target: str) -> System:
