@@ -148,7 +148,7 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
     if component.left_alone:
-        yield f"a run {component.remainder}"
+        yield component.remainder
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text

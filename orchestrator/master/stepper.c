@@ -169,7 +169,7 @@ static const double EXACT = 9007199254740992.0;
 #define SET_WIDE(kind, type, least)                                                              \
     SET(kind, type, value >= least && value < EXACT && value == (double)(type)value, it->python())
 
-static int set(const move *it, void *component) {
+static int set_converted(const move *it, void *component) {
     size_t i;
     switch (it->kind) {
         case IN_PLACE: break;
@@ -201,7 +201,7 @@ static int set(const move *it, void *component) {
         }                                                                                        \
         break;
 
-static int get(const move *it, void *component) {
+static int get_converted(const move *it, void *component) {
     size_t i;
     const int status = it->kind == BY_PYTHON ? it->python() : call(it, component);
     switch (it->kind) {
@@ -218,6 +218,15 @@ static int get(const move *it, void *component) {
         GET_WIDE(OF_UINT64, uint64_t)
     }
     return status;
+}
+
+/* What most values are costs no look at the others. */
+static int set(const move *it, void *component) {
+    return it->kind == IN_PLACE ? call(it, component) : set_converted(it, component);
+}
+
+static int get(const move *it, void *component) {
+    return it->kind == IN_PLACE ? call(it, component) : get_converted(it, component);
 }
 
 /* Whether a status is worse than a warning, or none of FMI's. */

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from functools import lru_cache
 from itertools import product
 from math import prod
 from pathlib import Path
@@ -38,18 +39,23 @@ class Variables(NamedTuple):
     other_names: Mapping[str, str]
 
 
+@lru_cache(maxsize=256)
 def variables_of(description: ModelDescription) -> Variables:
     """The variables of an FMU."""
     known: dict[str, ModelVariable] = {}
     left_alone: dict[str, str] = {}
     other_names: dict[str, str] = {}
+    names = {variable.name for variable in description.modelVariables}
     for variable in description.modelVariables:
         if reason := _reason(variable):
             left_alone[variable.name] = reason
+            continue
+        first = next(element_names(variable.name, variable.shape or ()))
+        if variable.shape and first in names:
+            left_alone[variable.name] = f"has the element {first}, as another variable"
         elif variable.alias is not None:
             other_names[variable.name] = f"is another name of {variable.alias.name}: use that one"
         elif variable.shape:
-            first = next(element_names(variable.name, variable.shape), "there is none")
             other_names[variable.name] = f"is an array: name an element, as {first}"
             known |= {element.name: element for element in _elements(variable)}
         else:
@@ -63,6 +69,8 @@ def _reason(variable: ModelVariable) -> str:
         return f"is of type {variable.type}, which is not supported"
     if variable.clocks:
         return "belongs to a Clock, and Clocks are not supported"
+    if any(length < 1 for length in variable.shape or ()):
+        return "is an array without elements"
     if prod(variable.shape or ()) > MOST_ELEMENTS:
         return f"is an array of more than {MOST_ELEMENTS:,} elements"
     return ""
@@ -128,6 +136,8 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
         assert stated is not None
         gives = stated.get("providesDirectionalDerivatives")
         description.coSimulation.providesDirectionalDerivative = gives in ("true", "1")
+        # A capability of FMI 2.0.
+        description.coSimulation.canInterpolateInputs = False
     elements = {element.get("name"): element for element in root.findall("ModelVariables/*")}
     for variable in description.modelVariables:
         element = elements.get(variable.name)

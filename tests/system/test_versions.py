@@ -260,14 +260,17 @@ def test_events_set_one_element_and_keep_the_others(fmu, way):
     tables = [
         {"at": 0.5, "set": {"a.gain[2]": 10.0}},
         {"at": 1.0, "override": {"a.u_Int64": 2**62 + 1}, "for": 0.5},
+        {"at": 1.75, "reset": ["a"]},
         {"when": f"a.counter >= {2**53 + 12}", "set": {"a.v[3]": 0.0}},
     ]
-    system = typed.system_of(fmu, parameters={"a.counts_from": 2**53, "a.gain[1]": 4.0})
+    values = {"a.counts_from": 2**53, "a.gain[1]": 4.0, "b.u_Float64": 1.0}
+    system = typed.system_of(fmu, "ab", parameters=values)
     events = read_events("here", tables, system)
     table = run(system, hooks=[Events(events)], **way)
     # w = gain (M v), v = (0, 0, 0.5), until v is zero.
     assert table["a.w[1]"].tolist() == [6.0] * 13 + [0.0] * 4
     assert table["a.w[2]"].tolist() == [3.0] * 5 + [30.0] * 8 + [0.0] * 4
+    assert table["a.counter"].tolist() == [2**53 + k for k in (*range(15), 1, 2)]
     large = [k in range(9, 13) for k in range(17)]
     assert table["a.y_Int64"].tolist() == [(2**62 + 1) * is_large for is_large in large]
 
