@@ -32,6 +32,7 @@ _REASONS = {
     "without a file that it names": r"holds no '",
     "without any FMU": r"holds no component",
     "with a library that does not load or instantiate here": r"cannot be (loaded|instantiated)",
+    "with sources that do not compile here": r"cannot be compiled|holds no sources",
     "not valid": "",
 }
 
