@@ -152,6 +152,11 @@ def surprises(component: Component) -> Iterator[str]:
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text
+    try:
+        if terminals := component.terminals:
+            yield f"has the terminals {', '.join(terminals)}, which wires may connect"
+    except InputError as error:
+        yield str(error).removeprefix(f"{component.name}: ")
     if component.having("input") and all(
         unknown.dependencies is None for unknown in component.description.outputs
     ):

@@ -17,7 +17,13 @@ from fmpy.model_description import ModelDescription, ModelVariable, ValidationEr
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
 from orchestrator.machine.user_files import unpack, unpacked_folder
 from orchestrator.system.values import Value, finite, integer, real, type_of, typed
-from orchestrator.system.variables import array_of, complete, variables_of
+from orchestrator.system.variables import (
+    Terminal,
+    array_of,
+    complete,
+    terminals_of,
+    variables_of,
+)
 
 _CAUSALITIES = {
     "structuralParameter", "parameter", "calculatedParameter", "input", "output", "local",
@@ -203,6 +209,19 @@ class Component:
                 found.setdefault(array_of(variable), []).append(variable)
         return found
 
+    @cached_property
+    def terminals(self) -> dict[str, Terminal]:
+        """Its terminals by their names.
+
+        Raises:
+            InputError: the file that lists them cannot be read.
+
+        """
+        try:
+            return terminals_of(self.folder)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None
+
     @property
     def is_once_per_process(self) -> bool:
         """Whether a process may hold one instance of the FMU only."""
@@ -244,6 +263,15 @@ class Component:
             hint = did_you_mean(name, self.variables)
             raise InputError(f"{self.name} has no port or parameter {name!r}{hint}")
         return self.variables[name]
+
+    def elements(self, name: str) -> list[ModelVariable]:
+        """The elements of an array, or a scalar variable.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        return self.arrays.get(name) or [self.variable(name)]
 
     def having(self, causality: str) -> list[ModelVariable]:
         """The variables of one causality, in the order of the description."""
