@@ -86,8 +86,7 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
         InputError: they do not agree, or there is nothing to compare.
 
     """
-    outputs = [v.name for v in component.having("output") if v.name in expected.columns]
-    if not outputs:
+    if not expected.columns:
         raise InputError("none of the columns of its results is an output")
     times, ours = expected.times, table.time
     slack = ROUNDING * max(1.0, float(np.abs(ours).max()))
@@ -102,8 +101,8 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
     # Apart from rounding, most times are a row's.
     exact = np.where(np.abs(ours[rows] - times) <= slack, ours[rows], times)
     worst, first = 0.0, None
-    for name in outputs:
-        wanted, found = expected.columns[name][chosen], table[f"{component.name}.{name}"]
+    for name, column in expected.columns.items():
+        wanted, found = column[chosen], table[f"{component.name}.{name}"]
         if type_of(component.variables[name]) == "Real":
             found = np.interp(exact, ours, found)
             deviations = np.abs(found - wanted) / max(1.0, float(np.abs(wanted).max()))
@@ -120,10 +119,11 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
             f"to {tolerance:g}"
         )
     left = int((new & ~chosen).sum())
+    outputs = f"{len(expected.columns)} of {len(component.having('output'))} outputs"
+    others = f", {left} rows are of other times" * bool(left)
     return (
-        f"{len(outputs)} outputs agree in {len(times)} rows from t = {times[0]:g} to "
-        f"{times[-1]:g} s{f', {left} rows are of other times' * bool(left)}; they differ by at "
-        f"most {worst:.2g}, with a tolerance of {tolerance:g}"
+        f"{outputs} agree in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
+        f"they differ by at most {worst:.2g}, with a tolerance of {tolerance:g}"
     )
 
 
