@@ -56,7 +56,7 @@ _TYPES = {
 _ANNOTATIONS = "Annotations"
 
 
-class Verdict(NamedTuple):
+class Judgement(NamedTuple):
     """What came of an experiment.
 
     Attributes:
@@ -137,7 +137,7 @@ class Carried:
                 raise ValueError(f"its root element is <{element.tag}>, not <{root}>")
             return element
 
-    def verdicts(self, tolerance: float | None = None) -> Iterator[Verdict]:
+    def judgements(self, tolerance: float | None = None) -> Iterator[Judgement]:
         """Make the experiments one by one, and compare their results.
 
         Args:
@@ -162,31 +162,31 @@ class Carried:
                 if not experiments:
                     raise InputError("holds no experiment")
             except InputError as error:
-                yield Verdict(source, self._said(str(error)), False)
+                yield Judgement(source, self._said(str(error)), False)
                 continue
             for number, element in enumerate(experiments, start=1):
                 name = element.get("name") or f"{source}, experiment {number}"
                 # Drafts differ in what addresses are relative to.
-                yield self._verdict(_Trial(name, element, (path.parent, self._place)), tolerance)
+                yield self._judged(_Trial(name, element, (path.parent, self._place)), tolerance)
         if found:
             return
         for source in results:
             # Then the only experiment that there is is the one in the FMU's description.
             element = Element("Experiment")
             element.append(Element(_REFERENCES, source=source))
-            yield self._verdict(_Trial(source, element, [self._place]), tolerance)
+            yield self._judged(_Trial(source, element, [self._place]), tolerance)
 
-    def _verdict(self, trial: _Trial, tolerance: float | None) -> Verdict:
+    def _judged(self, trial: _Trial, tolerance: float | None) -> Judgement:
         """Make an experiment, if there are results to compare with."""
         if trial.element.find(_REFERENCES) is None:
-            return Verdict(trial.name, "not made: it names no results to compare with", None)
+            return Judgement(trial.name, "not made: it names no results to compare with", None)
         findings = Findings()
         try:
             text = self._compared(trial, tolerance, findings)
             agrees = True
         except InputError as error:
             text, agrees = self._said(str(error)), False
-        return Verdict(trial.name, text, agrees, [*map(self._said, findings.notes)])
+        return Judgement(trial.name, text, agrees, [*map(self._said, findings.notes)])
 
     def _said(self, text: str) -> str:
         """A message without the folders in which the FMU is for now."""
