@@ -261,7 +261,7 @@ class Carried:
         if path is None:
             return None
         variables = self._component.having("input" if part == _STIMULI else "output")
-        return read_series(path, {variable.name: variable for variable in variables})
+        return read_series(path, variables)
 
     def _named(self, trial: _Trial, part: str) -> Path | None:
         """A file that an experiment names; None: it names none.

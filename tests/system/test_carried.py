@@ -13,7 +13,7 @@ import pytest
 
 from fmus.discovery import components
 from orchestrator.commands.main import main
-from support import others
+from support import others, typed
 from support.linear import linear
 from support.texts import mentions, numbers_in, tells
 
@@ -210,6 +210,27 @@ def test_other_types_are_equal_or_not(tmp_path: Path, value: str, column: str, w
     assert main(["verify", carrying(fmu, {**files, "tests/out.csv": result()})]) == 2
 
 
+@pytest.mark.parametrize(("array", "integer"), [("1.5 3.1", 3), ("1.5 3", 2), ("1.5", 3)])
+def test_arrays_and_integers_of_fmi_3(tmp_path: Path, array: str, integer: int):
+    """M v = w, with M = (1 2 3, 4 5 6) and v = (0, 0, 1/2); 2^53 + 3 is no double."""
+
+    def files(array: str, integer: int) -> dict[str, str | None]:
+        held = 2**53 + integer
+        value = f'name="u_Int64"><ssv:Integer value="{2**53 + 3}"/>'
+        start = PARAMETERS[: PARAMETERS.index('name="A00"')]
+        rows = "".join(f"{time},{array},{held}\n" for time in (0, 0.1))
+        return {
+            **FILES,
+            "lag.ssv": f"{start}{value}</ssv:Parameter></ssv:Parameters></ssv:ParameterSet>",
+            "tests/in.csv": "time,u_Float64\n0,0\n",
+            "tests/out.csv": f"time,w,y_Int64\n{rows}",
+        }
+
+    fmu = typed.build(tmp_path)
+    assert main(["verify", carrying(fmu, files("1.5 3", 3))]) == 0
+    assert main(["verify", carrying(fmu, files(array, integer))]) == 2
+
+
 def changed(file: str, old: str, new: str) -> dict[str, str]:
     text = FILES[file]
     assert old in text
@@ -287,7 +308,7 @@ def test_option_of_tables_is_refused(tmp_path: Path, refused, option: str):
     assert option.partition("=")[0] in refused("verify", fmu, option)
 
 
-@pytest.mark.parametrize("kind", ["dist", "native"])
+@pytest.mark.parametrize("kind", ["dist", "native", "dist3"])
 @pytest.mark.parametrize("name", components())
 def test_our_fmus_prove_themselves(request: pytest.FixtureRequest, kind: str, name: str, capsys):
     fmu = request.getfixturevalue(kind) / f"{name}.fmu"
