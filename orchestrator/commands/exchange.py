@@ -214,11 +214,11 @@ def _verify_carried(options: argparse.Namespace) -> int:
     for note in carried.notes:
         say(f"warning: {note}")
     judged = []
-    for verdict in carried.verdicts(options.tolerance):
-        show(f"{verdict.name}: {verdict.text}")
-        for note in verdict.notes:
-            say(f"warning: {verdict.name}: {note}")
-        judged += [] if verdict.agrees is None else [verdict.agrees]
+    for judgement in carried.judgements(options.tolerance):
+        show(f"{judgement.name}: {judgement.text}")
+        for note in judgement.notes:
+            say(f"warning: {judgement.name}: {note}")
+        judged += [] if judgement.agrees is None else [judgement.agrees]
     if not judged:
         raise InputError(f"{options.table}: carries no results to verify it with")
     counted = f"{sum(judged)} of {len(judged)} experiments with results agree"
