@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -73,9 +75,14 @@ def sources(package: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
 
 
 def fmu_entries(
-    component: str, package: str, fmi: str, platforms: Sequence[Platform], compiler: Compiler
+    component: str,
+    package: str,
+    fmi: str,
+    platforms: Sequence[Platform],
+    compiler: Compiler,
+    tell: Callable[[str], None],
 ) -> dict[str, bytes]:
-    """The contents of an FMU.
+    """The contents of an FMU, whose libraries are compiled side by side.
 
     Its GUID follows from its description and its sources, and is the same for all platforms.
 
@@ -85,6 +92,7 @@ def fmu_entries(
         fmi: version.
         platforms: that it has libraries for.
         compiler: that makes them.
+        tell: called with a line when a library is made.
 
     Raises:
         OSError: the compiler fails.
@@ -98,28 +106,32 @@ def fmu_entries(
 
     guid = guid_of(digest_of({**written, "modelDescription.xml": described("")}))
     written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        made = pool.map(
+            lambda platform: library(compiler, platform, component, written, MAIN[fmi]), platforms
+        )
+        libraries = {}
+        for platform, content in zip(platforms, made):
+            libraries[f"binaries/{platform.name}/{component}{platform.ending}"] = content
+            tell(f"{component} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": described(guid),
         **_pictures(component, declared.PORTS, fmi),
         "documentation/index.html": documentation.component_html(component, NATIVE, fmi).encode(),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
-        **{
-            f"binaries/{platform.name}/{component}{platform.ending}": library(
-                compiler, platform, component, written, MAIN[fmi]
-            )
-            for platform in platforms
-        },
+        **libraries,
     }
 
 
 @dataclass(frozen=True)
 class NativeKind:
-    """The native kind, for some platforms."""
+    """The native kind, for some platforms; a line tells of each library that is made."""
 
     fmi: str
     platforms: Sequence[Platform]
     compiler: Compiler
+    tell: Callable[[str], None]
     name = NATIVE
 
     @property
@@ -139,5 +151,7 @@ class NativeKind:
             OSError: the compiler fails, or the file cannot be written.
 
         """
-        entries = fmu_entries(component, package, self.fmi, self.platforms, self.compiler)
+        entries = fmu_entries(
+            component, package, self.fmi, self.platforms, self.compiler, self.tell
+        )
         write_archive(path, entries)

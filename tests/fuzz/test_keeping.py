@@ -160,7 +160,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def quick(here: Path) -> Iterator[None]:
     """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
 
-    def copied(module: str, folder: Path, *options: str) -> list[Path]:
+    def copied(module: str, folder: Path, *options: str, **_: object) -> list[Path]:
         source = current_fmus() if module == "build" else here / "own"
         found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
         return [Path(shutil.copy(path, folder)) for path in found]
