@@ -14,6 +14,9 @@ from pathlib import Path
 from fmus.kinds import CONTAINED
 from fmus.ports.port import Port
 
+#: The folder of a component that holds its reference results.
+REFERENCE = "reference"
+
 #: The oldest time a zip archive can hold: the time of a build is not part of its result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 

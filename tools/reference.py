@@ -1,10 +1,11 @@
 """Reference results, with which a user checks an import into another tool.
 
 For each FMU, in the manner of the FMI cross-check: `NAME_in.csv` with inputs over time,
-`NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment. For the system: `auv_ref.csv`
-and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
+`NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment, in the folder `reference` of
+its component. For the system: `reference/auv_ref.csv` and `auv_ref.opt`, from a Jacobi run, which
+is what most tools do.
 
-`python tools/reference.py [FOLDER]` writes them anew, into `reference` or FOLDER.
+`python tools/reference.py [FOLDER]` writes them anew, into this repository or FOLDER.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ import fmpy
 import numpy as np
 from fmpy.util import write_csv
 
+from fmus.discovery import REFERENCE, components
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.plan import make_plan
@@ -53,28 +55,32 @@ def reference_outputs(component: Component, inputs: np.ndarray) -> np.ndarray:
     return table
 
 
-def write_reference(dist: Path, folder: Path) -> list[Path]:
+def write_reference(dist: Path, root: Path) -> list[Path]:
     """Write the reference results of the closed loop and of each FMU of the bundle.
 
     Args:
         dist: folder with the built bundle.
-        folder: to write into.
+        root: of the repository that they are for.
 
     Returns:
         The files written.
 
     """
-    fmus = sorted(dist.glob("*.fmu"))
-    written = [path for fmu in fmus for path in write_component_reference(fmu, folder)]
-    written.append(folder / "auv_ref.csv")
+    written = []
+    for name, package in components().items():
+        folder = root.joinpath(*package.split("."), REFERENCE)
+        written += write_component_reference(dist / f"{name}.fmu", folder)
+    written.append(root / REFERENCE / "auv_ref.csv")
+    written[-1].parent.mkdir(exist_ok=True)
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
     simulate_to_end(make_plan(closed_loop(dist), jacobi), [CsvFile(written[-1])])
-    written.append(_write_options(folder / "auv"))
+    written.append(_write_options(written[-1].with_name("auv")))
     return written
 
 
 def write_component_reference(fmu: Path, folder: Path) -> list[Path]:
     """Write the reference results of one FMU, and return the files written."""
+    folder.mkdir(parents=True, exist_ok=True)
     component = read_component(fmu.stem, fmu)
     inputs = reference_inputs(component)
     written = []
@@ -98,10 +104,8 @@ def _write_options(stem: Path) -> Path:
 def main() -> None:
     """Write the reference results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("reference"))
-    folder: Path = parser.parse_args().folder
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in write_reference(current_fmus(), folder):
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parents[1])
+    for path in write_reference(current_fmus(), parser.parse_args().folder):
         print(path)
 
 
