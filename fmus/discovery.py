@@ -7,7 +7,7 @@ import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from importlib.metadata import distribution, version
+from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -55,18 +55,20 @@ def licences(kind: str) -> str:
 
 
 def fingerprint(kind: str) -> str:
-    """Hash of everything installed that FMUs of a kind depend on, except a C compiler."""
+    """Hash of everything installed that FMUs of a kind are made of, the same on all machines.
+
+    Not of the tools: a C compiler, and what makes a page of Markdown.
+    """
     digest = hashlib.sha256()
     for package in ("auv_fmu", "fmus", *CONTAINED[kind]):
         root = package_folder(package)
-        for path in sorted(root.rglob("*")):
-            name = path.relative_to(root)
+        files = {path.relative_to(root).as_posix(): path for path in root.rglob("*")}
+        for name, path in sorted(files.items()):
             # The first is Python's own, the second what was built of them.
-            if path.is_file() and path.suffix != ".pyc" and name.parts[0] != "dist":
+            if path.is_file() and path.suffix != ".pyc" and not name.startswith("dist/"):
                 digest.update(f"{package}/{name}\0".encode())
                 digest.update(path.read_bytes())
-    for text in (licences(kind), version("markdown-it-py")):
-        digest.update(text.encode())
+    digest.update(licences(kind).encode())
     return digest.hexdigest()
 
 

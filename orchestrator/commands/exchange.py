@@ -9,6 +9,7 @@ from pathlib import Path
 
 from orchestrator.commands.options import (
     add_fmi,
+    add_kind,
     add_options,
     add_out,
     add_set,
@@ -50,7 +51,8 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
-    add_options(parser, Request, "step", "strict", "kind")
+    add_options(parser, Request, "step", "strict")
+    add_kind(parser)
     add_fmi(parser)
     add_set(parser)
     add_out(parser, "exports/SCENARIO/")
@@ -71,7 +73,7 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
         "host", nargs="*", metavar="HOST", help=f"one of {', '.join(HOSTS)}; default: all"
     )
     _add_scenario(parser)
-    add_options(parser, Request, "kind")
+    add_kind(parser)
     parser.add_argument(
         "--steps", type=int, default=5000, metavar="N", help="number of steps; default: 5000"
     )

@@ -3,6 +3,7 @@
 All of it is run, so it is taken only from folders and files that nobody but the user can write,
 and only if unchanged since it was kept: the digests of its files are in a separate folder. Nothing
 there is ever overwritten or removed. Anything that has changed is made anew, under another name.
+What came with the installation, ready for use, is taken first, and trusted like the code beside it.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ from platformdirs import user_cache_path
 
 from orchestrator.machine.disk import process_folder, sync_to_disk
 
+#: What came with the installation: a folder for each category, in it one for each key.
+_READY = Path(__file__).parents[1] / "ready"
+
 #: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"
 
@@ -39,13 +43,15 @@ def users_folder() -> Path:
 
 
 def read_cached(category: str, key: str) -> dict[Path, bytes]:
-    """Read the files that were kept under a key; empty if they are not as they were kept.
+    """Read the files that are there under a key; empty if they are not as they were kept.
 
     Args:
         category: of what is kept, a name of a folder.
         key: of all that it was made of.
 
     """
+    with suppress(OSError):
+        return {path: path.read_bytes() for path in sorted((_READY / category / key).iterdir())}
     root = _root(category)
     with suppress(OSError):
         for record in sorted((root / _DIGESTS).glob(f"{category}-{key}-*.json")):

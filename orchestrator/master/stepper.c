@@ -9,7 +9,7 @@
 #else
 #define _POSIX_C_SOURCE 199309L
 #include <time.h>
-#define EXPORTED
+#define EXPORTED __attribute__((visibility("default")))
 #endif
 #ifndef __x86_64__
 #include <fenv.h>

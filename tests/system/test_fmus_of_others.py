@@ -212,6 +212,19 @@ def test_a_machine_for_which_there_is_no_library_is_named(tmp_path: Path, capsys
     assert mentions(capsys.readouterr().out, "others.so linux64 win64")
 
 
+@pytest.mark.parametrize("folder", ["aarch64-linux", "linux64"])
+def test_a_library_for_arm_may_have_the_standards_name_or_the_one_of_x86(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+):
+    """FMI 2.0.4 has a name for ARM; fmpy and OpenModelica have the other."""
+    monkeypatch.setattr(fmpy, "platform_tuple", "aarch64-linux")
+    fmu = build(tmp_path, platform=folder)
+    if folder != fmpy.platform:
+        with ZipFile(fmu, "a") as archive:
+            archive.writestr("binaries/linux64/others.so", "for x86-64")
+    assert len(run(system_of(fmu))) == 11
+
+
 def test_a_library_of_another_name_is_named(tmp_path: Path):
     renamed = tmp_path / "renamed.fmu"
     with ZipFile(build(tmp_path)) as fmu, ZipFile(renamed, "w") as archive:

@@ -23,10 +23,12 @@ from fmpy.validation import validate_fmu
 
 from auv_fmu import __version__
 from fmus.kinds import FMI_VERSIONS, platforms
+from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.runs import bundle
 from orchestrator.runs.wiring import closed_loop
+from ready_wheel import write_wheel
 from support.machine import contents
 from support.settings import NAMES, WITH_INPUTS
 
@@ -79,6 +81,31 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
     tables = {(empty / "results" / name / "result.csv").read_bytes() for name in ("fig4", "native")}
     assert len(tables) == 1
     assert [path.name for path in empty.iterdir()] == ["results"]
+
+
+@pytest.mark.slow
+@needs_zig
+def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(tmp_path: Path):
+    once, again = (write_wheel(tmp_path / name) for name in ("once", "again"))
+    assert once.name.endswith("-py3-none-any.whl")
+    assert once.read_bytes() == again.read_bytes()
+    packages, cache, empty = tmp_path / "packages", tmp_path / "cache", tmp_path / "empty"
+    empty.mkdir()
+    install = [sys.executable, "-m", "pip", "--quiet", "install", "--no-deps", "--target", packages]
+    subprocess.run([*install, once], check=True)
+    environment = {"PYTHONPATH": str(packages), "PATH": str(empty), "XDG_CACHE_HOME": str(cache)}
+    subprocess.run(
+        [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", "--no-figures"],
+        env=environment, cwd=empty, check=True, capture_output=True,
+    )  # fmt: skip
+    assert not (cache / "auv-fmu" / "fmus").exists()
+    result = empty / "results" / "fig4"
+    record = json.loads((result / "run.json").read_text())
+    assert {fmu["kind"] for fmu in record["fmus"].values()} == {"native"}
+    assert record["loop"] == "compiled"
+    # The table of the checkout's FMUs in Python.
+    expected = simulate("fig4", kind="python").save(tmp_path / "expected")
+    assert (result / "result.csv").read_bytes() == (expected / "result.csv").read_bytes()
 
 
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):

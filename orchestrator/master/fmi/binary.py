@@ -135,6 +135,7 @@ class Library:
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,
                     unzipDirectory=str(folder),
+                    libraryPath=str(binary_of(component, folder)),
                 )
         except Exception as error:
             raise InputError(
@@ -180,10 +181,14 @@ def check_place(folder: Path) -> None:
 
 
 def binary_of(component: Component, folder: Path) -> Path:
-    """Where the library of an unpacked FMU for this machine is, if it has one."""
+    """Where the library of an unpacked FMU for this machine is, if it has one.
+
+    fmpy knows only the old names of platforms, which FMI 2.0.4 has for x86, and some tools for ARM.
+    """
     identifier = component.description.coSimulation.modelIdentifier
     name = f"{identifier}{fmpy.sharedLibraryExtension}"
-    return Path(folder, "binaries", fmpy.platform, name)
+    old, named = (Path(folder, "binaries", p, name) for p in (fmpy.platform, fmpy.platform_tuple))
+    return named if named.is_file() else old
 
 
 def make_binary(component: Component, folder: Path) -> None:
