@@ -117,7 +117,7 @@ def fmu_entries(
     return {
         "modelDescription.xml": described(guid),
         **_pictures(component, declared.PORTS, fmi),
-        "documentation/index.html": documentation.component_html(component, NATIVE, fmi).encode(),
+        **documentation.fmu_documents(component, NATIVE, fmi),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
         **libraries,
