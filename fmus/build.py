@@ -24,11 +24,8 @@ from fmus.python.packaging import LOADERS, PythonKind, best_loader
 MANIFEST = "build.json"
 
 
-def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
+def build(destination: Path, kind: PythonKind | NativeKind) -> None:
     """Bring a folder of FMUs up to date.
-
-    Returns:
-        The files that had to be written.
 
     Raises:
         OSError: the folder cannot be written, or the FMUs cannot be built.
@@ -39,7 +36,7 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
     made_from = {"fingerprint": fingerprint(kind.name), "settings": kind.settings}
     before = built_before(manifest)
     current = {key: before.get(key) for key in made_from} == made_from
-    digests = before["sha256"] if current else {}
+    digests = dict(before["sha256"]) if current else {}
     stale = {
         path: (component, package)
         for component, package in components().items()
@@ -48,11 +45,10 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
     }
     with ThreadPoolExecutor(kind.side_by_side) as pool:
         list(pool.map(lambda path: kind.write(*stale[path], path), stale))
-    if stale:
-        digests |= {path.name: _digest(path) for path in stale}
-        text = json.dumps({**made_from, "sha256": digests})
-        manifest.write_text(text + "\n", encoding="utf-8")
-    return list(stale)
+    digests |= {path.name: _digest(path) for path in stale}
+    content = {**made_from, "sha256": digests}
+    if content != before:
+        manifest.write_text(json.dumps(content) + "\n", encoding="utf-8")
 
 
 def built_before(manifest: Path) -> dict[str, Any]:
@@ -88,8 +84,7 @@ def main() -> int:
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
     options = parser.parse_args()
     try:
-        for path in build(options.out, _kind(options)):
-            print(path)
+        build(options.out, _kind(options))
     except (OSError, ValueError) as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)
         return 2
@@ -111,7 +106,12 @@ def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
     if options.loader is not None:
         raise ValueError("--loader is for --kind python: the other kind loads no Python")
     wanted = platforms(options.fmi, options.platforms)
-    return NativeKind(options.fmi, wanted, compiler_for(wanted))
+    return NativeKind(options.fmi, wanted, compiler_for(wanted), _tell)
+
+
+def _tell(line: str) -> None:
+    """Print a line, whole, whatever other threads print."""
+    print(f"{line}\n", end="", flush=True)
 
 
 if __name__ == "__main__":

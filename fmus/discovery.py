@@ -10,9 +10,17 @@ from importlib import import_module
 from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path
+from xml.etree import ElementTree
 
 from fmus.kinds import CONTAINED
 from fmus.ports.port import Port
+
+#: The folder of a component that holds its reference results.
+REFERENCE = "reference"
+
+#: Where FMI-LS-REF has them in an FMU, and the file there that names them.
+RELATED = "extra/org.fmi-standard.fmi-ls-ref"
+RELATED_MANIFEST = "fmi-ls-manifest.xml"
 
 #: The oldest time a zip archive can hold: the time of a build is not part of its result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -40,6 +48,22 @@ def ports_of(name: str) -> Sequence[Port]:
     """The ports of a component, all but `fault`."""
     ports: Sequence[Port] = import_module(f"{components()[name]}.ports").PORTS
     return ports
+
+
+def related_files(package: str) -> dict[str, bytes]:
+    """The reference results that an FMU of a component carries, by their places in it.
+
+    Returns:
+        The manifest and the files that it names; empty if the component has none.
+
+    """
+    folder = package_folder(package) / REFERENCE
+    manifest = folder / RELATED_MANIFEST
+    if not manifest.is_file():
+        return {}
+    related = ElementTree.parse(manifest).iter("Related")
+    names = (manifest.name, *(element.attrib["source"] for element in related))
+    return {f"{RELATED}/{name}": (folder / name).read_bytes() for name in names}
 
 
 def licences(kind: str) -> str:

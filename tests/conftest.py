@@ -17,6 +17,7 @@ from platformdirs import user_cache_path
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from orchestrator.commands.main import main
+from orchestrator.exchange.release import write_release
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
 
@@ -97,7 +98,7 @@ def _own_cache(shared: Path) -> None:
     os.environ["XDG_CACHE_HOME"] = os.environ.get("TESTS_CACHE") or str(shared / "cache")
 
 
-def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
+def _copy(fmus: Path, module: str, folder: Path, *options: str, **_: object) -> None:
     """Take the place of what would build them once more."""
     shutil.copytree(fmus, folder, dirs_exist_ok=True)
 
@@ -129,6 +130,18 @@ def native(shared: Path) -> Path:
 def dist3(shared: Path) -> Path:
     """A folder with the FMUs in C of FMI 3.0, to be read only."""
     return _built(shared, NATIVE, "3")
+
+
+@pytest.fixture(scope="session")
+def release(shared: Path) -> Path:
+    """A folder with the archives of a release, and what they unpack to; to be read only."""
+    folder = shared / "release"
+    folder.mkdir(exist_ok=True)
+    with hold_lock(folder, wait=True):
+        if not any(folder.iterdir()):
+            for archive in write_release(folder / "archives", print):
+                shutil.unpack_archive(archive, folder)
+    return folder
 
 
 @pytest.fixture

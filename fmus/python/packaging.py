@@ -246,5 +246,5 @@ class PythonKind:
         """
         text = _SCRIPT.format(package=package, component=component)
         entries = fmu_entries(component, text, self.loader)
-        entries["documentation/index.html"] = documentation.component_html(component).encode()
+        entries |= documentation.fmu_documents(component)
         seal(entries, path)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
@@ -14,7 +14,7 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import BASE_UNITS, Linear, Mapped
-from orchestrator.system.values import items_of, literal, type_of
+from orchestrator.system.values import Value, items_of, literal, type_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
 PARAMETER_SET = "scenario"
@@ -48,7 +48,7 @@ def ssp_bytes(system: System) -> bytes:
     with ZipFile(archive, "w") as content:
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
         for name, source in _parameter_sources(system).items():
-            values = _parameter_set_xml(system, system.components[name])
+            values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
         for fmu, source in _sources(system).items():
             content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
@@ -67,15 +67,17 @@ def _parameter_sources(system: System) -> dict[str, str]:
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 
-def _parameter_set_xml(system: System, component: Component) -> bytes:
-    """The values that a system sets in one component, as an SSV."""
-    root = Element(_tag("ssv:ParameterSet"), name=PARAMETER_SET, version=_version(component))
+def parameter_set_xml(
+    component: Component, values: Mapping[str, Value], name: str = PARAMETER_SET
+) -> bytes:
+    """Values of one component by the names of its variables, as an SSV."""
+    root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")
-    for name, value in system.parameters_of(component.name).items():
-        variable = component.variable(name)
+    for port, value in values.items():
+        variable = component.variable(port)
         # Values of an enumeration have names there.
         items = (item for item, number in items_of(variable).items() if int(number) == value)
-        element = _add(parameters, "ssv:Parameter", name=name)
+        element = _add(parameters, "ssv:Parameter", name=port)
         written = next(items, literal(value))
         _add(element, f"ssv:{variable.type}", value=written)
     return _serialised(root)
