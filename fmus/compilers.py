@@ -12,7 +12,6 @@ import struct
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -158,29 +157,23 @@ def library(
         OSError: the compiler fails.
 
     """
-    with ThreadPoolExecutor() as pool:
-        libraries = [*pool.map(
-            lambda machine: _compiled(compiler, machine, f"{name}{platform.ending}", sources, main),
-            platform.machines,
-        )]  # fmt: skip
-    return libraries[0] if len(libraries) == 1 else universal(libraries)
-
-
-def _compiled(
-    compiler: Compiler, machine: str, name: str, sources: Mapping[str, bytes], main: str
-) -> bytes:
-    """The library of one machine, by the name of its file."""
     with TemporaryDirectory(prefix="auv_fmu_native_") as folder:
         for file, content in sources.items():
             Path(folder, file).write_bytes(content)
-        target = compiler.targets.get(machine, ())
-        size = _SMALL if machine.endswith("-windows") else _NO_TABLES
         # A name without a folder, because the library may hold it.
-        options = [*target, *FLAGS, *size, "-o", name, main, "-lm"]
-        process = run_compiler([*compiler.command, *options], Path(folder), compiler.limit)
-        if process.returncode != 0:
-            raise OSError(f"{compiler.name} makes no {name} for {machine}: {_complaint(process)}")
-        return Path(folder, name).read_bytes()
+        made = Path(folder, f"{name}{platform.ending}")
+        libraries = []
+        for machine in platform.machines:
+            target = compiler.targets.get(machine, ())
+            size = _SMALL if machine.endswith("-windows") else _NO_TABLES
+            options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
+            process = run_compiler([*compiler.command, *options], Path(folder), compiler.limit)
+            if process.returncode != 0:
+                raise OSError(
+                    f"{compiler.name} makes no {name} for {machine}: {_complaint(process)}"
+                )
+            libraries.append(made.read_bytes())
+    return libraries[0] if len(libraries) == 1 else universal(libraries)
 
 
 def _complaint(process: subprocess.CompletedProcess[str]) -> str:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -82,7 +80,7 @@ def fmu_entries(
     compiler: Compiler,
     tell: Callable[[str], None],
 ) -> dict[str, bytes]:
-    """The contents of an FMU, whose libraries are compiled side by side.
+    """The contents of an FMU.
 
     Its GUID follows from its description and its sources, and is the same for all platforms.
 
@@ -106,14 +104,11 @@ def fmu_entries(
 
     guid = guid_of(digest_of({**written, "modelDescription.xml": described("")}))
     written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        made = pool.map(
-            lambda platform: library(compiler, platform, component, written, MAIN[fmi]), platforms
-        )
-        libraries = {}
-        for platform, content in zip(platforms, made):
-            libraries[f"binaries/{platform.name}/{component}{platform.ending}"] = content
-            tell(f"{component} for {platform.name}, FMI {fmi}.0")
+    libraries = {}
+    for platform in platforms:
+        path = f"binaries/{platform.name}/{component}{platform.ending}"
+        libraries[path] = library(compiler, platform, component, written, MAIN[fmi])
+        tell(f"{component} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": described(guid),
         **_pictures(component, declared.PORTS, fmi),
