@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -128,6 +129,8 @@ class NativeKind:
     compiler: Compiler
     tell: Callable[[str], None]
     name = NATIVE
+    #: How many are written at the same time: compilers are processes of their own.
+    side_by_side = os.cpu_count()
 
     @property
     def settings(self) -> dict[str, str]:

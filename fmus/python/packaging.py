@@ -229,6 +229,8 @@ class PythonKind:
 
     loader: str
     name = PYTHON
+    #: How many are written at the same time: PythonFMU imports what it builds.
+    side_by_side = 1
 
     @property
     def settings(self) -> dict[str, str]:
