@@ -36,7 +36,7 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
     made_from = {"fingerprint": fingerprint(kind.name), "settings": kind.settings}
     before = built_before(manifest)
     current = {key: before.get(key) for key in made_from} == made_from
-    digests = dict(before["sha256"]) if current else {}
+    digests = before["sha256"] if current else {}
     stale = {
         path: (component, package)
         for component, package in components().items()
@@ -45,10 +45,10 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
     }
     with ThreadPoolExecutor(kind.side_by_side) as pool:
         list(pool.map(lambda path: kind.write(*stale[path], path), stale))
-    digests |= {path.name: _digest(path) for path in stale}
-    content = {**made_from, "sha256": digests}
-    if content != before:
-        manifest.write_text(json.dumps(content) + "\n", encoding="utf-8")
+    if stale:
+        digests |= {path.name: _digest(path) for path in stale}
+        text = json.dumps({**made_from, "sha256": digests})
+        manifest.write_text(text + "\n", encoding="utf-8")
 
 
 def built_before(manifest: Path) -> dict[str, Any]:
@@ -60,6 +60,11 @@ def built_before(manifest: Path) -> dict[str, Any]:
     parts = ("settings", "sha256")
     ours = isinstance(content, dict) and all(isinstance(content.get(p), dict) for p in parts)
     return content if ours else {}
+
+
+def _tell(line: str) -> None:
+    """Say at once what was made, in one piece: others are made at the same time."""
+    print(f"{line}\n", end="", flush=True)
 
 
 def _digest(path: Path) -> str:
@@ -107,11 +112,6 @@ def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
         raise ValueError("--loader is for --kind python: the other kind loads no Python")
     wanted = platforms(options.fmi, options.platforms)
     return NativeKind(options.fmi, wanted, compiler_for(wanted), _tell)
-
-
-def _tell(line: str) -> None:
-    """Print a line, whole, whatever other threads print."""
-    print(f"{line}\n", end="", flush=True)
 
 
 if __name__ == "__main__":

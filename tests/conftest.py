@@ -41,7 +41,8 @@ settings.register_profile("attack", settings.get_profile("search"), max_examples
 # Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
 # does all that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if os.name == "posix":
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 #: What a reason says beside the name of what is missing.
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")

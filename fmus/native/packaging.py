@@ -107,8 +107,8 @@ def fmu_entries(
     written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
     libraries = {}
     for platform in platforms:
-        name = f"binaries/{platform.name}/{component}{platform.ending}"
-        libraries[name] = library(compiler, platform, component, written, MAIN[fmi])
+        path = f"binaries/{platform.name}/{component}{platform.ending}"
+        libraries[path] = library(compiler, platform, component, written, MAIN[fmi])
         tell(f"{component} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": described(guid),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from orchestrator.commands.options import (
@@ -18,9 +19,10 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
+from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.exchange.release import write_release
-from orchestrator.exchange.verify import verify
+from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
@@ -40,6 +42,10 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 
 #: What tools do with values before the first step; the first is the default.
 _INITIAL = ("full", "none")
+
+
+#: Options of `verify` that are for a table only.
+_OF_TABLES = ("scenario", "order", "initial", "verbose", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
@@ -82,14 +88,19 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu verify`."""
-    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="table with a column `time`")
+    parser.add_argument(
+        "table",
+        type=Path,
+        metavar="RESULT.csv|FILE.fmu",
+        help="table with a column `time`; or an FMU, any one's, whose experiments are made and "
+        "compared with the results that it carries, as FMI-LS-REF has them",
+    )
     _add_scenario(parser)
     parser.add_argument(
         "--tolerance",
         type=float,
-        default=1e-6,
         help="largest deviation, relative to the larger of 1 and the port's largest value; "
-        "default: 1e-6",
+        f"default: {TOLERANCE:g}, for an FMU what its experiment says",
     )
     parser.add_argument(
         "--order",
@@ -109,7 +120,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         "--verbose", action="store_true", help="name every column that was not compared"
     )
     add_set(parser)
-    parser.set_defaults(action=_verify)
+    parser.set_defaults(action=partial(_verify, parser.get_default))
 
 
 def _add_scenario(parser: argparse.ArgumentParser) -> None:
@@ -176,11 +187,42 @@ def _hosts(options: argparse.Namespace) -> int:
     return OK if all(verdict.agrees for verdict in verdicts) else FAILED
 
 
-def _verify(options: argparse.Namespace) -> int:
+def _verify(default: Callable[[str], object], options: argparse.Namespace) -> int:
+    if options.table.suffix == ".fmu":
+        for name in _OF_TABLES:
+            if getattr(options, name) != default(name):
+                raise InputError(f"--{name} is for a table; an FMU says itself what is compared")
+        return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
     at_start, verbose = options.initial == _INITIAL[0], options.verbose
     certificate = verify(
-        options.table, system, options.tolerance, options.order, at_start=at_start, verbose=verbose
+        options.table,
+        system,
+        TOLERANCE if options.tolerance is None else options.tolerance,
+        options.order,
+        at_start=at_start,
+        verbose=verbose,
     )
     show(*certificate.splitlines())
+    return OK
+
+
+def _verify_carried(options: argparse.Namespace) -> int:
+    """Verify an FMU by what it carries; nothing less than agreement in all of it will do."""
+    carried = Carried(options.table)
+    show(f"{options.table.name}: FMI-LS-REF {carried.version}")
+    for note in carried.notes:
+        say(f"warning: {note}")
+    judged = []
+    for verdict in carried.verdicts(options.tolerance):
+        show(f"{verdict.name}: {verdict.text}")
+        for note in verdict.notes:
+            say(f"warning: {verdict.name}: {note}")
+        judged += [] if verdict.agrees is None else [verdict.agrees]
+    if not judged:
+        raise InputError(f"{options.table}: carries no results to verify it with")
+    counted = f"{sum(judged)} of {len(judged)} experiments with results agree"
+    if not all(judged):
+        raise InputError(f"{options.table}: {counted}")
+    show(counted)
     return OK

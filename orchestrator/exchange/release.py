@@ -95,8 +95,10 @@ def _licences() -> Iterator[tuple[str, bytes]]:
 
 def _references() -> Iterator[tuple[str, bytes]]:
     """Reference results of each FMU, and of the system."""
-    found = next(folder for folder in _REFERENCES if folder.is_dir())
-    folders = [package_folder(package) / REFERENCE for package in components().values()]
-    for folder in (found, *folders):
-        for path in sorted(folder.iterdir()):
-            yield f"{REFERENCE}/{path.name}", path.read_bytes()
+    folder = next(folder for folder in _REFERENCES if folder.is_dir())
+    paths = [*folder.iterdir()]
+    for name, package in components().items():
+        # Beside them is what the FMU carries itself.
+        paths += (package_folder(package) / REFERENCE).glob(f"{name}_*")
+    for path in paths:
+        yield f"{REFERENCE}/{path.name}", path.read_bytes()

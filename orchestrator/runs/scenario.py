@@ -185,22 +185,43 @@ def read_inputs(
         InputError: the table cannot be read, or a column is not an available input.
 
     """
-    file = inputs.file
-    names, rows = inputs.content
-    targets = tuple(map(system.named, names))
     try:
-        _check_rows(rows, targets)
-        for target, column in zip(targets, rows[:, 1:].T, strict=True):
-            if target in map(system.named, given):
-                raise InputError(f"{target} is given both a value and a column of the table")
-            _check_column(system, target, column)
-        linear = [_is_linear(system, target, inputs.between) for target in targets]
-        input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
-        start = system.start_time or 0.0
-        values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
-        return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
+        return with_input_table(system, *inputs.content, given, inputs.between)
     except InputError as error:
-        raise InputError(f"{file}: {error}") from error
+        raise InputError(f"{inputs.file}: {error}") from error
+
+
+def with_input_table(
+    system: System,
+    names: Sequence[PortName],
+    rows: np.ndarray,
+    given: Collection[PortName] = (),
+    between: str = "linear",
+) -> tuple[System, InputTable]:
+    """A system that begins with the first values of inputs over time, and what follows.
+
+    Args:
+        system: that has the inputs.
+        names: of the inputs.
+        rows: their values, time first.
+        given: ports that have values already.
+        between: what continuous Real inputs do between two rows.
+
+    Raises:
+        InputError: a column is not an available input, or cannot be followed.
+
+    """
+    targets = tuple(map(system.named, names))
+    _check_rows(rows, targets)
+    for target, column in zip(targets, rows[:, 1:].T, strict=True):
+        if target in map(system.named, given):
+            raise InputError(f"{target} is given both a value and a column of the table")
+        _check_column(system, target, column)
+    linear = [_is_linear(system, target, between) for target in targets]
+    input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
+    start = system.start_time or 0.0
+    values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
+    return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
 
 
 def _check_rows(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
