@@ -134,15 +134,15 @@ def dist3(shared: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def release(shared: Path) -> Path:
-    """A folder with the archives of a release, and what they unpack to; to be read only."""
+def release(shared: Path) -> dict[str, Path]:
+    """What the archives of a release unpack to, by versions of FMI; to be read only."""
     folder = shared / "release"
     folder.mkdir(exist_ok=True)
     with hold_lock(folder, wait=True):
         if not any(folder.iterdir()):
             for archive in write_release(folder / "archives", print):
                 shutil.unpack_archive(archive, folder)
-    return folder
+    return {fmi: next(folder.glob(f"auv-fmu-*-fmi{fmi}")) for fmi in FMI_VERSIONS}
 
 
 @pytest.fixture

@@ -114,12 +114,11 @@ def run_elsewhere(
 
 
 @pytest.fixture(scope="module")
-def elsewhere(release: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def elsewhere(release: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The libraries for Windows and for ARM that a release has."""
     folder = tmp_path_factory.mktemp("elsewhere")
-    [fmus] = release.glob("auv-fmu-*-fmi2")
     for name in NAMES:
-        fmpy.extract(fmus / f"{name}.fmu", unzipdir=folder / name)
+        fmpy.extract(release["2"] / f"{name}.fmu", unzipdir=folder / name)
     return folder
 
 
