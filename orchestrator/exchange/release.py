@@ -61,13 +61,13 @@ def write_release(folder: Path, hear: Callable[[str], None], *, force: bool = Fa
 def _contents(folder: Path, fmi: str, hear: Callable[[str], None]) -> Iterator[tuple[str, bytes]]:
     """The files of an archive by their names, made in a folder."""
     build_bundle(folder, kind=NATIVE, fmi=fmi, platforms="all", hear=hear)
-    fmus = sorted(folder.glob("*.fmu"))
     others = {_PAGE: _page(fmi), **dict(_licences()), **dict(_references())}
     for name, content in others.items():
         path = folder / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(content)
-    files = [*fmus, folder / ARCHIVE, *(folder / name for name in others)]
+    # In an order of their own: a folder's is another one elsewhere.
+    files = sorted((*folder.glob("*.fmu"), folder / ARCHIVE, *(folder / name for name in others)))
     for path in (*files, *write_papers(folder, files, settings_of(folder))):
         yield path.relative_to(folder).as_posix(), path.read_bytes()
 
@@ -96,7 +96,7 @@ def _licences() -> Iterator[tuple[str, bytes]]:
 def _references() -> Iterator[tuple[str, bytes]]:
     """Reference results of each FMU, and of the system."""
     folder = next(folder for folder in _REFERENCES if folder.is_dir())
-    paths = [*folder.iterdir()]
+    paths = [*folder.glob("auv_*")]
     for name, package in components().items():
         # Beside them is what the FMU carries itself.
         paths += (package_folder(package) / REFERENCE).glob(f"{name}_*")
