@@ -1,4 +1,4 @@
-"""`auv-fmu export`, `hosts` and `verify`: exchange systems and results with other tools."""
+"""`auv-fmu export`, `release`, `hosts` and `verify`: exchange systems and results with tools."""
 
 from __future__ import annotations
 
@@ -21,6 +21,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
+from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
@@ -60,6 +61,13 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_out(parser, "exports/SCENARIO/")
     add_options(parser, Files, "force")
     parser.set_defaults(action=_export)
+
+
+def add_release(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu release`."""
+    add_out(parser, Path("release"))
+    add_options(parser, Files, "force")
+    parser.set_defaults(action=_release)
 
 
 def add_hosts(parser: argparse.ArgumentParser) -> None:
@@ -154,6 +162,11 @@ def _export(options: argparse.Namespace) -> int:
         written = EXPORT_FORMATS[options.format](system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))
+    return OK
+
+
+def _release(options: argparse.Namespace) -> int:
+    show(*write_release(options.out, say, force=options.force))
     return OK
 
 

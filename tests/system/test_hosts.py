@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from fmus.compilers import machines_compiler
+from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
 from orchestrator.exchange.hosts import comparison, here
@@ -60,6 +61,17 @@ def test_host_gives_the_numbers_of_our_master_in_its_order(dist: Path, host: str
     if scenario != "fig4" and host in (*WITHOUT_PARAMETERS, *APART):
         pytest.skip("it applies no parameters")
     check(closed_loop(dist, read_scenario(scenario)), host, 500)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+@pytest.mark.parametrize("fmi", FMI_VERSIONS)
+@pytest.mark.parametrize("host", BESIDE)
+def test_host_gives_our_numbers_with_a_release(release: dict[str, Path], host: str, fmi: str):
+    if fmi not in HOSTS[host].fmi:
+        pytest.skip(f"it runs no FMI {fmi}.0")
+    system, reference = (closed_loop(release[n], versions=WRITABLE) for n in (fmi, "2"))
+    check(system, host, 300, reference)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ from orchestrator.runs.bundle import CATEGORY, build_bundle, current_fmus, key_o
 @pytest.fixture
 def folder(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A bundle, and a build that finds its FMUs up to date."""
-    monkeypatch.setattr(bundle, "run_fmus", lambda module, folder, *options: [])
+    monkeypatch.setattr(bundle, "run_fmus", lambda module, folder, *options, hear: [])
     return shutil.copytree(dist, tmp_path / "bundle")
 
 
@@ -58,7 +58,7 @@ def test_papers_are_about_the_files_beside_them(dist: Path):
 
 
 def test_a_build_that_fails_leaves_what_was_there(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    def fails(*_: object) -> None:
+    def fails(*_: object, hear: object) -> None:
         raise InputError("no compiler")
 
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
