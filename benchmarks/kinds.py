@@ -30,7 +30,7 @@ from measuring import options, python, steps_time, timed
 from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
 from orchestrator.exchange import c_host
-from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.exchange.hosts.comparison import HOSTS, compare
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import choose_loop
 from orchestrator.runs.bundle import current_fmus

@@ -20,15 +20,15 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.carried import Carried
-from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, read_order
+from orchestrator.master.experiment import INITIAL, ORDERS, read_order
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.loading import left_behind, load
+from orchestrator.runs.loading import left_behind, load, load_scenario
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.system.structure import System
@@ -39,9 +39,6 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
     "osp": write_osp,
     "container": write_container,
 }
-
-#: What tools do with values before the first step; the first is the default.
-_INITIAL = ("full", "none")
 
 
 #: Options of `verify` that are for a table only.
@@ -75,11 +72,18 @@ def add_release(parser: argparse.ArgumentParser) -> None:
 
 def add_hosts(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu hosts`."""
+    beside = [name for name, host in HOSTS.items() if not host.pins]
     parser.add_argument(
-        "host", nargs="*", metavar="HOST", help=f"one of {', '.join(HOSTS)}; default: all"
+        "host",
+        nargs="*",
+        metavar="HOST",
+        help=f"of {', '.join(HOSTS)}; default: {', '.join(beside)}. The others are installed when "
+        "they are first named, each into an environment in the user's cache folder",
     )
+    parser.add_argument("--all", action="store_true", help="every host")
     _add_scenario(parser)
     add_kind(parser)
+    add_fmi(parser)
     parser.add_argument(
         "--steps", type=int, default=5000, metavar="N", help="number of steps; default: 5000"
     )
@@ -106,15 +110,16 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         "--order",
         type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help="order in which the tool steps the components, or the names of all of them; default: "
-        f"the better match of {' and '.join(ORDERS)}",
+        help="order in which the tool steps the components, or the names of all of them, with "
+        f"NAME+NAME for some side by side; default: the better match of {' and '.join(ORDERS)}",
     )
     parser.add_argument(
         "--initial",
-        choices=_INITIAL,
-        default=_INITIAL[0],
+        choices=INITIAL,
+        default=INITIAL[0],
         help="full: the tool exchanges values in initialisation mode; none: only just before the "
-        f"first step; default: {_INITIAL[0]}",
+        "first step; zero: not before it, so that inputs begin with zeros or start values; "
+        f"default: {INITIAL[0]}",
     )
     parser.add_argument(
         "--verbose", action="store_true", help="name every column that was not compared"
@@ -169,22 +174,31 @@ def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
-    system = load(options.scenario, options.kind)
-    step = system.step or DEFAULT_STEP
-    verdicts = compare(system, options.host or list(HOSTS), options.steps, step)
-    show(f"{'host':13} {'package':34} {'max deviation':>14} {'steps/s':>8}  worst port")
+    hosts = options.host or [
+        name
+        for name, host in HOSTS.items()
+        if options.fmi in host.fmi and (options.all or not host.pins)
+    ]
+    reference = load(options.scenario, options.kind)
+    _, system = load_scenario(options.scenario, options.kind, options.fmi)
+    step = reference.step or DEFAULT_STEP
+    system = replace(system, name=reference.name, stop_time=reference.stop_time, step=step)
+    verdicts = compare(system, hosts, options.steps, step, reference=reference, told=say)
+    show(f"{'host':15} {'version':32} {'order':42} {'deviation':>9} {'us/step':>8}  worst port")
+    agree = True
     for verdict in verdicts:
-        if verdict.failure is not None:
-            show(f"{verdict.host:13} {verdict.package:34} {verdict.failure}")
-            continue
         host = HOSTS[verdict.host]
-        note = f" ({host.why})" if host.why else ""
-        note += "" if verdict.agrees else f", above {host.bound:g}"
-        show(
-            f"{verdict.host:13} {verdict.package:34} {verdict.deviation:14.2e} "
-            f"{verdict.steps_per_second:8.0f}  {verdict.port}{note}"
-        )
-    return OK if all(verdict.agrees for verdict in verdicts) else FAILED
+        order = f"{host.initial}: {host.order}"
+        if verdict.failure is not None:
+            show(f"{verdict.host:15} {verdict.package:32} {verdict.failure}")
+        else:
+            note = "" if verdict.agrees else f", above {BOUND:g}"
+            show(
+                f"{verdict.host:15} {verdict.package:32} {order:42} {verdict.deviation:9.1e} "
+                f"{1e6 / verdict.steps_per_second:8.1f}  {verdict.port}{note}"
+            )
+        agree &= verdict.agrees
+    return OK if agree else FAILED
 
 
 def _verify(default: Callable[[str], object], options: argparse.Namespace) -> int:
@@ -194,14 +208,13 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
                 raise InputError(f"--{name} is for a table; an FMU says itself what is compared")
         return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
-    at_start, verbose = options.initial == _INITIAL[0], options.verbose
     certificate = verify(
         options.table,
         system,
         TOLERANCE if options.tolerance is None else options.tolerance,
         options.order,
-        at_start=at_start,
-        verbose=verbose,
+        initial=options.initial,
+        verbose=options.verbose,
     )
     show(*certificate.splitlines())
     return OK

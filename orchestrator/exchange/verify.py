@@ -6,6 +6,7 @@ import re
 from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,14 +16,16 @@ from orchestrator.formats.tables import SEPARATORS, Record, records
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import (
     DELAY,
+    FULL,
+    NONE,
     ORDERS,
     ROUNDING,
+    ZERO,
     Exchange,
     Experiment,
     Order,
     format_order,
 )
-from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
@@ -30,7 +33,7 @@ from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import BOOLEANS, finite
+from orchestrator.system.values import BOOLEANS, finite, type_of
 
 #: How far values may differ where nothing else is said.
 TOLERANCE = 1e-6
@@ -40,6 +43,13 @@ _FIRST = 5
 
 #: Columns that name the time, in lower case.
 _TIME = ("time", "t")
+
+#: What is said of the exchange before the first step.
+_STARTS = {
+    FULL: "",
+    NONE: ", no values exchanged in initialisation mode",
+    ZERO: ", no values exchanged before the first step",
+}
 
 #: What ecos puts after a name.
 _TYPE = re.compile(r"\[[A-Z]+\]$")
@@ -68,7 +78,7 @@ def verify(
     tolerance: float,
     order: Order | None = None,
     *,
-    at_start: bool = True,
+    initial: str = FULL,
     verbose: bool = False,
 ) -> str:
     """Compare a table from any tool with our own runs of the same system.
@@ -81,8 +91,9 @@ def verify(
         system: that the tool has run.
         tolerance: largest difference that is accepted, relative to the larger of one and the
             largest magnitude of the port.
-        order: in which the tool steps the components; None: one of :data:`ORDERS`.
-        at_start: whether it exchanges values in initialisation mode.
+        order: in which the tool steps the components, with `a+b` for some that it steps side by
+            side; None: one of :data:`ORDERS`.
+        initial: what it exchanges before the first step.
         verbose: whether all names of what was not compared are said.
 
     Returns:
@@ -94,18 +105,16 @@ def verify(
 
     """
     check_tolerance(tolerance)
-    if order is not None:
-        check_order(system, Experiment(DEFAULT_STEP, DEFAULT_STEP, order).order)
+    algorithms = list(ways(system, order, initial))
     outputs = {
-        str(PortName(component.name, variable.name)): variable.type
+        str(PortName(component.name, variable.name)): type_of(variable)
         for component in system.components.values()
         for variable in component.having("output")
-        if variable.type in FMI_TYPES
     }
     known = {
-        str(PortName(component.name, variable.name))
+        str(PortName(component.name, variable))
         for component in system.components.values()
-        for variable in component.description.modelVariables
+        for variable in component.variables
     }
     table = read_table(path, outputs, known)
     if not len(table.time) or not table.time[-1] > 0.0:
@@ -115,7 +124,7 @@ def verify(
             f"{path}: no column is named after an output; outputs are named like {min(outputs)}"
         )
     complaints = []
-    for way in _ways(system, order, at_start):
+    for way in algorithms:
         complaint = _complaint(table, system, way, tolerance)
         if complaint is None:
             return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
@@ -134,14 +143,24 @@ def check_tolerance(tolerance: float) -> None:
         raise InputError(f"tolerance {tolerance:g}: must be at least 0 and less than 1")
 
 
-def _ways(system: System, order: Order | None, at_start: bool) -> Iterator[Algorithm]:
-    """The ways to run a system that a table may agree with."""
-    start = "" if at_start else ", no values exchanged in initialisation mode"
-    exchange = Exchange(at_start)
-    if not (order is None or isinstance(order, str)):
-        words = f"in the order {format_order(order)}"
-        latest = exchange._replace(latest=True)
-        yield Algorithm(order, None, latest, f"{words}, each with the latest outputs{start}")
+def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorithm]:
+    """The ways to run a system that a table may agree with, the likeliest first.
+
+    Raises:
+        InputError: there is no such order.
+
+    """
+    exchange, start = Exchange(initial), _STARTS[initial]
+    if isinstance(order, str):
+        Experiment(DEFAULT_STEP, DEFAULT_STEP, order)
+    elif order is not None:
+        groups = [name.split("+") for name in order]
+        names = tuple(chain(*groups))
+        check_order(system, names)
+        words = f"in the order {format_order(order)}, each with the latest outputs{start}"
+        yield Algorithm(names, None, exchange._replace(groups=groups), words)
+        if names != tuple(order):
+            return
     # Other tools solve rings, or delay them.
     for coupling in (None, DELAY) if rings(system) else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)

@@ -8,7 +8,17 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
 from orchestrator.machine.errors import InputError, StartError, shortened
-from orchestrator.master.experiment import DELAY, GAUSS_SEIDEL, LINEAR, OURS, SOLVE, Exchange, Order
+from orchestrator.master.experiment import (
+    DELAY,
+    FULL,
+    GAUSS_SEIDEL,
+    LINEAR,
+    NONE,
+    OURS,
+    SOLVE,
+    Exchange,
+    Order,
+)
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.master.observers.observer import Ending, Header
@@ -259,7 +269,7 @@ class Coupling:
         for name, instance in instances.items():
             instance.enter_initialization(system.parameters_of(name), start)
             self._enter(name, system.open_inputs(name))
-        if self._exchange.at_start:
+        if self._exchange.initial == FULL:
             settling = self._settling(self._rings)
             self._read_ahead(settling.places)
             settling.hand_on(everything=True)
@@ -269,9 +279,9 @@ class Coupling:
             instance.exit_initialization()
         self._solved = self._solvable()
         self.sequence = self._in_stages(self._experiment.order, self._solved)
-        if self._exchange.at_start:
+        if self._exchange.initial == FULL:
             self._settling(self._solved).hand_on(everything=True)
-        else:
+        elif self._exchange.initial == NONE:
             for name in instances:
                 self._enter(name, [port.name for port in system.components[name].having("output")])
         self._check_finite()
@@ -286,7 +296,7 @@ class Coupling:
             steps = _LinearSteps(system, instances, row, settling)
             stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return [stage], settling.gatherings
-        latest = self._exchange.latest
+        latest = bool(self._exchange.groups)
         found = schedule(self._plan, self.sequence, instances, row, self._solved, latest=latest)
         own = [gather for ring in self._solved for gather in ring.gatherings]
         return found, [stage.gather for stage in found] + own
@@ -311,7 +321,7 @@ class Coupling:
             # Where outputs are computed in steps only, the second one has them right.
             return self._rings
         reasons: dict[str, str] = {}
-        if coupling == DELAY or self._exchange.latest:
+        if coupling == DELAY or self._exchange.groups:
             reasons = dict.fromkeys(system.components, "")
         else:
             for ring in self._rings:
@@ -331,8 +341,8 @@ class Coupling:
         return Ring(names, self._system, self._instances, self._row)
 
     def _in_stages(self, order: Order, solved: Sequence[Ring]) -> list[list[str]]:
-        if self._exchange.latest and not isinstance(order, str):
-            return [[name] for name in order]
+        if self._exchange.groups and not isinstance(order, str):
+            return [[*group] for group in self._exchange.groups]
         return stages(self._system, order, [ring.names for ring in solved])
 
     def _settling(self, solved: Sequence[Ring]) -> _Settling:

@@ -19,6 +19,11 @@ ORDERS = GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
 #: One of these, or the names of all components, one stepped after the other.
 Order: TypeAlias = str | Sequence[str]
 
+#: What components have at their inputs in the first step: outputs that were exchanged in
+#: initialisation mode, outputs that were exchanged after it, or start values and zeros. The first
+#: is what we do.
+INITIAL = FULL, NONE, ZERO = "full", "none", "zero"
+
 #: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
 #: inputs that change linearly from one communication point to the next.
 COUPLINGS = SOLVE, DELAY, LINEAR = "solve", "delay", "linear"
@@ -47,16 +52,15 @@ class Exchange(NamedTuple):
     """How values are exchanged; not every tool does it as we do, which is the default.
 
     Attributes:
-        at_start: whether outputs are handed on in initialisation mode; else inputs are what they
-            are in the FMUs until the first step.
-        latest: whether components in an order by names take all outputs of those before them as
-            they have just computed them, not only what follows directly from their inputs; rings
-            are then delayed.
+        initial: one of :data:`INITIAL`.
+        groups: all components, those of a group stepped side by side; each group takes all outputs
+            of the groups before it as they have just computed them, not only what follows directly
+            from their inputs, and rings are delayed. Empty: as the experiment has it.
 
     """
 
-    at_start: bool = True
-    latest: bool = False
+    initial: str = FULL
+    groups: Sequence[Sequence[str]] = ()
 
 
 #: As we do it.

@@ -77,7 +77,7 @@ def simulate_plan(
                 experiment,
                 _parameters(system, instances, log),
                 stepping.name,
-                dict.fromkeys(map(str, row.text_ports), row.strings),
+                {str(port): standing for port, standing in row.standing.items()},
                 _units(system, row.columns),
             )
         scheduled, gatherings = coupling.schedule()

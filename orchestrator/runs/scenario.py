@@ -23,7 +23,7 @@ from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, file_name, flatten, port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import finite, type_of, typed
+from orchestrator.system.values import EXACT, finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
@@ -248,6 +248,8 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
     is_real = type_of(variable) == "Real"
+    if type_of(variable) == "Integer" and abs(column).max() > EXACT:
+        raise InputError(f"{target}: a table holds integers up to 2^53 only")
     for value in (column.min(), column.max()) if is_real else np.unique(column):
         typed(str(target), variable, _number(value))
 

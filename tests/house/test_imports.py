@@ -41,6 +41,9 @@ ALLOWED = {
     },
 }  # fmt: skip
 
+#: What runs in environments of other tools, and imports nothing of ours.
+FOREIGN = ("exchange", "hosts", "drivers")
+
 #: What else may be imported of `fmus`: how FMUs run, and PythonFMU, stays out of the process.
 DECLARED = re.compile(r"fmus\.(compilers|kinds|discovery|ports|\w+\.(ports|behaviour))(\.|$)")
 
@@ -100,7 +103,10 @@ def test_packages_import_what_they_may(package):
         if package == "auv_fmu" and name[:1] == ("proof",):
             allowed = allowed | {"numpy"}
         for imported in imports(path):
-            assert imported[0] in allowed, f"{path} imports {imported[0]}"
+            if name == FOREIGN:
+                assert imported[0] not in ALLOWED, f"{path} imports {imported[0]}"
+            else:
+                assert imported[0] in allowed, f"{path} imports {imported[0]}"
 
 
 @pytest.mark.parametrize("package", FLOORS)

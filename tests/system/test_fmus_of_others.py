@@ -192,7 +192,7 @@ def test_a_step_that_goes_on_after_its_call_is_waited_for(tmp_path, way):
 
 def test_a_step_that_should_have_ended_with_its_call_is_a_failure(tmp_path):
     table = run(system_of(build(tmp_path, "WAITS")))
-    assert mentions(table.failure, "a: fmi2DoStep description")
+    assert mentions(table.failure, "a: doStep description")
 
 
 def test_a_description_that_is_not_valid_is_a_note_where_it_does_no_harm(tmp_path):

@@ -6,18 +6,26 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from fmus.compilers import machines_compiler
-from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.commands import exchange
+from orchestrator.commands.main import main
+from orchestrator.exchange.hosts import comparison, here
+from orchestrator.exchange.hosts.comparison import HOSTS, Host, compare
+from orchestrator.exchange.hosts.environments import folder_of, is_whole
 from orchestrator.exchange.verify import verify
 from orchestrator.formats.ssp.writer import structure_xml
+from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
+from orchestrator.system.component import WRITABLE
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.tiers import slow
@@ -25,24 +33,43 @@ from support.tiers import slow
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 
 
-def check(system: System, host: str, steps: int) -> None:
+#: Hosts beside this program, and hosts with environments of their own.
+BESIDE = [name for name, host in HOSTS.items() if not host.pins]
+APART = [name for name, host in HOSTS.items() if host.pins]
+
+#: Hosts that apply no parameters; drivers pass none on.
+WITHOUT_PARAMETERS = ["fmpy", "fmpy-ssp"]
+
+
+def check(system: System, host: str, steps: int, reference: System | None = None) -> None:
     """Hold all Real outputs of a host against ours; without the host the test is skipped."""
-    if find_spec(HOSTS[host].package) is None:
+    if host == "c-program" and machines_compiler() is None:
+        pytest.skip("there is no C compiler")
+    pins = HOSTS[host].pins
+    if HOSTS[host].label() is None or (pins and not is_whole(folder_of(pins))):
         pytest.skip(f"{HOSTS[host].package} is not installed")
-    [verdict] = compare(system, [host], steps, 0.02)
+    [verdict] = compare(system, [host], steps, 0.02, reference=reference)
     assert verdict.failure is None
-    assert verdict.deviation <= HOSTS[host].bound
+    assert verdict.deviation <= 1e-9
 
 
 @pytest.mark.parametrize("scenario", ["fig4", *slow("fig5-pd")])
-@pytest.mark.parametrize("host", HOSTS)
-def test_host_gives_the_numbers_of_our_jacobi_master(dist: Path, host: str, scenario: str):
-    """Every Real output over 500 steps, to 1e-9; fmpy.ssp ignores parameters, so fig4 only."""
-    if host == "c-program" and machines_compiler() is None:
-        pytest.skip("there is no C compiler")
-    if host == "fmpy-ssp" and scenario != "fig4":
-        pytest.skip("fmpy.ssp ignores parameter sets")
+@pytest.mark.parametrize("host", [*BESIDE, *slow(*APART)])
+def test_host_gives_the_numbers_of_our_master_in_its_order(dist: Path, host: str, scenario: str):
+    """Every Real output over 500 steps."""
+    if scenario != "fig4" and host in (*WITHOUT_PARAMETERS, *APART):
+        pytest.skip("it applies no parameters")
     check(closed_loop(dist, read_scenario(scenario)), host, 500)
+
+
+@pytest.mark.parametrize(
+    "host",
+    ["fmpy", *slow(*(name for name, host in HOSTS.items() if "3" in host.fmi and name != "fmpy"))],
+)
+def test_host_gives_the_same_numbers_with_fmi_3(native: Path, dist3: Path, host: str):
+    """Every Real output over 500 steps, against our run of the FMUs of FMI 2.0."""
+    system = closed_loop(dist3, read_scenario("fig4"), versions=WRITABLE)
+    check(system, host, 500, closed_loop(native, read_scenario("fig4")))
 
 
 @pytest.mark.parametrize("host", ["libcosim-ssp", *slow("ecos")])
@@ -60,12 +87,10 @@ def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str)
 
 
 @pytest.mark.parametrize(
-    "host", ["c-program", *slow(*(name for name in HOSTS if name not in ("c-program", "ecos")))]
+    "host", ["c-program", *slow("libcosim-ssp", "libcosim-osp", "container", "fmpy-ssp")]
 )
 def test_a_start_time_reaches_the_host(dist: Path, host: str):
     """The disturbance (56) is a function of the time."""
-    if host == "c-program" and machines_compiler() is None:
-        pytest.skip("there is no C compiler")
     check(replace(closed_loop(dist), start_time=10.0), host, 300)
 
 
@@ -75,14 +100,70 @@ def test_ecos_refuses_a_start_time(dist: Path):
     assert "from 10 s" in str(verdict.failure)
 
 
+@pytest.mark.parametrize("host", WITHOUT_PARAMETERS)
+def test_host_that_applies_no_parameters_refuses_them(dist: Path, host: str):
+    system = closed_loop(dist).with_parameters({PortName("plant", "noise.std"): 0.5})
+    [verdict] = compare(system, [host], 3, 0.02)
+    assert "plant.noise.std is 0.5" in str(verdict.failure)
+
+
+@pytest.mark.parametrize(
+    ("changed", "what"),
+    [({"start_time": 10.0}, "start time"), ({"steps": {"controller": 0.06}}, "longer steps")],
+)
+def test_driver_refuses_what_it_does_not_pass_on(dist: Path, changed: dict[str, Any], what: str):
+    [verdict] = compare(replace(closed_loop(dist), **changed), ["fmpy"], 3, 0.02)
+    assert what in str(verdict.failure)
+
+
 def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkeypatch):
-    monkeypatch.setitem(
-        HOSTS, "ghost", HOSTS["ecos"].__class__("no-such-package", HOSTS["ecos"].run)
-    )
-    system = closed_loop(dist)
-    verdicts = compare(system, ["ghost", "fmpy-ssp"], 50, 0.02)
+    monkeypatch.setitem(HOSTS, "ghost", Host("no-such-package", here.ecos))
+    verdicts = list(compare(closed_loop(dist), ["ghost", "fmpy-ssp"], 50, 0.02))
     assert "not installed" in str(verdicts[0].failure)
     assert verdicts[1].failure is None
+
+
+def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
+    """One that cannot be installed does not end the others."""
+
+    def python(pins: Sequence[str]) -> Path:
+        if pins == ["fmpy==1"]:
+            raise InputError("no such version")
+        return Path(sys.executable)
+
+    monkeypatch.setattr(comparison, "python_with", python)
+    for pin in ("fmpy==1", "fmpy==2"):
+        monkeypatch.setitem(HOSTS, pin, replace(HOSTS["fmpy"], pins=[pin]))
+    told: list[str] = []
+    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, told=told.append))
+    assert [verdict.failure for verdict in verdicts] == ["no such version", None]
+    assert [verdict.package for verdict in verdicts] == ["fmpy 1", "fmpy 2"]
+    assert verdicts[1].deviation <= 1e-9
+    assert len(told) == 2 and "fmpy 2" in told[1]
+
+
+@pytest.mark.parametrize(
+    ("options", "expected"),
+    [
+        ("", BESIDE),
+        ("--all", [*HOSTS]),
+        ("sofirpy ecos", ["sofirpy", "ecos"]),
+        ("--kind native --fmi 3", ["ecos", "container", "fmpy"]),
+    ],
+)
+def test_hosts_apart_are_run_where_they_are_asked_for(
+    dist: Path, monkeypatch, options: str, expected: list[str]
+):
+    asked: list[str] = []
+    monkeypatch.setattr(exchange, "compare", lambda _, hosts, *__, **___: asked.extend(hosts) or [])
+    assert main(["hosts", *options.split()]) == 0
+    assert asked == expected
+
+
+def test_version_of_fmi_that_a_host_does_not_run_is_said(dist3: Path, native: Path):
+    system = closed_loop(dist3, versions=WRITABLE)
+    [verdict] = compare(system, ["sofirpy"], 3, 0.02, reference=closed_loop(native))
+    assert "FMI 3.0" in str(verdict.failure)
 
 
 @pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")

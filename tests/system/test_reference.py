@@ -14,6 +14,7 @@ from fmus.discovery import REFERENCE, components, package_folder
 from orchestrator.commands.main import main
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import INITIAL
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -84,7 +85,7 @@ class OtherTool:
     """A plain loop: it steps one group of components after the other, with whatever is there.
 
     At the start it exchanges what is there (full), nothing (none), or less than that, as one that
-    begins with zeros (zeros).
+    begins with zeros (zero).
     """
 
     def __init__(self, system: System, initial: str) -> None:
@@ -115,7 +116,7 @@ class OtherTool:
         for name, slave in self.slaves.items():
             slave.exitInitializationMode()
             self.read(name)
-        if initial == "zeros":
+        if initial == "zero":
             self.values = dict.fromkeys(self.values, 0.0)
 
     def read(self, name: str) -> None:
@@ -146,21 +147,24 @@ class OtherTool:
         path.write_text("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]))
 
 
-@pytest.mark.parametrize("initial", ["full", "none"])
-@pytest.mark.parametrize("order", [ORDER, ("planner", *ORDER[:3]), ("plant", *ORDER[:0:-1])])
+@pytest.mark.parametrize("initial", INITIAL)
+@pytest.mark.parametrize(
+    "order",
+    [ORDER, ("planner", *ORDER[:3]), ("plant", *ORDER[:0:-1]), ("planner", "+".join(ORDER[:3]))],
+)
 def test_table_of_a_tool_with_an_order_of_its_own_is_certified(
     native: Path, tmp_path: Path, order: tuple[str, ...], initial: str
 ):
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool = OtherTool(system, initial)
-    tool.write(path, tool.rows([[name] for name in order]))
-    said = verify(path, system, 1e-12, order, at_start=initial == "full")
+    tool.write(path, tool.rows([name.split("+") for name in order]))
+    said = verify(path, system, 1e-12, order, initial=initial)
     compared, *_ = said.splitlines()
     assert numbers_in(compared)[:6] == [66, 70, 1e-12, 200, 0.02, 4]
     assert ",".join(order) in compared
     assert compared.endswith("outputs") == (initial == "full")
-    others = ({}, {"order": order, "at_start": initial != "full"}, {"order": OTHER_ORDER})
-    for asked in others:
+    other = "none" if initial == "full" else "full"
+    for asked in ({}, {"order": order, "initial": other}, {"order": OTHER_ORDER}):
         with pytest.raises(InputError, match="differs"):
             verify(path, system, 1e-9, **asked)
 
@@ -171,7 +175,7 @@ def test_table_of_a_tool_without_an_exchange_at_the_start_is_certified(
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool = OtherTool(system, "none")
     tool.write(path, tool.rows([ORDER]))
-    assert "jacobi" in verify(path, system, 1e-12, at_start=False)
+    assert "jacobi" in verify(path, system, 1e-12, initial="none")
     options = ["verify", str(path), "--tolerance", "1e-12"]
     assert main([*options, "--initial", "none", "--order", "jacobi"]) == 0
     assert main([*options, "--initial", "none", "--order", "gauss-seidel"]) == 2
@@ -188,9 +192,9 @@ def test_host_without_initial_exchange_ends_where_the_others_end(native: Path):
         return np.array([tool.values["plant", f"eta.{axis}"] for axis in "xyz"])
 
     with_exchange = end("full")
-    assert np.abs(end("zeros") - with_exchange).max() < 1e-3
+    assert np.abs(end("zero") - with_exchange).max() < 1e-3
     # The gate is what makes the difference.
-    assert np.abs(end("zeros", innovation_gate=0.0) - with_exchange).max() > 1e-2
+    assert np.abs(end("zero", innovation_gate=0.0) - with_exchange).max() > 1e-2
 
 
 def test_order_that_names_no_component_or_not_all_is_refused(system: System):

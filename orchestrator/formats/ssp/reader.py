@@ -283,6 +283,9 @@ class _Ports:
         component, connector = leaf.component, leaf.connector(port.port)
         if component is None or connector is None:
             return
+        if connector.causality == "structuralParameter":
+            self._keep_size(port, component, given.text)
+            return
         if not component.is_settable(port.port):
             self._archive.note(
                 f"{port}: is of causality {connector.causality} and cannot be set; the value that "
@@ -296,6 +299,11 @@ class _Ports:
         if isinstance(value, float) and value.is_integer() and connector.type != "Real":
             value = int(value)
         self.parameters[port] = typed(str(port), component.variable(port.port), value)
+
+    def _keep_size(self, port: PortName, component: Component, text: str) -> None:
+        """Refuse another size of arrays than the one that their FMU describes."""
+        if typed(str(port), component.variable(port.port), text) != component.start(port.port):
+            raise InputError(f"{port} = {shortened(text)}: sizes of arrays cannot be changed")
 
 
 def _number(port: PortName, text: str) -> float:

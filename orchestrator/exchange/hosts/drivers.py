@@ -1,8 +1,8 @@
-"""Runs four FMUs in another tool: `python drivers.py HOST JOB.json ROWS.csv`.
+"""Tools in environments of their own: `python drivers.py FUNCTION JOB.json ROWS.csv`.
 
-It is run by the Python of the tool's own environment, so it imports that tool, what comes with it
-and the standard library. JOB names the FMUs, the wires, the steps and the outputs that are wanted;
-into ROWS go the seconds that the steps took, and the wanted outputs after every step.
+It is run by the Python of such an environment, so it imports one tool and the standard library. JOB
+names the FMUs, the wires, the steps and the outputs that are wanted; into ROWS go the seconds that
+the steps took, and the wanted outputs after every step.
 """
 
 # ruff: noqa: PLC0415 - only one of the tools is there
@@ -18,11 +18,18 @@ from fractions import Fraction
 from itertools import count
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-Rows = list[list[float]]
+#: The name of a job in its folder.
+JOB = "job.json"
+
+#: Wanted outputs after every step.
+Rows = Sequence[Sequence[float]]
+
+#: These, and the seconds of the steps.
+Result = tuple[Rows, float]
 
 
 class Job:
@@ -54,7 +61,7 @@ class Job:
         return list(dict.fromkeys(port for owner, port in used if owner == name))
 
 
-def sofirpy(job: Job) -> tuple[Rows, float]:
+def sofirpy(job: Job) -> Result:
     """`simulate`, which logs at the start, and after every step."""
     from sofirpy import simulate
 
@@ -81,7 +88,7 @@ def sofirpy(job: Job) -> tuple[Rows, float]:
     return table[[f"{name}.{port}" for name, port in job.wanted]].values.tolist()[1:], seconds
 
 
-def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> tuple[Rows, float]:
+def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> Result:
     """A `System` of `FMUComponent`s, which keep their histories, the start with them."""
     from syssimx import Connection, System
     from syssimx.components.fmu import FMUComponent
@@ -102,12 +109,12 @@ def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> tuple[Rows, float]:
     return [list(row) for row in zip(*columns, strict=True)][1 : job.steps + 1], seconds
 
 
-def syssimx_gauss_seidel(job: Job) -> tuple[Rows, float]:
+def syssimx_gauss_seidel(job: Job) -> Result:
     """The same in the order that the tool takes if it is given none."""
     return syssimx(job, "GaussSeidelAlgorithm")
 
 
-def gemseo_fmu(job: Job) -> tuple[Rows, float]:
+def gemseo_fmu(job: Job) -> Result:
     """A `TimeSteppingSystem`, which couples by equal names.
 
     So every discipline is told its ports: some outputs and parameters have one name in several
@@ -138,7 +145,7 @@ def gemseo_fmu(job: Job) -> tuple[Rows, float]:
     return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
 
 
-def pathsim_fmi(job: Job) -> tuple[Rows, float]:
+def pathsim_fmi(job: Job) -> Result:
     """A block for each FMU, and a `Scope`."""
     from pathsim import Connection, Simulation
     from pathsim.blocks import Scope
@@ -165,7 +172,7 @@ def pathsim_fmi(job: Job) -> tuple[Rows, float]:
     return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
 
 
-def cofmupy(job: Job) -> tuple[Rows, float]:
+def cofmupy(job: Job) -> Result:
     """A `Coordinator`, as its configuration is without a word about the method: Jacobi."""
     from cofmupy import Coordinator
 
@@ -190,7 +197,7 @@ def cofmupy(job: Job) -> tuple[Rows, float]:
     return [[float(x) for x in row] for row in zip(*columns, strict=True)], seconds
 
 
-def sdf4sim(job: Job) -> tuple[Rows, float]:
+def sdf4sim(job: Job) -> Result:
     """A graph of the tool's agents, with an initial token of zero on every wire.
 
     Its agent of an FMU needs an input, so what has none gets an agent of ours, as does what
@@ -200,7 +207,7 @@ def sdf4sim(job: Job) -> tuple[Rows, float]:
 
     step = Fraction(job.step).limit_denominator(10**6)
 
-    class Source(sdf.Agent):
+    class Source(sdf.Agent):  # type: ignore[misc]
         """An FMU without inputs, stepped as `cs.Simulator` steps the others."""
 
         def __init__(self, slave: Any) -> None:
@@ -221,7 +228,7 @@ def sdf4sim(job: Job) -> tuple[Rows, float]:
             values = self.fmu.getReal(list(self.numbers.values()))
             return {name: [value] for name, value in zip(self.numbers, values, strict=True)}
 
-    class Sink(sdf.Agent):
+    class Sink(sdf.Agent):  # type: ignore[misc]
         """Takes what is wanted; the tool's results keep it."""
 
         @property
@@ -253,81 +260,151 @@ def sdf4sim(job: Job) -> tuple[Rows, float]:
     return [list(row) for row in zip(*(results[sink] for sink in sinks), strict=True)], seconds
 
 
-class Loaded:
-    """A slave of fmuloader in initialisation mode, the same for both versions of FMI."""
+def pycosimlibrary(job: Job) -> Result:
+    """A `JacobiRunner`, which keeps a snapshot at the start and after every step."""
+    from PyCosimLibrary.jacobi_runner import JacobiRunner
+    from PyCosimLibrary.loader import FMULoader
+    from PyCosimLibrary.scenario import Connection as Wire
+    from PyCosimLibrary.scenario import CosimScenario, OutputConnection, SignalType, VarType
 
-    def __init__(self, name: str, path: str, identifier: str, attributes: dict[str, str]) -> None:
-        self.fmu: Any
-        self.get: Callable[[Sequence[int]], list[float]]
-        if attributes["fmiVersion"].startswith("3"):
+    loaded = {name: FMULoader.load(path, name, None) for name, path in job.fmus.items()}
+    for one in loaded.values():
+        one.fmu.instantiate()
+    real = {"value_type": VarType.REAL, "signal_type": SignalType.CONTINUOUS}
+
+    def end(side: str, name: str, port: str) -> dict[str, Any]:
+        numbers = [loaded[name].vars[port].valueReference]
+        return {f"{side}_fmu": loaded[name].fmu, f"{side}_vr": numbers}
+
+    scenario = CosimScenario(
+        fmus=[one.fmu for one in loaded.values()],
+        connections=[
+            Wire(**real, **end("source", *source), **end("target", *target))
+            for source, target in job.wires
+        ],
+        outputs=[OutputConnection(**real, **end("source", *port)) for port in job.wanted],
+        step_size=job.step,
+        stop_time=job.steps * job.step,
+        print_interval=job.step,
+    )
+    begin = perf_counter()
+    signals = JacobiRunner().run_cosim(scenario, None).out_signals
+    seconds = perf_counter() - begin
+    columns = [signals[name][loaded[name].vars[port].valueReference] for name, port in job.wanted]
+    return [list(row) for row in zip(*columns, strict=True)][1:], seconds
+
+
+class Slave(NamedTuple):
+    """An FMU in initialisation mode, the same for both versions of FMI.
+
+    Attributes:
+        numbers: value references of its variables.
+        get, set: its numbers, by value references.
+        go: ends initialisation mode.
+        step: from a time, for a length [s].
+
+    """
+
+    numbers: dict[str, int]
+    get: Callable[[list[int]], list[float]]
+    set: Callable[[list[int], list[float]], object]
+    go: Callable[[], object]
+    step: Callable[[float, float], object]
+
+
+def fmuloader(job: Job) -> Result:
+    """Its slaves: it loads FMUs, and has no master."""
+
+    def loaded(name: str, path: str) -> Slave:
+        with ZipFile(path) as archive:
+            root: Any = ElementTree.fromstring(archive.read("modelDescription.xml"))
+        identifier = root.find("CoSimulation").attrib["modelIdentifier"]
+        fmu: Any
+        if root.attrib["fmiVersion"].startswith("3"):
             from fmuloader.fmi3 import Fmi3Slave
 
-            self.fmu = Fmi3Slave(path, model_identifier=identifier)
-            token = attributes["instantiationToken"]
-            self.fmu.instantiate_co_simulation(name, instantiation_token=token)
-            self.get, self.set = self.fmu.get_float64, self.fmu.set_float64
+            fmu = Fmi3Slave(path, model_identifier=identifier)
+            token = root.attrib["instantiationToken"]
+            fmu.instantiate_co_simulation(name, instantiation_token=token)
+            access = fmu.get_float64, fmu.set_float64
         else:
             from fmuloader.fmi2 import Fmi2Slave, Fmi2Type
 
-            self.fmu = Fmi2Slave(path, model_identifier=identifier)
-            self.fmu.instantiate(name, Fmi2Type.CO_SIMULATION, guid=attributes["guid"])
-            self.fmu.setup_experiment(start_time=0.0)
-            self.get, self.set = self.fmu.get_real, self.fmu.set_real
-        self.fmu.enter_initialization_mode()
+            fmu = Fmi2Slave(path, model_identifier=identifier)
+            fmu.instantiate(name, Fmi2Type.CO_SIMULATION, guid=root.attrib["guid"])
+            fmu.setup_experiment(start_time=0.0)
+            access = fmu.get_real, fmu.set_real
+        fmu.enter_initialization_mode()
+        variables = [v.attrib for v in root.find("ModelVariables")]
+        numbers = {v["name"]: int(v["valueReference"]) for v in variables}
+        return Slave(numbers, *access, fmu.exit_initialization_mode, fmu.do_step)
+
+    return _by_hand(job, loaded)
 
 
-def fmuloader(job: Job) -> tuple[Rows, float]:
-    """Its slaves, stepped by a loop of ours: it loads FMUs, and has no master."""
-    slaves, numbers = {}, {}
-    for name, path in job.fmus.items():
-        with ZipFile(path) as archive:
-            root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-        identifier = root.find("CoSimulation").attrib["modelIdentifier"]
-        variables = root.find("ModelVariables")
-        numbers[name] = {v.attrib["name"]: int(v.attrib["valueReference"]) for v in variables}
-        slaves[name] = Loaded(name, path, identifier, root.attrib)
+def fmpy_slaves(job: Job) -> Result:
+    """Its slaves, of which each is an FMU with the functions of FMI."""
+    from fmpy import extract, instantiate_fmu, read_model_description
+
+    def loaded(name: str, path: str) -> Slave:
+        folder = extract(path)
+        description = read_model_description(folder)
+        fmu = instantiate_fmu(folder, description, "CoSimulation")
+        if description.fmiVersion.startswith("3"):
+            access = fmu.getFloat64, fmu.setFloat64
+            fmu.enterInitializationMode(startTime=0.0)
+        else:
+            access = fmu.getReal, fmu.setReal
+            fmu.setupExperiment(startTime=0.0)
+            fmu.enterInitializationMode()
+        numbers = {v.name: v.valueReference for v in description.modelVariables}
+        return Slave(numbers, *access, fmu.exitInitializationMode, fmu.doStep)
+
+    return _by_hand(job, loaded)
+
+
+def _by_hand(job: Job, loaded: Callable[[str, str], Slave]) -> Result:
+    """Slaves of a tool without a master, stepped side by side by a loop of ours."""
+    slaves = {name: loaded(name, path) for name, path in job.fmus.items()}
     values = dict.fromkeys((source for source, _ in job.wires), 0.0)
 
     def give() -> None:
         for name, slave in slaves.items():
             ports = job.outputs(name)
-            read = slave.get([numbers[name][port] for port in ports])
+            read = slave.get([slave.numbers[port] for port in ports])
             values.update({(name, port): value for port, value in zip(ports, read, strict=True)})
 
     def take() -> None:
         for name, slave in slaves.items():
             fed = [(source, port) for source, (owner, port) in job.wires if owner == name]
             if fed:
-                slave.set([numbers[name][port] for _, port in fed], [values[s] for s, _ in fed])
+                slave.set([slave.numbers[port] for _, port in fed], [values[s] for s, _ in fed])
 
     for _ in slaves:
         give()
         take()
     for slave in slaves.values():
-        slave.fmu.exit_initialization_mode()
+        slave.go()
     give()
     rows = []
     begin = perf_counter()
     for k in range(job.steps):
         take()
         for slave in slaves.values():
-            slave.fmu.do_step(k * job.step, job.step)
+            slave.step(k * job.step, job.step)
         give()
         rows.append([values[port] for port in job.wanted])
     return rows, perf_counter() - begin
 
 
-def main() -> None:
-    """Run one job, and write its rows."""
-    host, job, table = sys.argv[1:]
-    run: Callable[[Job], tuple[Rows, float]] = globals()[host]
-    try:
-        rows, seconds = run(Job(json.loads(Path(job).read_text(encoding="utf-8"))))
-    except Exception as error:
-        sys.exit(f"reason: {type(error).__name__}: {' '.join(str(error).split())}")
-    with Path(table).open("w", encoding="utf-8", newline="") as lines:
-        csv.writer(lines).writerows([[seconds], *rows])
+def write_rows(path: Path, rows: Rows, *seconds: float) -> None:
+    """Write what a host took, and its rows."""
+    with path.open("w", encoding="utf-8", newline="") as lines:
+        csv.writer(lines).writerows([seconds, *rows])
 
 
 if __name__ == "__main__":
-    main()
+    run: Callable[[Job], Result] = globals()[sys.argv[1]]
+    found, taken = run(Job(json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))))
+    # They keep their rows themselves: nothing is read after the steps.
+    write_rows(Path(sys.argv[3]), found, taken, 0.0)

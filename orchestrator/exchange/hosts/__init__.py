@@ -1,0 +1,1 @@
+"""Hosts of others: what runs the bundle in them, and where they are installed."""

@@ -1,0 +1,210 @@
+"""Tools that are installed beside this program, each run in a separate process.
+
+`python -m orchestrator.exchange.hosts.here TOOL FOLDER` does it: some leave threads running or end
+the process when something is wrong.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import pickle
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import fmpy
+import numpy as np
+from fmpy.ssp.simulation import simulate_ssp
+
+from orchestrator.exchange import c_host
+from orchestrator.exchange.hosts.drivers import write_rows
+from orchestrator.formats.osp_and_container import write_container, write_osp
+from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import Experiment
+from orchestrator.system.structure import System
+
+#: In the folder: what is run, and where files for the tool go.
+GIVEN, _EXPORT = "given", "export"
+
+#: In the folder: what came of it.
+ROWS = "rows.csv"
+
+#: What both versions of FMI call a floating-point number.
+_NUMBERS = ("Real", "Float64")
+
+
+class Ran(NamedTuple):
+    """A run in a host.
+
+    Attributes:
+        rows: of all Real outputs, one a step.
+        seconds: that the steps have taken.
+        reading: what it took to read the rows, where the tool does not record them itself.
+
+    """
+
+    rows: np.ndarray
+    seconds: float
+    reading: float = 0.0
+
+
+def real_outputs(system: System) -> list[tuple[str, str, int]]:
+    """Component, port and value reference of every Real output."""
+    return [
+        (component.name, variable.name, variable.valueReference)
+        for component in system.components.values()
+        for variable in component.having("output")
+        if variable.type in _NUMBERS
+    ]
+
+
+def fmi_of(system: System) -> str:
+    """The newest version of FMI that FMUs of a system have."""
+    return max(str(one.description.fmiVersion) for one in system.components.values())
+
+
+def check_parameters(system: System, host: str) -> None:
+    """Check that parameters are what they are in the FMUs, for hosts that apply none.
+
+    Raises:
+        InputError: one is not.
+
+    """
+    for name, value in system.parameters.items():
+        if system.components[name.component].starts.get(name.port) != value:
+            raise InputError(f"{host} applies no parameters, and {name} is {value} here")
+
+
+def _names(system: System, between: str = ".") -> list[str]:
+    """Names of all Real outputs, as tools write them."""
+    return [f"{component}{between}{port}" for component, port, _ in real_outputs(system)]
+
+
+def _stepped(
+    step: Callable[[], object], read: Callable[[], list[float]], experiment: Experiment
+) -> Ran:
+    """Step a tool that is read after each step."""
+    rows, seconds, reading = [], 0.0, 0.0
+    for _ in range(experiment.rows - 1):
+        start = perf_counter()
+        step()
+        stepped = perf_counter()
+        rows.append(read())
+        seconds += stepped - start
+        reading += perf_counter() - stepped
+    return Ran(np.array(rows), seconds, reading)
+
+
+def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) -> Ran:
+    from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
+    from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
+    from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
+
+    log_output_level(CosimLogLevel.ERROR)
+    execution = getattr(CosimExecution, opener)(**path)
+    observer = CosimObserver.create_last_value()
+    execution.add_observer(observer=observer)
+    references: dict[str, list[int]] = {}
+    for component, _, reference in real_outputs(system):
+        references.setdefault(component, []).append(reference)
+    index = {name: execution.slave_index_from_instance_name(name) for name in references}
+
+    def one() -> None:
+        if not execution.step():
+            raise InputError("libcosim ended the run")
+
+    def read() -> list[float]:
+        return [
+            value
+            for name, wanted in references.items()
+            for value in observer.last_real_values(index[name], wanted)
+        ]
+
+    return _stepped(one, read, experiment)
+
+
+def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
+    [path] = write_ssp(system, folder)
+    return _libcosim(system, experiment, "from_ssp_file", ssp_path=str(path))
+
+
+def libcosim_osp(system: System, experiment: Experiment, folder: Path) -> Ran:
+    write_osp(system, folder)
+    return _libcosim(system, experiment, "from_osp_config_file", osp_path=str(folder))
+
+
+def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
+    if experiment.start_time != 0.0:
+        # It tells the FMUs a start time, and then steps them from 0 s.
+        raise InputError(f"ecos runs from 0 s only, not from {experiment.start_time:g} s")
+    # ecospy needs libtbb, which the wheel tbb puts where the loader does not look.
+    for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
+        ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
+    ecospy = importlib.import_module("ecospy")
+    names = _names(system, "::")
+    parameter_set = {"parameter_set": PARAMETER_SET} if system.parameters else {}
+    with _ecos_simulation(ecospy, system, experiment, folder) as simulation:
+        simulation.init(**parameter_set)
+        return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], experiment)
+
+
+def _ecos_simulation(ecospy: Any, system: System, experiment: Experiment, folder: Path) -> Any:
+    """A simulation of ecos: it reads no SSP 2.0, so with FMI 3.0 its calls say what is in one."""
+    if fmi_of(system) == "2.0":
+        [path] = write_ssp(system, folder)
+        return ecospy.EcosSimulation(experiment.step, ssp_path=str(path))
+    structure = ecospy.EcosSimulationStructure()
+    for name, component in system.components.items():
+        structure.add_model(name, component.fmu)
+    for wire in system.connections:
+        source, target = (f"{end.component}::{end.port}" for end in (wire.source, wire.target))
+        structure.make_real_connection(source, target)
+    values = {f"{name.component}::{name.port}": x for name, x in system.parameters.items()}
+    structure.add_parameter_set(PARAMETER_SET, values)
+    return ecospy.EcosSimulation(experiment.step, structure=structure)
+
+
+def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
+    check_parameters(system, "fmpy.ssp")
+    [path] = write_ssp(system, folder)
+    start_time, step = experiment.start_time, experiment.step
+    start = perf_counter()
+    # It accumulates its time, so the last step may be there or not: ask for half a step more.
+    table = simulate_ssp(str(path), start_time, experiment.stop_time + 0.5 * step, step)
+    seconds = perf_counter() - start
+    # Its row at a time has the outputs of the step that begins there.
+    rows = np.column_stack([table[name] for name in _names(system)])
+    return Ran(rows[: experiment.rows - 1], seconds)
+
+
+def container(system: System, experiment: Experiment, folder: Path) -> Ran:
+    [path] = write_container(system, folder)
+    start = perf_counter()
+    table = fmpy.simulate_fmu(
+        str(path),
+        start_time=experiment.start_time,
+        stop_time=experiment.stop_time,
+        step_size=experiment.step,
+        output_interval=experiment.step,
+    )
+    seconds = perf_counter() - start
+    return Ran(np.column_stack([table[name] for name in _names(system)])[1:], seconds)
+
+
+def c_program(system: System, experiment: Experiment, folder: Path) -> Ran:
+    program = c_host.compile_host(folder, system, experiment)
+    rows, seconds = c_host.run_host([program], folder, experiment.rows - 1, _names(system))
+    return Ran(rows[1:], seconds)
+
+
+if __name__ == "__main__":
+    run: Callable[[System, Experiment, Path], Ran] = globals()[sys.argv[1]]
+    folder = Path(sys.argv[2])
+    (folder / _EXPORT).mkdir()
+    system, experiment = pickle.loads((folder / GIVEN).read_bytes())
+    ran = run(system, experiment, folder / _EXPORT)
+    write_rows(folder / ROWS, ran.rows.tolist(), ran.seconds, ran.reading)
