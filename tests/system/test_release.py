@@ -25,7 +25,7 @@ from auv_fmu import __version__
 from fmus.kinds import FMI_VERSIONS, platforms
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.exchange.hosts import HOSTS, compare
+from orchestrator.exchange.hosts.comparison import HOSTS, compare
 from orchestrator.runs import bundle
 from orchestrator.runs.wiring import closed_loop
 from ready_wheel import write_wheel
