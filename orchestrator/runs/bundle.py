@@ -21,11 +21,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from fmus.compilers import compiler_for
 from fmus.discovery import fingerprint
-from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
+from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON, platforms
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
-from orchestrator.machine.children import find_fast_compiler, listen_to_module
+from orchestrator.machine.children import listen_to_module
 from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
@@ -218,8 +219,8 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
     """The folder with the FMUs of the installed sources, built if it is not there.
 
     Args:
-        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they are there or this machine
-            has a C compiler, else Python.
+        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they are there or can be
+            built, else Python.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
 
     Raises:
@@ -248,13 +249,16 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
 def _best_fmus(fmi: str) -> Path:
     if found := _kept(key_of(NATIVE, fmi)):
         return found
-    if find_fast_compiler():
-        try:
-            return current_fmus(NATIVE, fmi)
-        except InputError as error:
-            # The command may be there, and what it needs not.
-            warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
-    return current_fmus(PYTHON, fmi)
+    try:
+        compiler_for(platforms(fmi))
+    except (OSError, ValueError):
+        return current_fmus(PYTHON, fmi)
+    try:
+        return current_fmus(NATIVE, fmi)
+    except InputError as error:
+        # The command may be there, and what it needs not.
+        warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
+        return current_fmus(PYTHON, fmi)
 
 
 def key_of(kind: str, fmi: str) -> str:

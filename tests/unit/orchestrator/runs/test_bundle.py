@@ -87,8 +87,12 @@ def builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(bundle, "current_fmus", current_fmus.__wrapped__)
     monkeypatch.setattr(bundle, "run_fmus", run_fmus)
-    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: lambda *_: None)
+    monkeypatch.setattr(bundle, "compiler_for", lambda _: None)
     return built
+
+
+def none(_: object) -> None:
+    raise OSError("there is no C compiler")
 
 
 def auto() -> str:
@@ -97,12 +101,12 @@ def auto() -> str:
 
 def test_auto_builds_native_with_a_compiler_and_takes_it_afterwards_without(builds, monkeypatch):
     assert (auto(), builds) == ("native", ["native"])
-    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: None)
+    monkeypatch.setattr(bundle, "compiler_for", none)
     assert (auto(), builds) == ("native", ["native"])
 
 
 def test_auto_is_python_without_a_compiler(builds, monkeypatch):
-    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: None)
+    monkeypatch.setattr(bundle, "compiler_for", none)
     assert (auto(), builds) == ("python", ["python"])
 
 
