@@ -71,12 +71,13 @@ def run_module(
                 [sys.executable, "-P", "-m", __name__, module, *arguments],
                 stdin=end_of_child,
                 capture_output=True,
-                text=True,
+                encoding="utf-8",
                 errors="replace",
                 check=False,
                 cwd=folder,
                 timeout=timeout,
-                env=os.environ | {"TMPDIR": temporary},
+                # Windows would choose a code page, which has few letters for the names of files.
+                env=os.environ | {"TMPDIR": temporary, "PYTHONIOENCODING": "utf-8"},
             )
     finally:
         os.close(end_of_child)
