@@ -28,11 +28,13 @@ if sys.argv[1:2] == ["cc"] and "-target" not in sys.argv:
 with TemporaryDirectory() as temporary:
     status, said, script = (Path(temporary, name) for name in ("status", "said", "script"))
     there = shlex.quote(for_linux(temporary))
-    script.write_text(
-        f"{command} >{there}/said 2>&1\necho $? >{there}/new\nmv {there}/new {there}/status\n",
-        encoding="utf-8",
-        newline="\n",
+    lines = (
+        f"export TMPDIR={there}",
+        f"{command} >{there}/said 2>&1",
+        f"echo $? >{there}/new",
+        f"mv {there}/new {there}/status",
     )
+    script.write_text("\n".join(lines), encoding="utf-8", newline="\n")
     with suppress(OSError):
         # It runs, and has no handle.
         os.spawnv(os.P_NOWAIT, "Z:\\bin\\sh", ["sh", f"{there}/script"])

@@ -51,10 +51,16 @@ def show(*lines: object) -> None:
     """
     try:
         for line in lines:
-            print(escape_unprintable(str(line)))
+            print(_in_its_letters(sys.stdout, escape_unprintable(str(line))))
     except OSError as error:
         _give_up(sys.stdout, error)
         raise Unheard from error
+
+
+def _in_its_letters(stream: TextIO, text: str) -> str:
+    """A text with escapes for letters that a stream has not: Windows' code pages have few."""
+    encoding = stream.encoding or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def finished() -> bool:

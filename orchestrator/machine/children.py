@@ -81,7 +81,7 @@ def listen_to_module(
     """
     with (
         _tie() as tied,
-        TemporaryFile("w+", errors="replace") as complaints,
+        TemporaryFile("w+", encoding="utf-8", errors="replace") as complaints,
         Popen(_command(module, arguments), stdout=PIPE, stderr=complaints, **tied) as process,
     ):
         try:
@@ -109,8 +109,13 @@ def _tie() -> Iterator[dict[str, Any]]:
     end_of_child, end_of_ours = os.pipe()
     try:
         with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-            environment = os.environ | {"TMPDIR": temporary}
-            yield {"stdin": end_of_child, "text": True, "errors": "replace", "env": environment}
+            yield {
+                "stdin": end_of_child,
+                "encoding": "utf-8",
+                "errors": "replace",
+                # Windows would choose a code page, which has few letters for the names of files.
+                "env": os.environ | {"TMPDIR": temporary, "PYTHONIOENCODING": "utf-8"},
+            }
     finally:
         os.close(end_of_child)
         os.close(end_of_ours)

@@ -180,3 +180,25 @@ def test_no_modules_import_each_other():
             found = {".".join(part) for one in imports(path) for part in (one, one[:-1])}
             needs[name] = found & (names.keys() - {name})
         list(TopologicalSorter(needs).static_order())
+
+
+#: What tells one operating system from another, and the module of the orchestrator that may ask.
+ASKS = {("os", "name"), ("sys", "platform"), ("platform", "system"), ("sys", "getwindowsversion")}
+OPERATING_SYSTEM = ("machine", "operating_system")
+
+
+def test_one_module_asks_which_operating_system_there_is():
+    """What is below the orchestrator asks for itself: fmus.kinds, fmus.compilers, the loader."""
+    asking = {
+        name
+        for path, name in modules("orchestrator")
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
+        and (node.value.id, node.attr) in ASKS
+    }  # fmt: skip
+    assert asking == {OPERATING_SYSTEM}
+    for path, name in modules("orchestrator"):
+        assert not imports(path) & ASKS, f"{path} imports what only one module may ask"
+        if name != OPERATING_SYSTEM:
+            alone = {("fcntl",), ("msvcrt",), ("_winapi",), ("termios",)}
+            assert not imports(path) & alone, f"{path} imports what one system has"

@@ -6,10 +6,12 @@ import os
 import signal
 import subprocess
 import sys
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import pytest
 
+from orchestrator.commands import streams
 from support.tiers import slow
 
 COMMAND = [sys.executable, "-m", "orchestrator"]
@@ -113,3 +115,12 @@ def test_folder_of_any_name_takes_a_result(tmp_path: Path):
     assert (process.returncode, process.stderr) == (0, "")
     assert process.stdout.endswith("written to o\\udcff\\n\\x1b/\n")
     assert os.path.exists(os.path.join(os.fsencode(tmp_path), name, b"run.json"))  # noqa: PTH110, PTH118
+
+
+def test_letters_that_a_code_page_has_not_are_escaped(monkeypatch):
+    """Windows writes what is not a console in a code page; 1252 has an u umlaut, and no pi."""
+    written = BytesIO()
+    monkeypatch.setattr(sys, "stdout", TextIOWrapper(written, "cp1252"))
+    streams.show("\u03c0 = 3.14", "f\u00fcr")
+    sys.stdout.flush()
+    assert written.getvalue().split() == [b"\\u03c0", b"=", b"3.14", b"f\xfcr"]
