@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands.options import (
     add_fmi,
     add_options,
@@ -158,19 +159,19 @@ def _hosts(options: argparse.Namespace) -> int:
     step = reference.step or DEFAULT_STEP
     system = replace(system, name=reference.name, stop_time=reference.stop_time, step=step)
     verdicts = compare(system, hosts, options.steps, step, reference=reference, told=say)
-    show(f"{'host':15} {'version':32} {'order':42} {'deviation':>9} {'us/step':>8}  worst port")
+    kind = options.kind if options.fmi == FMI_VERSIONS[0] else f"{options.kind}, FMI {options.fmi}"
+    columns = f"{'kind':13} {'order':42} {'deviation':>9} {'us/step':>8}  worst port"
+    show(f"{'host':14} {'version':28} {columns}")
     agree = True
     for verdict in verdicts:
         host = HOSTS[verdict.host]
-        order = f"{host.initial}: {host.order}"
-        if verdict.failure is not None:
-            show(f"{verdict.host:15} {verdict.package:32} {verdict.failure}")
-        else:
+        said = verdict.failure
+        if said is None:
+            order = f"{host.initial}: {host.order}"
+            microseconds = 1e6 / verdict.steps_per_second
             note = "" if verdict.agrees else f", above {BOUND:g}"
-            show(
-                f"{verdict.host:15} {verdict.package:32} {order:42} {verdict.deviation:9.1e} "
-                f"{1e6 / verdict.steps_per_second:8.1f}  {verdict.port}{note}"
-            )
+            said = f"{order:42} {verdict.deviation:9.1e} {microseconds:8.1f}  {verdict.port}{note}"
+        show(f"{verdict.host:14} {verdict.package:28} {kind:13} {said}")
         agree &= verdict.agrees
     return OK if agree else FAILED
 
