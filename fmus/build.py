@@ -10,6 +10,7 @@ import argparse
 import hashlib
 import json
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -39,17 +40,19 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
     before = built_before(manifest)
     current = {key: before.get(key) for key in made_from} == made_from
     digests = before["sha256"] if current else {}
-    written = []
-    for component, package in components().items():
-        path = destination / f"{component}.fmu"
-        if not path.is_file() or digests.get(path.name) != _digest(path):
-            kind.write(component, package, path)
-            digests[path.name] = _digest(path)
-            written.append(path)
-    if written:
+    stale = {
+        path: (component, package)
+        for component, package in components().items()
+        if not (path := destination / f"{component}.fmu").is_file()
+        or digests.get(path.name) != _digest(path)
+    }
+    with ThreadPoolExecutor(kind.side_by_side) as pool:
+        list(pool.map(lambda path: kind.write(*stale[path], path), stale))
+    if stale:
+        digests |= {path.name: _digest(path) for path in stale}
         text = json.dumps({**made_from, "sha256": digests})
         manifest.write_text(text + "\n", encoding="utf-8")
-    return written
+    return list(stale)
 
 
 def built_before(manifest: Path) -> dict[str, Any]:

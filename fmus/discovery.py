@@ -7,12 +7,20 @@ import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
 from importlib import import_module
-from importlib.metadata import distribution, version
+from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path
+from xml.etree import ElementTree
 
 from fmus.kinds import CONTAINED
 from fmus.ports.port import Port
+
+#: The folder of a component that holds its reference results.
+REFERENCE = "reference"
+
+#: Where FMI-LS-REF has them in an FMU, and the file there that names them.
+RELATED = "extra/org.fmi-standard.fmi-ls-ref"
+RELATED_MANIFEST = "fmi-ls-manifest.xml"
 
 #: The oldest time a zip archive can hold: the time of a build is not part of its result.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
@@ -42,6 +50,22 @@ def ports_of(name: str) -> Sequence[Port]:
     return ports
 
 
+def related_files(package: str) -> dict[str, bytes]:
+    """The reference results that an FMU of a component carries, by their places in it.
+
+    Returns:
+        The manifest and the files that it names; empty if the component has none.
+
+    """
+    folder = package_folder(package) / REFERENCE
+    manifest = folder / RELATED_MANIFEST
+    if not manifest.is_file():
+        return {}
+    related = ElementTree.parse(manifest).iter("Related")
+    names = (manifest.name, *(element.attrib["source"] for element in related))
+    return {f"{RELATED}/{name}": (folder / name).read_bytes() for name in names}
+
+
 def licences(kind: str) -> str:
     """Licence of the bundle, and of what else FMUs of a kind contain."""
     heads = {"auv-fmu": "auv-fmu", "pythonfmu": "PythonFMU, contained in resources and binaries"}
@@ -52,18 +76,20 @@ def licences(kind: str) -> str:
 
 
 def fingerprint(kind: str) -> str:
-    """Hash of everything installed that FMUs of a kind depend on, except a C compiler."""
+    """Hash of everything installed that FMUs of a kind are made of, the same on all machines.
+
+    Not of the tools: a C compiler, and what makes a page of Markdown.
+    """
     digest = hashlib.sha256()
     for package in ("auv_fmu", "fmus", *CONTAINED[kind]):
         root = package_folder(package)
-        for path in sorted(root.rglob("*")):
-            name = path.relative_to(root)
+        files = {path.relative_to(root).as_posix(): path for path in root.rglob("*")}
+        for name, path in sorted(files.items()):
             # The first is Python's own, the second what was built of them.
-            if path.is_file() and path.suffix != ".pyc" and name.parts[0] != "dist":
+            if path.is_file() and path.suffix != ".pyc" and not name.startswith("dist/"):
                 digest.update(f"{package}/{name}\0".encode())
                 digest.update(path.read_bytes())
-    for text in (licences(kind), version("markdown-it-py")):
-        digest.update(text.encode())
+    digest.update(licences(kind).encode())
     return digest.hexdigest()
 
 

@@ -12,7 +12,7 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
-from fmus.discovery import components, package_folder, ports_of
+from fmus.discovery import components, package_folder, ports_of, related_files
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description_fmi3 import TYPES
 from fmus.ports.port import FAULT, Port
@@ -51,6 +51,14 @@ compiled from the C sources in its folder `sources`, which any importer can comp
 platform: one file that includes all others. The equations in them were translated from the Python
 text that the FMU's twin runs, so both give the same numbers."""
 
+_REFERENCE = """\
+## Reference results
+
+The folder `extra/org.fmi-standard.fmi-ls-ref` in the FMU holds experiments with this FMU alone:
+parameter sets, inputs over time, and the outputs to compare with, as the drafts FMI-LS-REF and
+MA-HS-Experiments of the Modelica Association have them. The inputs of a step are set at its
+beginning. `auv-fmu verify {name}.fmu` makes the experiments and compares."""
+
 _EXAMPLE = """\
 ## Example
 
@@ -75,7 +83,8 @@ def component_page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
         refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")
     made_of = (_NATIVE,) if kind == NATIVE else ()
     tables = _tables(ports, TYPES if fmi == "3" else {})
-    parts = (text, *made_of, *tables, refusals, _EXAMPLE.format(name=name))
+    reference = (_REFERENCE.format(name=name),) if related_files(components()[name]) else ()
+    parts = (text, *made_of, *tables, refusals, *reference, _EXAMPLE.format(name=name))
     return "\n\n".join(parts) + "\n"
 
 
@@ -133,6 +142,14 @@ def _range(port: Port) -> str:
     lower = "" if port.minimum is None else f"≥ {port.minimum:g}"
     upper = "" if port.maximum is None else f"≤ {port.maximum:g}"
     return " ".join(filter(None, (lower, upper)))
+
+
+def fmu_documents(name: str, kind: str = PYTHON, fmi: str = "2") -> dict[str, bytes]:
+    """What an FMU of a component holds for its user, by the places in it."""
+    documents = {"documentation/index.html": component_html(name, kind, fmi).encode()}
+    if related := related_files(components()[name]):
+        documents["documentation/fmi-ls-ref.txt"] = f"{_REFERENCE.format(name=name)}\n".encode()
+    return documents | related
 
 
 def component_html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:

@@ -12,6 +12,9 @@ from typing import NamedTuple
 #: Python sources that PythonFMU runs, or libraries translated from them. The first is the default.
 KINDS = PYTHON, NATIVE = "python", "native"
 
+#: What a run asks for unless a kind is named: native where it is to be had, else Python.
+AUTO = "auto"
+
 #: Packages besides ours whose code is in the FMUs of each kind.
 CONTAINED: Mapping[str, Sequence[str]] = {PYTHON: ("pythonfmu",), NATIVE: ()}
 
@@ -27,12 +30,16 @@ TARGETS = {
 #: Endings of libraries, by the last part of a machine's name.
 _ENDINGS = {"linux": ".so", "windows": ".dll", "darwin": ".dylib"}
 
-#: The machines that a platform stands for: several share one universal library.
+#: The machines that a platform stands for: several share one universal library. In FMI 2.0.4
+#: darwin64 is for x86-64, and other processors have FMI 3.0's names; but hosts on ARM Macs, fmpy
+#: among them, look into darwin64.
 _MACHINES: Mapping[str, Mapping[str, Sequence[str]]] = {
     "2": {
         "linux64": ("x86_64-linux",),
         "win64": ("x86_64-windows",),
         "darwin64": ("x86_64-darwin", "aarch64-darwin"),
+        "aarch64-linux": ("aarch64-linux",),
+        "aarch64-darwin": ("aarch64-darwin",),
     },
     "3": {machine: (machine,) for machine in TARGETS},
 }
@@ -78,24 +85,18 @@ def platforms(fmi: str, names: str | None = None) -> list[Platform]:
         machine = this_machine()
         own = [platform for platform in known.values() if machine in platform.machines]
         if not own:
-            raise ValueError(
-                f"FMI {fmi}.0 has no name for this machine, {machine}{_other(machine)}"
-            )
+            raise ValueError(f"there is no platform for this machine, {machine}")
         return own
     if names == "all":
         return list(known.values())
     wanted = {name.strip() for name in names.split(",")}
     for name in sorted(wanted - known.keys()):
+        others = [f"; try --fmi {other}" for other, names in _MACHINES.items() if name in names]
         raise ValueError(
             f"FMI {fmi}.0 has no platform {name!r}; there are {', '.join(known)}, or all"
-            f"{_other(name)}"
+            f"{''.join(others)}"
         )
     return [platform for name, platform in known.items() if name in wanted]
-
-
-def _other(name: str) -> str:
-    """A hint, if another version of FMI has a name."""
-    return "".join(f"; try --fmi {fmi}" for fmi, known in _MACHINES.items() if name in known)
 
 
 def this_machine() -> str:

@@ -1,31 +1,72 @@
 """Reference results, with which a user checks an import into another tool.
 
 For each FMU, in the manner of the FMI cross-check: `NAME_in.csv` with inputs over time,
-`NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment. For the system: `auv_ref.csv`
-and `auv_ref.opt`, from a Jacobi run, which is what most tools do.
+`NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment, in the folder `reference` of
+its component. For the system: `reference/auv_ref.csv` and `auv_ref.opt`, from a Jacobi run, which
+is what most tools do.
 
-`python tools/reference.py [FOLDER]` writes them anew, into `reference` or FOLDER.
+Beside them, what the FMU carries, as the draft FMI-LS-REF has it: `fmi-ls-manifest.xml`, which
+names the others; `experiments.exp`, in the draft MA-HS-Experiments; a parameter set for each group
+of scenarios that sets parameters of the component; the results of each experiment, in fewer rows.
+
+`python tools/reference.py [FOLDER]` writes them anew, into this repository or FOLDER.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from xml.etree import ElementTree
+from xml.etree.ElementTree import Element, SubElement
 
 import fmpy
 import numpy as np
 from fmpy.util import write_csv
 
+from fmus.discovery import REFERENCE, RELATED_MANIFEST, components
+from orchestrator.formats.ssp.writer import parameter_set_xml
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.plan import make_plan
 from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.values import Value
 
 #: Length of the reference runs [s] and their step [s].
 STOP_TIME, STEP = 4.0, 0.02
+
+#: Of the results that an FMU carries, one row in so many; and how close a tool comes: the libraries
+#: of mathematics of two machines may differ in the last place.
+EVERY, TOLERANCE = 10, 1e-9
+
+#: Scenarios whose parameters are a parameter set, by its name, and what it is.
+SETS = {
+    "fig4": (("fig4",), "Parameters of Fig. 4 of the paper"),
+    "fig5": (("fig5", "fig5-pd"), "Parameters of Fig. 5 of the paper"),
+    "survey": (("path", "path-pd"), "Path of the survey through waypoints"),
+}
+
+#: MIME types of files, by their endings.
+_TYPES = {
+    ".csv": "text/csv",
+    ".exp": "application/x-ma-hs-experiments",
+    ".ssv": "application/x-ssp-parameter-set",
+}
+
+#: The parameters that are a path, of a planner that runs through waypoints.
+_PATH = ("count", "timed", "cruise", "rounding")
+
+#: FMI-LS-REF as it is written, and the attributes that it wants in a manifest.
+_NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
+_STANDARD = {
+    "name": "org.fmi-standard.fmi-ls-ref",
+    "version": "1.0.0-beta.1",
+    "description": ("Layered Standard providing information on related files included in an FMU."),
+}
 
 
 def reference_inputs(component: Component) -> np.ndarray:
@@ -39,50 +80,148 @@ def reference_inputs(component: Component) -> np.ndarray:
     return table
 
 
-def reference_outputs(component: Component, inputs: np.ndarray) -> np.ndarray:
-    """Outputs of an FMU that runs alone with these inputs, by fmpy."""
+def reference_outputs(
+    component: Component, inputs: np.ndarray, values: Mapping[str, Value] | None = None
+) -> np.ndarray:
+    """Outputs of an FMU that runs alone with these inputs, by fmpy.
+
+    Args:
+        component: the FMU.
+        inputs: over time.
+        values: of its parameters; None: its own.
+
+    """
     names = [variable.name for variable in component.having("output") if variable.type == "Real"]
     table: np.ndarray = fmpy.simulate_fmu(
         str(component.fmu),
         stop_time=STOP_TIME,
         step_size=STEP,
         output_interval=STEP,
+        start_values=dict(values or {}),
         input=inputs,
         output=names,
     )
     return table
 
 
-def write_reference(dist: Path, folder: Path) -> list[Path]:
+def parameter_sets(component: Component) -> Iterator[tuple[str, dict[str, Value]]]:
+    """The parameter sets of an FMU that scenarios give it, by their names."""
+    for name, (scenarios, _) in SETS.items():
+        values: dict[str, Value] = {}
+        for scenario in scenarios:
+            _, system = load_scenario(scenario)
+            for place, other in system.components.items():
+                if other.description.modelName == component.description.modelName:
+                    # A survey is the path that its planner begins with.
+                    values |= _path(other) | system.parameters_of(place)
+        if values:
+            yield name, values
+
+
+def _path(component: Component) -> dict[str, Value]:
+    """The path of a planner that runs through waypoints; empty for any other component."""
+    starts = component.starts
+    if not starts.keys() >= {*_PATH}:
+        return {}
+    numbers = range(1, 1 + int(starts["count"]))
+    places = [f"waypoint[{number}].{axis}" for number in numbers for axis in "xyzt"]
+    return {name: starts[name] for name in (*_PATH, *places)}
+
+
+def write_reference(dist: Path, root: Path) -> list[Path]:
     """Write the reference results of the closed loop and of each FMU of the bundle.
 
     Args:
         dist: folder with the built bundle.
-        folder: to write into.
+        root: of the repository that they are for.
 
     Returns:
         The files written.
 
     """
-    fmus = sorted(dist.glob("*.fmu"))
-    written = [path for fmu in fmus for path in write_component_reference(fmu, folder)]
-    written.append(folder / "auv_ref.csv")
+    written = []
+    for name, package in components().items():
+        folder = root.joinpath(*package.split("."), REFERENCE)
+        written += write_component_reference(dist / f"{name}.fmu", folder)
+    written.append(root / REFERENCE / "auv_ref.csv")
+    written[-1].parent.mkdir(exist_ok=True)
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
     simulate_to_end(make_plan(closed_loop(dist), jacobi), [CsvFile(written[-1])])
-    written.append(_write_options(folder / "auv"))
+    written.append(_write_options(written[-1].with_name("auv")))
     return written
 
 
 def write_component_reference(fmu: Path, folder: Path) -> list[Path]:
     """Write the reference results of one FMU, and return the files written."""
+    folder.mkdir(parents=True, exist_ok=True)
     component = read_component(fmu.stem, fmu)
     inputs = reference_inputs(component)
+    outputs = reference_outputs(component, inputs)
     written = []
-    for suffix, table in (("in", inputs), ("ref", reference_outputs(component, inputs))):
+    for suffix, table in (("in", inputs), ("ref", outputs)):
         if len(table.dtype.names or ()) > 1:
             written.append(folder / f"{fmu.stem}_{suffix}.csv")
             write_csv(written[-1], table)
-    return [*written, _write_options(folder / fmu.stem)]
+    written.append(_write_options(folder / fmu.stem))
+    stimuli = written[0].name if component.having("input") else None
+    return [*written, *_write_related(component, folder, stimuli, outputs)]
+
+
+def _write_related(
+    component: Component, folder: Path, stimuli: str | None, outputs: np.ndarray
+) -> Iterator[Path]:
+    """Write what the FMU carries, and say which files.
+
+    Args:
+        component: the FMU.
+        folder: to write into.
+        stimuli: name of the table of inputs there; None: it has none.
+        outputs: of the FMU with its own parameters.
+
+    """
+    about = f"Experiments of {component.name} alone"
+    experiments = Element("Experiments", name=component.name, description=about)
+    manifest = Element(
+        "fmiReferences", {f"{{{_NAMESPACE}}}fmi-ls-{key}": text for key, text in _STANDARD.items()}
+    )
+    _relate(manifest, "experiments.exp", "experiment/smoke-test", about)
+    if stimuli is not None:
+        _relate(manifest, stimuli, "other", "Inputs of the experiments over time")
+    inputs = reference_inputs(component)
+    for experiment, values in (("default", {}), *parameter_sets(component)):
+        element = SubElement(
+            experiments, "Experiment", name=experiment,
+            description=SETS[experiment][1] if values else "Parameters as they are in the FMU",
+            startTime="0.0", stopTime=str(STOP_TIME), stepSize=str(STEP), tolerance=str(TOLERANCE),
+        )  # fmt: skip
+        if values:
+            path = folder / f"{experiment}.ssv"
+            path.write_bytes(parameter_set_xml(component, values, experiment))
+            yield path
+            _relate(manifest, path.name, "parameter", SETS[experiment][1])
+            SubElement(element, "Parameters", source=path.name)
+            outputs = reference_outputs(component, inputs, values)
+        if stimuli is not None:
+            SubElement(element, "Stimuli", source=stimuli)
+        path = folder / f"{experiment}_out.csv"
+        write_csv(path, outputs[::EVERY])
+        yield path
+        _relate(manifest, path.name, "result", f"Outputs of the experiment {experiment}")
+        SubElement(element, "References", source=path.name)
+    yield _write_xml(folder / "experiments.exp", experiments)
+    yield _write_xml(folder / RELATED_MANIFEST, manifest)
+
+
+def _relate(manifest: Element, source: str, role: str, description: str) -> None:
+    stated = {"type": _TYPES[Path(source).suffix], "source": source, "role": role}
+    SubElement(manifest, "Related", **stated, description=description)
+
+
+def _write_xml(path: Path, root: Element) -> Path:
+    ElementTree.register_namespace("fmi-ls", _NAMESPACE)
+    ElementTree.indent(root)
+    path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True) + b"\n")
+    return path
 
 
 def _write_options(stem: Path) -> Path:
@@ -98,10 +237,8 @@ def _write_options(stem: Path) -> Path:
 def main() -> None:
     """Write the reference results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", nargs="?", type=Path, default=Path("reference"))
-    folder: Path = parser.parse_args().folder
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in write_reference(current_fmus(), folder):
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parents[1])
+    for path in write_reference(current_fmus(), parser.parse_args().folder):
         print(path)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
@@ -101,7 +102,7 @@ def fmu_entries(
     return {
         "modelDescription.xml": described(guid),
         **_pictures(component, declared.PORTS, fmi),
-        "documentation/index.html": documentation.component_html(component, NATIVE, fmi).encode(),
+        **documentation.fmu_documents(component, NATIVE, fmi),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
         **{
@@ -121,6 +122,8 @@ class NativeKind:
     platforms: Sequence[Platform]
     compiler: Compiler
     name = NATIVE
+    #: How many are written at the same time: compilers are processes of their own.
+    side_by_side = os.cpu_count()
 
     @property
     def settings(self) -> dict[str, str]:

@@ -229,6 +229,8 @@ class PythonKind:
 
     loader: str
     name = PYTHON
+    #: How many are written at the same time: PythonFMU imports what it builds.
+    side_by_side = 1
 
     @property
     def settings(self) -> dict[str, str]:
@@ -244,5 +246,5 @@ class PythonKind:
         """
         text = _SCRIPT.format(package=package, component=component)
         entries = fmu_entries(component, text, self.loader)
-        entries["documentation/index.html"] = documentation.component_html(component).encode()
+        entries |= documentation.fmu_documents(component)
         seal(entries, path)

@@ -8,12 +8,19 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.commands.options import add_fmi, add_options, add_out, add_set, assignments
+from orchestrator.commands.options import (
+    add_fmi,
+    add_kind,
+    add_options,
+    add_out,
+    add_set,
+    assignments,
+)
 from orchestrator.commands.streams import OK, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
-from orchestrator.runs.request import Files, Request
+from orchestrator.runs.request import Files
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
@@ -21,7 +28,7 @@ from orchestrator.vehicle.proof import gain_check
 
 def add_build(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu build`."""
-    add_options(parser, Request, "kind")
+    add_kind(parser)
     add_fmi(parser)
     parser.add_argument(
         "--platforms",

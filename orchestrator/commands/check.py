@@ -21,6 +21,7 @@ from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
+from orchestrator.system.variables import array_of
 
 #: What surprises the user of an FMU, by a flag of its description and the value that means it.
 _SURPRISES = {
@@ -136,15 +137,18 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
                 findings.note(f"start value of {error}")
         seen: dict[tuple[str, int], str] = {}
         for variable in (*component.having("input"), *component.having("parameter")):
-            other = seen.setdefault((variable.type, variable.valueReference), variable.name)
-            if other != variable.name:
-                findings.note(f"{other} and {variable.name} are one: setting one sets both")
+            name = array_of(variable)
+            other = seen.setdefault((variable.type, variable.valueReference), name)
+            if other != name:
+                findings.note(f"{other} and {name} are one: setting one sets both")
         return component
     return None
 
 
 def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
+    if component.left_alone:
+        yield f"a run {component.remainder}"
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text

@@ -5,11 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands.options import (
     add_fmi,
+    add_kind,
     add_options,
     add_out,
     add_set,
@@ -18,8 +20,9 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
+from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
-from orchestrator.exchange.verify import verify
+from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
@@ -38,6 +41,10 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 }
 
 
+#: Options of `verify` that are for a table only.
+_OF_TABLES = ("scenario", "order", "initial", "verbose", "set")
+
+
 def add_export(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu export`."""
     add_system(parser)
@@ -47,7 +54,8 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         default="ssp",
         help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
     )
-    add_options(parser, Request, "step", "strict", "kind")
+    add_options(parser, Request, "step", "strict")
+    add_kind(parser)
     add_fmi(parser)
     add_set(parser)
     add_out(parser, "exports/SCENARIO/")
@@ -67,7 +75,7 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--all", action="store_true", help="every host")
     _add_scenario(parser)
-    add_options(parser, Request, "kind")
+    add_kind(parser)
     add_fmi(parser)
     parser.add_argument(
         "--steps", type=int, default=5000, metavar="N", help="number of steps; default: 5000"
@@ -77,14 +85,19 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu verify`."""
-    parser.add_argument("table", type=Path, metavar="RESULT.csv", help="table with a column `time`")
+    parser.add_argument(
+        "table",
+        type=Path,
+        metavar="RESULT.csv|FILE.fmu",
+        help="table with a column `time`; or an FMU, any one's, whose experiments are made and "
+        "compared with the results that it carries, as FMI-LS-REF has them",
+    )
     _add_scenario(parser)
     parser.add_argument(
         "--tolerance",
         type=float,
-        default=1e-6,
         help="largest deviation, relative to the larger of 1 and the port's largest value; "
-        "default: 1e-6",
+        f"default: {TOLERANCE:g}, for an FMU what its experiment says",
     )
     parser.add_argument(
         "--order",
@@ -105,7 +118,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         "--verbose", action="store_true", help="name every column that was not compared"
     )
     add_set(parser)
-    parser.set_defaults(action=_verify)
+    parser.set_defaults(action=partial(_verify, parser.get_default))
 
 
 def _add_scenario(parser: argparse.ArgumentParser) -> None:
@@ -176,15 +189,41 @@ def _hosts(options: argparse.Namespace) -> int:
     return OK if agree else FAILED
 
 
-def _verify(options: argparse.Namespace) -> int:
+def _verify(default: Callable[[str], object], options: argparse.Namespace) -> int:
+    if options.table.suffix == ".fmu":
+        for name in _OF_TABLES:
+            if getattr(options, name) != default(name):
+                raise InputError(f"--{name} is for a table; an FMU says itself what is compared")
+        return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
     certificate = verify(
         options.table,
         system,
-        options.tolerance,
+        TOLERANCE if options.tolerance is None else options.tolerance,
         options.order,
         initial=options.initial,
         verbose=options.verbose,
     )
     show(*certificate.splitlines())
+    return OK
+
+
+def _verify_carried(options: argparse.Namespace) -> int:
+    """Verify an FMU by what it carries; nothing less than agreement in all of it will do."""
+    carried = Carried(options.table)
+    show(f"{options.table.name}: FMI-LS-REF {carried.version}")
+    for note in carried.notes:
+        say(f"warning: {note}")
+    judged = []
+    for verdict in carried.verdicts(options.tolerance):
+        show(f"{verdict.name}: {verdict.text}")
+        for note in verdict.notes:
+            say(f"warning: {verdict.name}: {note}")
+        judged += [] if verdict.agrees is None else [verdict.agrees]
+    if not judged:
+        raise InputError(f"{options.table}: carries no results to verify it with")
+    counted = f"{sum(judged)} of {len(judged)} experiments with results agree"
+    if not all(judged):
+        raise InputError(f"{options.table}: {counted}")
+    show(counted)
     return OK

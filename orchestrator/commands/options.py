@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fmus.kinds import FMI_VERSIONS, NATIVE
+from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.observers.observer import Ending
@@ -67,6 +67,17 @@ def add_fmi(parser: argparse.ArgumentParser) -> None:
         choices=FMI_VERSIONS,
         default=FMI_VERSIONS[0],
         help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
+    )
+
+
+def add_kind(parser: argparse.ArgumentParser) -> None:
+    """Which kind of FMU goes to other tools: one that does not depend on the compiler here."""
+    parser.add_argument(
+        "--kind",
+        choices=KINDS,
+        default=PYTHON,
+        help="kind of the FMUs: Python source, or its translation to C, with the same numbers; "
+        f"default: {PYTHON}",
     )
 
 

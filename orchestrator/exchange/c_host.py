@@ -98,9 +98,9 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
         for causality in ("input", "output"):
             ports = [port for port in component.having(causality) if port.type == "Real"]
             first = len(columns)
-            fmu[f"{causality}s"] = _struct(
-                references=f"references + {first}", n=len(ports), values=f"row + {first}"
-            )
+            row = f"row + {first}"
+            where = {"references": f"references + {first}", "row": row, "values": row}
+            fmu[f"{causality}s"] = _struct(**where, n_references=len(ports), n=len(ports))
             columns |= {PortName(name, port.name): first + i for i, port in enumerate(ports)}
             references += [port.valueReference for port in ports]
         fmus.append(_struct(**fmu))

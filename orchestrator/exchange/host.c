@@ -78,7 +78,7 @@ static void *function(const fmu *of, const char *name) {
     } while (0)
 
 static inline void set_real(const fmu *of, reference number, double value) {
-    check(of->inputs.call.set_reals(of->instance, &number, 1, &value), "fmi2SetReal", of);
+    check(of->inputs.call.fmi2(of->instance, &number, 1, &value), "fmi2SetReal", of);
 }
 
 static inline void set_integer(const fmu *of, const char *name, reference number, int value) {
@@ -99,9 +99,9 @@ static void load(fmu *of, member *as) {
     of->library = OPEN(of->path);
     if (of->library == NULL) fail("cannot be loaded", of->path);
     *(void **)&instantiate = function(of, "fmi2Instantiate");
-    *(void **)&as->do_step = function(of, "fmi2DoStep");
-    *(void **)&of->inputs.call.set_reals = function(of, "fmi2SetReal");
-    *(void **)&of->outputs.call.get_reals = function(of, "fmi2GetReal");
+    *(void **)&as->do_step.fmi2 = function(of, "fmi2DoStep");
+    *(void **)&of->inputs.call.fmi2 = function(of, "fmi2SetReal");
+    *(void **)&of->outputs.call.fmi2 = function(of, "fmi2GetReal");
     of->instance = instantiate(of->name, CO_SIMULATION, of->guid, of->resources, &functions, 0, 1);
     if (of->instance == NULL) fail("no instance", of->name);
     as->component = of->instance;
@@ -113,8 +113,7 @@ static void load(fmu *of, member *as) {
 
 static void read_reals(const fmu *of, const move *ports) {
     if (ports->n > 0)
-        check(of->outputs.call.get_reals(of->instance, ports->references, ports->n, ports->values),
-              "fmi2GetReal", of);
+        check(get(ports, of->instance), "fmi2GetReal", of);
 }
 
 static void exchange(void) {

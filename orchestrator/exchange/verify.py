@@ -26,7 +26,6 @@ from orchestrator.master.experiment import (
     Order,
     format_order,
 )
-from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
@@ -34,7 +33,10 @@ from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import BOOLEANS, finite
+from orchestrator.system.values import BOOLEANS, finite, type_of
+
+#: How far values may differ where nothing else is said.
+TOLERANCE = 1e-6
 
 #: How many names of a list are said where not all are.
 _FIRST = 5
@@ -102,19 +104,17 @@ def verify(
             order; the text names the port that differs first.
 
     """
-    if not 0.0 <= tolerance < 1.0:
-        raise InputError(f"tolerance {tolerance:g}: must be at least 0 and less than 1")
+    check_tolerance(tolerance)
     algorithms = list(ways(system, order, initial))
     outputs = {
-        str(PortName(component.name, variable.name)): variable.type
+        str(PortName(component.name, variable.name)): type_of(variable)
         for component in system.components.values()
         for variable in component.having("output")
-        if variable.type in FMI_TYPES
     }
     known = {
-        str(PortName(component.name, variable.name))
+        str(PortName(component.name, variable))
         for component in system.components.values()
-        for variable in component.description.modelVariables
+        for variable in component.variables
     }
     table = read_table(path, outputs, known)
     if not len(table.time) or not table.time[-1] > 0.0:
@@ -130,6 +130,17 @@ def verify(
             return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
         complaints.append(f"{way.words} {complaint}")
     raise InputError(f"{path}: {'; '.join(complaints)}")
+
+
+def check_tolerance(tolerance: float) -> None:
+    """Check that not just anything agrees to a tolerance.
+
+    Raises:
+        InputError: it does, or nothing can.
+
+    """
+    if not 0.0 <= tolerance < 1.0:
+        raise InputError(f"tolerance {tolerance:g}: must be at least 0 and less than 1")
 
 
 def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorithm]:
@@ -295,23 +306,23 @@ def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> 
 
     """
     what = "not a table that can be compared"
-    with records(path, what, _places_of_time) as (names, rows):
+    with records(path, what, places_of_time) as (names, rows):
         return _table(names, rows, ports, known)
 
 
 def _table(
     names: Sequence[str], rows: Iterable[Record], ports: Mapping[str, str], known: Collection[str]
 ) -> ForeignTable:
-    if not _places_of_time(names):
+    if not places_of_time(names):
         separators = ", ".join(SEPARATORS.values())
         raise ValueError(f"no column of its first line is named time (separators are {separators})")
-    clock, *more = _places_of_time(names)
+    clock, *more = places_of_time(names)
     if more:
         raise ValueError(f"{1 + len(more)} columns are named {names[clock].strip()}")
     places: dict[str, int] = {}
     longest = max(map(len, known), default=0)
     for place, name in enumerate(names):
-        port = _port_of(name, known, longest)
+        port = port_of(name, known, longest)
         port = port if port in ports else None
         if port in places:
             raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")
@@ -342,13 +353,14 @@ def _table(
     )
 
 
-def _places_of_time(names: Sequence[str]) -> list[int]:
+def places_of_time(names: Sequence[str]) -> list[int]:
+    """Where a table has its times; several places, or none, are a mistake."""
     lowered = [name.strip().lower() for name in names]
     found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
     return next(filter(None, found), [])
 
 
-def _port_of(name: str, known: Collection[str], longest: int) -> str | None:
+def port_of(name: str, known: Collection[str], longest: int) -> str | None:
     """Our name of a column: some tools write component::port, [REAL] after it, or systems before.
 
     Args:

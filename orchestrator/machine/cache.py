@@ -3,6 +3,7 @@
 All of it is run, so it is taken only from folders and files that nobody but the user can write,
 and only if unchanged since it was kept: the digests of its files are in a separate folder. Nothing
 there is ever overwritten or removed. Anything that has changed is made anew, under another name.
+What came with the installation, ready for use, is taken first, and trusted like the code beside it.
 """
 
 from __future__ import annotations
@@ -16,18 +17,19 @@ from hashlib import sha256
 from multiprocessing import parent_process
 from pathlib import Path
 from shutil import rmtree
-from stat import S_ISDIR, S_ISLNK, S_ISREG, S_ISVTX, S_IWGRP, S_IWOTH
+from stat import S_ISDIR, S_ISLNK, S_ISREG, S_ISVTX
 from tempfile import mkdtemp, mkstemp
 
 from platformdirs import user_cache_path
 
-from orchestrator.machine.disk import process_folder, sync_to_disk
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.operating_system import is_mine, others_write, sync_to_disk
+
+#: What came with the installation: a folder for each category, in it one for each key.
+_READY = Path(__file__).parents[1] / "ready"
 
 #: The folder of the digests, beside one for each category of what is kept.
 _DIGESTS = "digests"
-
-#: That others than its owner can write a file or folder.
-_OTHERS_WRITE = S_IWGRP | S_IWOTH
 
 #: Links in a path, as many as Linux follows.
 _MOST_LINKS = 40
@@ -39,13 +41,15 @@ def users_folder() -> Path:
 
 
 def read_cached(category: str, key: str) -> dict[Path, bytes]:
-    """Read the files that were kept under a key; empty if they are not as they were kept.
+    """Read the files that are there under a key; empty if they are not as they were kept.
 
     Args:
         category: of what is kept, a name of a folder.
         key: of all that it was made of.
 
     """
+    with suppress(OSError):
+        return {path: path.read_bytes() for path in sorted((_READY / category / key).iterdir())}
     root = _root(category)
     with suppress(OSError):
         for record in sorted((root / _DIGESTS).glob(f"{category}-{key}-*.json")):
@@ -129,8 +133,7 @@ def _read(path: Path) -> bytes:
     flags = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(os.open(path, os.O_RDONLY | flags), "rb") as file:  # noqa: PTH123
         status = os.fstat(file.fileno())
-        others = status.st_mode & _OTHERS_WRITE
-        if not S_ISREG(status.st_mode) or not _is_mine(status) or others:
+        if not S_ISREG(status.st_mode) or not is_mine(status) or others_write(status):
             raise PermissionError(f"{path} is not the user's file")
         return file.read()
 
@@ -197,7 +200,7 @@ def _open_to_others(path: Path) -> Path | None:
         above = len(parts) > 1
         if above and S_ISLNK(status.st_mode):
             links += 1
-            if links > _MOST_LINKS or not _is_mine(status, or_roots=True):
+            if links > _MOST_LINKS or not is_mine(status, or_roots=True):
                 return current
             target = current.parent / current.readlink()
             current, parts = Path(target.anchor), [*target.parts[1:], *parts]
@@ -214,12 +217,7 @@ def _keeps_others_out(status: os.stat_result, above: bool) -> bool:
         above: it is above the cache folder.
 
     """
-    mine = _is_mine(status, or_roots=above)
-    open_to_others = status.st_mode & _OTHERS_WRITE and not (above and status.st_mode & S_ISVTX)
+    mine = is_mine(status, or_roots=above)
+    open_to_others = others_write(status) and not (above and status.st_mode & S_ISVTX)
     # A file in place of a folder is reported when something is written into it.
     return mine and not open_to_others and (above or S_ISDIR(status.st_mode))
-
-
-def _is_mine(status: os.stat_result, or_roots: bool = False) -> bool:
-    mine = (os.geteuid(), 0) if or_roots else (os.geteuid(),)
-    return status.st_uid in mine

@@ -21,6 +21,7 @@ from tempfile import TemporaryDirectory
 from fmus.compilers import LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import last_line
+from orchestrator.machine.operating_system import wait_for_end
 
 #: A compiler: a call with its arguments.
 Compiler = Callable[..., CompletedProcess[str]]
@@ -115,7 +116,7 @@ def compile_library(compiler: Compiler, *arguments: str) -> bytes:
 
 def _follow() -> None:
     """End with the process that has started this one."""
-    os.read(sys.stdin.fileno(), 1)
+    wait_for_end(sys.stdin.fileno())
     os._exit(1)
 
 

@@ -7,30 +7,23 @@ temporary folder holds a marker, too: one with a marker and without a lock is no
 
 from __future__ import annotations
 
-import errno
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
+from stat import S_ISDIR
 from tempfile import TemporaryDirectory, gettempdir
 from typing import Any
 from uuid import uuid4
 
-try:
-    import fcntl
-except ImportError:  # pragma: no cover
-    # Not a POSIX system: no process is kept out there, and nothing is removed.
-    fcntl = None  # type: ignore[assignment]
+from orchestrator.machine.operating_system import is_mine, sync_to_disk, take_lock
 
 #: The entry of a record with its checksum.
 _SEAL = "sha256"
-
-#: What file systems answer that know no fsync.
-_CANNOT = (errno.EINVAL, errno.ENOTSUP)
 
 #: How the name of a process's temporary folder begins, and the file that proves it to be one.
 _PREFIX, _MARKER = "auvfmu-", ".auv-fmu.json"
@@ -90,25 +83,6 @@ def write_whole(path: Path, text: str, partial: Path) -> None:
     sync_to_disk(path.parent)
 
 
-def sync_to_disk(path: Path) -> None:
-    """Have a file, or the names in a folder, outlast a power cut.
-
-    Raises:
-        OSError: it is not all there; some file systems say so only now.
-
-    """
-    if os.name != "posix":
-        return
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    except OSError as error:
-        if error.errno not in _CANNOT:
-            raise
-    finally:
-        os.close(descriptor)
-
-
 def is_still(descriptor: int, status: os.stat_result) -> bool:
     """Whether a descriptor is the file that it was, not closed since nor taken by another one."""
     with suppress(OSError):
@@ -129,33 +103,16 @@ def hold_lock(path: Path, wait: bool = False) -> Iterator[None]:
         OSError: it cannot be opened.
 
     """
-    if fcntl is None:
-        yield
-        return
-    descriptor = os.open(path, os.O_RDONLY)
+    release: Callable[[], object] = bool
+    # Where there are no locks, nobody is kept out.
+    with suppress(NotImplementedError):
+        release = take_lock(path, wait)
     try:
-        _lock(descriptor, wait)
         yield
     finally:
         # An FMU may have closed it.
         with suppress(OSError):
-            os.close(descriptor)
-
-
-def _lock(descriptor: int, wait: bool = False) -> bool:
-    """Lock a file; whether that can be known, which not every file system can tell.
-
-    Raises:
-        BlockingIOError: another process has it.
-
-    """
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except BlockingIOError:
-        raise
-    except OSError:
-        return False
-    return True
+            release()
 
 
 def process_folder() -> Path:
@@ -167,40 +124,40 @@ def process_folder() -> Path:
 def _process_folder() -> TemporaryDirectory[str]:
     _remove_left()
     folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
-    if fcntl is not None:
-        # Held until the process ends: nothing closes it.
-        descriptor = os.open(folder.name, os.O_RDONLY)
-        with suppress(OSError):
-            _lock(descriptor)
-            marker = sealed({"folder": Path(folder.name).name, "token": uuid4().hex})
-            Path(folder.name, _MARKER).write_text(marker, encoding="utf-8")
+    # Without the marker it is not removed by others.
+    with suppress(OSError, NotImplementedError):
+        # Held until the process ends: nothing releases it.
+        take_lock(Path(folder.name))
+        marker = sealed({"folder": Path(folder.name).name, "token": uuid4().hex})
+        Path(folder.name, _MARKER).write_text(marker, encoding="utf-8")
     return folder
 
 
 def _remove_left() -> None:
     """Remove the temporary folders of processes that were killed."""
-    for folder in Path(gettempdir()).glob(f"{_PREFIX}*") if fcntl is not None else ():
+    for folder in Path(gettempdir()).glob(f"{_PREFIX}*"):
         # Of another user, or gone meanwhile.
-        with suppress(OSError):
-            descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+        with suppress(OSError, NotImplementedError):
+            if not _is_ours(folder):
+                continue
+            release = take_lock(folder)
             try:
-                if _is_ours(folder) and _lock(descriptor):
-                    for path in folder.iterdir():
-                        if path.is_dir() and not path.is_symlink():
-                            rmtree(path)
-                        # The proof comes last: this process may be killed, too.
-                        elif path.name != _MARKER:
-                            path.unlink()
-                    rmtree(folder)
+                for path in folder.iterdir():
+                    if path.is_dir() and not path.is_symlink():
+                        rmtree(path)
+                    # The proof comes last: this process may be killed, too.
+                    elif path.name != _MARKER:
+                        path.unlink()
+                rmtree(folder)
             finally:
-                os.close(descriptor)
+                release()
 
 
 def _is_ours(folder: Path) -> bool:
     """Whether a folder says itself that a process of this user has made it."""
-    marker = folder / _MARKER
+    marker, status = folder / _MARKER, folder.lstat()
     try:
-        if folder.stat().st_uid != os.geteuid() or marker.is_symlink():
+        if not (S_ISDIR(status.st_mode) and is_mine(status)) or marker.is_symlink():
             return False
         return unsealed(marker.read_text(encoding="utf-8")).get("folder") == folder.name
     except ValueError:

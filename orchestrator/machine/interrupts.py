@@ -12,9 +12,12 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from orchestrator.machine.disk import is_still
+from orchestrator.machine.operating_system import let_full_pipe_pass
 
-#: Ctrl-C, what a batch system sends, and the end of the terminal.
-_STOPS = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
+#: Ctrl-C, what a batch system sends, the end of the terminal, and Ctrl-Break of Windows.
+_STOPS = [
+    getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, n)
+]
 
 #: What ends a process that has not asked for it, such as the alarm that an FMU has set.
 _ENDS = [
@@ -90,7 +93,7 @@ class Interrupts:
             return
         end_of_thread, end_of_signals = os.pipe()
         status = os.fstat(end_of_signals)
-        os.set_blocking(end_of_signals, False)
+        let_full_pipe_pass(end_of_signals)
         before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
         leaving = threading.Lock()
         # A thread, because Python answers no signal while an FMU computes.
@@ -195,16 +198,3 @@ def held_interrupts(
     finally:
         for number, handler in before.items():
             signal.signal(number, signal.SIG_IGN if is_last and number in _STOPS else handler)
-
-
-@contextmanager
-def without_interrupt() -> Iterator[None]:
-    """Threads and processes that are started here never see Ctrl-C, which is for this to answer."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -26,8 +26,9 @@ from stat import S_ISREG
 from typing import NamedTuple
 from uuid import uuid4
 
-from orchestrator.machine.disk import sealed, sync_to_disk, unsealed, write_new, write_whole
+from orchestrator.machine.disk import sealed, unsealed, write_new, write_whole
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.operating_system import rename_to_new, sync_to_disk
 
 #: The ledger of a folder; what is being written there begins with the same letters.
 LEDGER, _UNFINISHED = ".auv-fmu.json", ".auv-fmu-"
@@ -347,10 +348,6 @@ def move_aside(path: Path) -> Path:
     for n in count(1):
         aside = path.with_name(f"{path.name}.~{n}~")
         with suppress(FileExistsError):
-            if path.is_dir() and not path.is_symlink():
-                aside.mkdir()
-            else:
-                aside.touch(exist_ok=False)
-            # In the place of what was made just now, and of nothing else.
-            return path.replace(aside)
+            rename_to_new(path, aside)
+            return aside
     raise AssertionError

@@ -26,7 +26,8 @@ from orchestrator.machine import cache
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.interrupts import Interrupts, held_interrupts, without_interrupt
+from orchestrator.machine.interrupts import Interrupts, held_interrupts
+from orchestrator.machine.operating_system import most_processes, without_interrupt
 
 #: How long the loop waits before it asks whether it shall stop [s].
 _PATIENCE = 0.1
@@ -152,7 +153,9 @@ def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterato
     # What a killed process leaves goes with the folder of this one.
     environment = {"TMPDIR": str(process_folder())} | cache.environment()
     with held_interrupts() as interrupts:
-        crew = Workers(n or _cores(), partial(_begin, environment, setup), interrupts)
+        crew = Workers(
+            min(n or _cores(), most_processes()), partial(_begin, environment, setup), interrupts
+        )
         try:
             yield crew
         except BaseException:

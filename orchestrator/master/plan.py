@@ -75,18 +75,23 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     if experiment.coupling == LINEAR:
         _check_linear(system)
     found = decimations(system, experiment.step)
+    remarks = [
+        f"{name}: {component.remainder}"
+        for name, component in system.components.items()
+        if component.left_alone
+    ]
     rigid = [name for name, component in system.components.items() if not component.takes_any_step]
     period = lcm(*(found[name] for name in rigid))
     whole = experiment.full_steps // period * period
     if not rigid or whole == experiment.rows - 1:
-        return Plan(system, experiment, found)
+        return Plan(system, experiment, found, remarks)
     why = f"{', '.join(rigid)}: takes only steps of a fixed length, so"
     if whole == 0:
         shortest = period * experiment.step
         raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
     end = experiment.time(whole)
     remark = f"{why} the run ends with the last whole step, at t = {end:.12g} s"
-    return Plan(system, replace(experiment, stop_time=end), found, (remark,))
+    return Plan(system, replace(experiment, stop_time=end), found, [*remarks, remark])
 
 
 def _check_linear(system: System) -> None:

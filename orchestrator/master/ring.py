@@ -21,7 +21,7 @@ from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
-from orchestrator.system.values import real
+from orchestrator.system.values import real, type_of
 
 #: A ring is at rest where what arrives at each input differs by no more than this, relatively or
 #: absolutely; what brings it nearer is done until it is within rounding.
@@ -34,8 +34,9 @@ _MOST_ROUNDS, _MOST_STEPS, _MOST_HALVINGS = 1000, 50, 10
 #: A derivative is used again while each step leaves at most this share of the difference.
 _GOOD_STEP = 0.1
 
-#: Share of an input, or of its nominal value, by which it is changed to see what follows.
-_CHANGE = 1e-7
+#: Share of an input, or of its nominal value, by which it is changed to see what follows; of a
+#: Float32, and the share within which one is at rest.
+_CHANGE, _CHANGE_OF_FLOAT32, _GRAIN_OF_FLOAT32 = 1e-7, 1e-3, 2.0**-22
 
 #: More inputs than this are not solved for: their matrix would take more than 128 MB.
 _MOST_INPUTS = 4000
@@ -86,10 +87,9 @@ class _Part:
         """How its outputs change with its inputs, as the FMU says it, or by differences."""
         if self.outputs and self.instance.gives_derivatives:
             with suppress(ComponentFailed):
-                outputs = [variable.valueReference for variable in self.outputs]
+                outputs = [variable.name for variable in self.outputs]
                 columns = [
-                    self.instance.derivatives(outputs, variable.valueReference)
-                    for variable in self.inputs
+                    self.instance.derivatives(outputs, variable.name) for variable in self.inputs
                 ]
                 return np.array(columns).reshape(len(self.inputs), len(outputs)).T
         return self.changes()
@@ -127,6 +127,10 @@ class Ring:
         self._ports = [connection.target for connection in connections]
         self._real = np.array([_is_real(system, c) for c in connections], dtype=bool)
         self._reals = np.ix_(self._real, self._real)
+        grain = np.array([_grain(system, connection) for connection in connections])
+        self._rest, self._rounding = (
+            (np.maximum(relative, grain), absolute) for relative, absolute in (_REST, _ROUNDING)
+        )
         self._parts: list[_Part] = []
         for name in names:
             variables = system.components[name].variables
@@ -173,7 +177,7 @@ class Ring:
             {
                 self._columns[PortName(component.name, variable.name)]: variable
                 for variable in component.having(causality)
-                if variable.type == "Real"
+                if type_of(variable) == "Real"
             }
             for causality in ("input", "output")
         )
@@ -194,7 +198,7 @@ class Ring:
     @property
     def is_closed(self) -> bool:
         """Whether each input has what arrives there."""
-        return not _differ(*self._looked(), _REST).any()
+        return not _differ(*self._looked(), self._rest).any()
 
     def check(self) -> None:
         """Close the ring where something about its components has changed."""
@@ -232,7 +236,7 @@ class Ring:
         derivative, steps = None, 0
         for _ in range(_MOST_ROUNDS):
             held, arriving = self._looked()
-            moving = _differ(held, arriving, _ROUNDING)
+            moving = _differ(held, arriving, self._rounding)
             if not moving.any():
                 return
             if (
@@ -246,13 +250,13 @@ class Ring:
             steps += 1
             if derivative is None:
                 derivative = self._derivative()
-            near = not _differ(held, arriving, _REST).any()
+            near = not _differ(held, arriving, self._rest).any()
             left = self._step(held, arriving, derivative, 1 if near else _MOST_HALVINGS)
             if left >= 1.0 or steps == _MOST_STEPS or (near and left > _GOOD_STEP):
                 break
             if left > _GOOD_STEP:
                 derivative = None
-        moving = _differ(*self._looked(), _REST)
+        moving = _differ(*self._looked(), self._rest)
         if moving.any():
             ports = ", ".join(str(self._ports[i]) for i in np.flatnonzero(moving))
             raise ComponentFailed(
@@ -316,7 +320,7 @@ class Ring:
         return left
 
 
-def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[float, float]) -> np.ndarray:
+def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[np.ndarray, float]) -> np.ndarray:
     # Not numpy's isclose, which takes longer than the FMUs. What is not finite is named where the
     # row is looked at.
     relative, absolute = by
@@ -327,14 +331,22 @@ def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[float, float]) -> 
 def _is_real(system: System, connection: Connection) -> bool:
     """Whether a connection goes from a Real to a Real."""
     return all(
-        system.components[end.component].variables[end.port].type == "Real"
+        type_of(system.components[end.component].variables[end.port]) == "Real"
         for end in (connection.source, connection.target)
     )
 
 
+def _grain(system: System, connection: Connection) -> float:
+    """The share of a value that is lost on its way through a connection."""
+    ends = (connection.source, connection.target)
+    types = [system.components[end.component].variables[end.port].type for end in ends]
+    return _GRAIN_OF_FLOAT32 if "Float32" in types else 0.0
+
+
 def _near(held: float, variable: ModelVariable) -> float:
     """A value of an input beside the one that it has."""
-    change = _CHANGE * max(abs(held), abs(_number(variable.nominal, 1.0)) or 1.0)
+    share = _CHANGE_OF_FLOAT32 if variable.type == "Float32" else _CHANGE
+    change = share * max(abs(held), abs(_number(variable.nominal, 1.0)) or 1.0)
     return held + (change if held + change <= _number(variable.max, inf) else -change)
 
 

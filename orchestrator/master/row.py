@@ -10,12 +10,12 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.master.fmi.instance import Instance, Part
-from orchestrator.master.fmi.transfer import FMI_TYPES, are_integers
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import StringTable, Value
+from orchestrator.system.values import TYPES, Standing, StringTable, Value, are_of
+from orchestrator.system.variables import references_of
 
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12
@@ -37,7 +37,8 @@ class Row:
         values: of all ports, and the hidden ones.
         shown: a view of the columns only.
         columns: where the value of a port is.
-        strings, text_ports: the texts for which numbers stand in it, and the ports they belong to.
+        strings: what numbers in it stand for.
+        standing: the same for each port that may have such a number.
 
     """
 
@@ -56,7 +57,7 @@ class Row:
             (name, causality, fmi_type, ports)
             for name in instances
             for causality in ("input", "output")
-            for fmi_type in FMI_TYPES
+            for fmi_type in TYPES
             if (ports := _ports(system.components[name], causality, fmi_type))
         ]
         n = sum(len(ports) for *_, ports in groups)
@@ -66,11 +67,12 @@ class Row:
         self.values = np.zeros(n + more)
         self.shown = self.values[:n]
         self.columns: dict[PortName, int] = {}
-        self.strings, self.text_ports = StringTable(), set[PortName]()
+        self.strings = StringTable()
+        self.standing: dict[PortName, Standing] = {}
         self._hidden: dict[PortName, int] = {}
         self._sources = {c.target: c.source for c in system.connections}
         self._ports: dict[str, list[tuple[PortName, str, str]]] = {name: [] for name in instances}
-        self._integers: list[int] = []
+        self._inputs: dict[str, list[int]] = {}
         firsts: dict[str, int] = {}
         parts: dict[str, list[Part]] = {name: [] for name in instances}
         for component, causality, fmi_type, ports in groups:
@@ -81,17 +83,17 @@ class Row:
                 for i, port in enumerate(ports, start=where):
                     self._hidden[PortName(component, port.name)] = i
             first = where - firsts.setdefault(component, column)
-            references = [port.valueReference for port in ports]
+            references = references_of(ports)
             place = slice(first, first + len(ports))
             parts[component].append(Part(causality, fmi_type, references, place))
             for i, port in enumerate(ports, start=column):
                 name = PortName(component, port.name)
                 self.columns[name] = i
                 self._ports[component].append((name, causality, fmi_type))
-                if causality == "input" and fmi_type != "Real":
-                    self._integers.append(i)
-                if fmi_type == "String":
-                    self.text_ports.add(name)
+                if causality == "input":
+                    self._inputs.setdefault(fmi_type, []).append(i)
+                if TYPES[fmi_type].stands:
+                    self.standing[name] = Standing(fmi_type, self.strings)
                 self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
         for component, instance in instances.items():
             part = self.values[firsts.get(component, 0) :]
@@ -110,7 +112,12 @@ class Row:
 
     def number(self, value: Value) -> float:
         """What stands for a value in the row."""
-        return self.strings.number(value) if isinstance(value, str) else float(value)
+        return self.strings.stand_in(value)
+
+    def value(self, port: PortName) -> Value:
+        """The value of a port."""
+        number = float(self.values[self.columns[port]])
+        return self.standing[port].value(number) if port in self.standing else number
 
     def wrong(self, components: Iterable[str]) -> str | None:
         """The first value that is not finite or not of an input's type, in words.
@@ -122,7 +129,8 @@ class Row:
             What is wrong and where it comes from; None: nothing is.
 
         """
-        if np.isfinite(self.shown).all() and are_integers(self.values[self._integers]):
+        fit = all(are_of(of, self.values[places]).all() for of, places in self._inputs.items())
+        if fit and np.isfinite(self.shown).all():
             return None
         ports = [port for component in components for port in self._ports[component]]
         passed_on = None
@@ -130,7 +138,7 @@ class Row:
             value = self.values[self.columns[port]]
             if not isfinite(value):
                 text = f"{port} is {value:g}"
-            elif causality == "input" and fmi_type != "Real" and not are_integers(value):
+            elif causality == "input" and not are_of(fmi_type, value):
                 text = f"{port} is {value:.16g}, which FMI type {fmi_type} cannot hold"
             else:
                 continue
@@ -258,9 +266,9 @@ class Overrides:
         # Of inputs that nothing feeds: what they would have, and what is done to it.
         self._open: dict[int, tuple[float, float, float]] = {}
 
-    def override(self, target: PortName, value: float) -> None:
+    def override(self, target: PortName, value: Value) -> None:
         """Let an input take a value, whatever feeds it."""
-        self._alter(target, 0.0, value)
+        self._alter(target, 0.0, self._row.number(value))
 
     def bias(self, target: PortName, offset: float) -> None:
         """Let an input take the value that it would take, and something more."""
@@ -275,8 +283,9 @@ class Overrides:
         elif column in self._open:
             self._row.values[column], _, _ = self._open.pop(column)
 
-    def supply(self, target: PortName, value: float) -> None:
+    def supply(self, target: PortName, value: Value) -> None:
         """Let an input that nothing feeds have a value, which is altered as one that is fed is."""
+        value = self._row.number(value)
         column = self._row.columns[target]
         if column in self._open:
             _, factor, offset = self._open[column]

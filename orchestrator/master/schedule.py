@@ -73,7 +73,7 @@ class StageCall:
     def pointers(self) -> CMember:
         """The same for the compiled loop."""
         nothing = (CMove * 0)()
-        return CMember(None, address_of(self._called_back), nothing, nothing, 0, 0)
+        return CMember(None, address_of(self._called_back), None, nothing, nothing, 0, 0)
 
     def _tried(self, t: float, h: float) -> int:
         try:

@@ -77,7 +77,7 @@ def simulate_plan(
                 experiment,
                 _parameters(system, instances, log),
                 stepping.name,
-                dict.fromkeys(map(str, row.text_ports), row.strings),
+                {str(port): standing for port, standing in row.standing.items()},
                 _units(system, row.columns),
             )
         scheduled, gatherings = coupling.schedule()
@@ -117,7 +117,10 @@ def simulate_plan(
 
 
 def simulate_to_end(
-    plan: Plan, observers: Sequence[Observer] = (), exchange: Exchange = OURS
+    plan: Plan,
+    observers: Sequence[Observer] = (),
+    exchange: Exchange = OURS,
+    hooks: Sequence[Hook] = (),
 ) -> None:
     """Run a system of which nothing less than all rows will do.
 
@@ -126,7 +129,7 @@ def simulate_to_end(
         KeyboardInterrupt: a signal has come to stop it.
 
     """
-    ending = simulate_plan(plan, observers, exchange=exchange)
+    ending = simulate_plan(plan, observers, hooks=hooks, exchange=exchange)
     if ending.interrupts:
         raise KeyboardInterrupt
     if ending.failure is not None:

@@ -9,17 +9,19 @@
 #else
 #define _POSIX_C_SOURCE 199309L
 #include <time.h>
-#define EXPORTED
+#define EXPORTED __attribute__((visibility("default")))
 #endif
 #ifndef __x86_64__
 #include <fenv.h>
 #endif
-#include <limits.h>
+#include <float.h>
+#include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 #include <string.h>
 
-/* The worst of FMI's statuses that is not a failure, and one that is. */
-enum { FMI2_WARNING = 1, FMI2_ERROR = 3 };
+/* The worst of FMI's statuses that is not a failure, and two that are. */
+enum { FMI_WARNING = 1, FMI_DISCARD = 2, FMI_ERROR = 3 };
 
 /* Steps of which so many take no time to speak of are timed so many together. */
 enum { MANY = 1024, FEW = 8 };
@@ -29,26 +31,40 @@ enum { LANES = 4 };
 
 typedef unsigned reference;
 
-/* FMI's function that moves values of one type, to an FMU or from it. */
+/* What moves values of one type, to an FMU or from it. */
 typedef union {
-    int (*set_reals)(void *component, const reference[], size_t n, const double[]);
-    int (*set_integers)(void *component, const reference[], size_t n, const int[]);
-    int (*get_reals)(void *component, const reference[], size_t n, double[]);
-    int (*get_integers)(void *component, const reference[], size_t n, int[]);
+    int (*fmi2)(void *component, const reference[], size_t n, void *values);
+    int (*fmi3)(void *component, const reference[], size_t n, void *values, size_t n_values);
+    int (*python)(void); /* it looks at the row itself */
 } mover;
 
 /* Values of one type that are neighbours in the row. */
 typedef struct {
     mover call;
     const reference *references;
-    size_t n;
-    double *values; /* their place in the row */
-    int *integers;  /* as FMI's Integers or Booleans; NULL: they are Reals */
+    size_t n_references, n;
+    double *row;  /* their place in the row */
+    void *values; /* as the FMU has them: doubles are the row itself */
+    enum {
+        IN_PLACE, OF_FLOAT32, OF_INT8, OF_UINT8, OF_INT16, OF_UINT16, OF_INT32, OF_UINT32, BY_PYTHON
+    } kind;
+    int is_counted; /* whether the function is told how many values there are, as in FMI 3.0 */
 } move;
+
+/* What doStep of FMI 3.0 tells. */
+typedef struct {
+    bool event, terminate, early;
+    double last;
+} told_by_step;
 
 typedef struct {
     void *component;
-    int (*do_step)(void *component, double t, double h, int no_rollback);
+    union {
+        int (*fmi2)(void *component, double t, double h, int no_rollback);
+        int (*fmi3)(void *component, double t, double h, bool no_rollback, bool *event,
+                    bool *terminate, bool *early, double *last);
+    } do_step;
+    told_by_step *told; /* NULL: it is FMI 2.0 */
     const move *inputs, *outputs;
     size_t n_inputs, n_outputs;
 } member;
@@ -128,34 +144,65 @@ static double now(void) {
 #endif
 }
 
-static int set(const move *inputs, void *component) {
-    size_t i;
-    if (inputs->integers == NULL) {
-        return inputs->call.set_reals(component, inputs->references, inputs->n, inputs->values);
+static int call(const move *it, void *component) {
+    if (it->is_counted) {
+        return it->call.fmi3(component, it->references, it->n_references, it->values, it->n);
     }
-    for (i = 0; i < inputs->n; i++) {
-        const double value = inputs->values[i];
-        /* The check of the row names values that FMI's Integer cannot hold. */
-        if (!(value >= INT_MIN && value <= INT_MAX && value == (int)value)) return FMI2_ERROR;
-        inputs->integers[i] = (int)value;
-    }
-    return inputs->call.set_integers(component, inputs->references, inputs->n, inputs->integers);
+    return it->call.fmi2(component, it->references, it->n_references, it->values);
 }
 
-static int get(const move *outputs, void *component) {
+/* The check of the row names values that a type cannot hold. */
+#define SET(kind, type, fits)                                                                    \
+    case kind:                                                                                   \
+        for (i = 0; i < it->n; i++) {                                                            \
+            const double value = it->row[i];                                                     \
+            if (!(fits)) return FMI_ERROR;                                                           \
+            ((type *)it->values)[i] = (type)value;                                               \
+        }                                                                                        \
+        break;
+#define SET_INTEGERS(kind, type, least, most)                                                    \
+    SET(kind, type, value >= least && value <= most && value == (double)(type)value)
+
+static int set(const move *it, void *component) {
     size_t i;
-    int status;
-    if (outputs->integers == NULL) {
-        return outputs->call.get_reals(component, outputs->references, outputs->n, outputs->values);
+    switch (it->kind) {
+        case IN_PLACE: break;
+        case BY_PYTHON: return it->call.python();
+        SET(OF_FLOAT32, float, value >= -FLT_MAX && value <= FLT_MAX)
+        SET_INTEGERS(OF_INT8, int8_t, INT8_MIN, INT8_MAX)
+        SET_INTEGERS(OF_UINT8, uint8_t, 0, UINT8_MAX)
+        SET_INTEGERS(OF_INT16, int16_t, INT16_MIN, INT16_MAX)
+        SET_INTEGERS(OF_UINT16, uint16_t, 0, UINT16_MAX)
+        SET_INTEGERS(OF_INT32, int32_t, INT32_MIN, INT32_MAX)
+        SET_INTEGERS(OF_UINT32, uint32_t, 0, UINT32_MAX)
     }
-    status = outputs->call.get_integers(component, outputs->references, outputs->n,
-                                        outputs->integers);
-    for (i = 0; i < outputs->n; i++) outputs->values[i] = outputs->integers[i];
+    return call(it, component);
+}
+
+#define GET(kind, type)                                                                          \
+    case kind:                                                                                   \
+        for (i = 0; i < it->n; i++) it->row[i] = ((const type *)it->values)[i];                  \
+        break;
+
+static int get(const move *it, void *component) {
+    size_t i;
+    const int status = it->kind == BY_PYTHON ? it->call.python() : call(it, component);
+    switch (it->kind) {
+        case IN_PLACE:
+        case BY_PYTHON: break;
+        GET(OF_FLOAT32, float)
+        GET(OF_INT8, int8_t)
+        GET(OF_UINT8, uint8_t)
+        GET(OF_INT16, int16_t)
+        GET(OF_UINT16, uint16_t)
+        GET(OF_INT32, int32_t)
+        GET(OF_UINT32, uint32_t)
+    }
     return status;
 }
 
 /* Whether a status is worse than a warning, or none of FMI's. */
-static int is_bad(int status) { return (unsigned)status > FMI2_WARNING; }
+static int is_bad(int status) { return (unsigned)status > FMI_WARNING; }
 
 /* Read the outputs of a stage, with care for the mode after each component; whether one failed. */
 static int outputs_failed(const stage *this, int careful, failure *why) {
@@ -171,6 +218,16 @@ static int outputs_failed(const stage *this, int careful, failure *why) {
     return 0;
 }
 
+static int do_step(const member *it, double t, double h) {
+    told_by_step *told = it->told;
+    int status;
+    if (told == NULL) return it->do_step.fmi2(it->component, t, h, 1);
+    status = it->do_step.fmi3(it->component, t, h, true, &told->event, &told->terminate,
+                              &told->early, &told->last);
+    /* Python sees what it means. */
+    return !is_bad(status) && (told->terminate || told->early) ? FMI_DISCARD : status;
+}
+
 /* Step the components of a stage; whether one of them failed. */
 static int stage_failed(const stage *this, double t, double h, failure *why) {
     size_t i, j;
@@ -182,7 +239,7 @@ static int stage_failed(const stage *this, double t, double h, failure *why) {
             if (is_bad(why->status = set(&it->inputs[j], it->component))) return 1;
         }
         why->call = DO_STEP;
-        if (is_bad(why->status = it->do_step(it->component, t, h, 1))) return 1;
+        if (is_bad(why->status = do_step(it, t, h))) return 1;
         if (this->n_members > 1) put_back();
     }
     why->call = GET_OUTPUTS;

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import sysconfig
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_void_p
@@ -11,6 +9,9 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
+from fmpy import platform_tuple, sharedLibraryExtension
+
+from fmus.compilers import FLAGS
 from orchestrator.machine import cache as user_cache
 from orchestrator.machine.children import compile_library, find_compiler, find_fast_compiler
 from orchestrator.machine.disk import hold_lock
@@ -21,13 +22,10 @@ from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import CBlock
 from orchestrator.master.schedule import Decimation, Stage
 
-_SOURCE = Path(__file__).with_name("stepper.c")
+SOURCE = Path(__file__).with_name("stepper.c")
 
-#: Products are not contracted with sums: t + h must not depend on the processor.
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-shared", "-fPIC")
-
-#: What it is in the user's cache folder.
-_CATEGORY = "loop"
+#: What it is among what is kept.
+CATEGORY = "loop"
 
 #: Libraries that this process has loaded, by cache folders.
 _in_use: dict[Path, CDLL] = {}
@@ -152,7 +150,7 @@ def load_stepper() -> CDLL | None:
         # What is loaded needs no second look: short runs would take longer for it.
         with suppress(OSError):
             _in_use.update(
-                (folder, _loaded(path)) for path in user_cache.read_cached(_CATEGORY, _key())
+                (folder, _loaded(path)) for path in user_cache.read_cached(CATEGORY, key_of())
             )
     return _in_use.get(folder)
 
@@ -173,13 +171,13 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     try:
-        with hold_lock(user_cache.category_folder(_CATEGORY), wait=True):
+        with hold_lock(user_cache.category_folder(CATEGORY), wait=True):
             if library := load_stepper():
                 # Another process was first.
                 return library
-            content = compile_library(found, *_FLAGS, str(_SOURCE))
-            name = "stepper" + (".dll" if sys.platform == "win32" else ".so")
-            [place] = user_cache.write_cached(_CATEGORY, _key(), {name: content})
+            content = compile_library(found, *FLAGS, str(SOURCE))
+            name = f"stepper{sharedLibraryExtension}"
+            [place] = user_cache.write_cached(CATEGORY, key_of(), {name: content})
         return _loaded(place)
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
@@ -194,8 +192,8 @@ def _loaded(place: Path) -> CDLL:
 
 
 @cache
-def _key() -> str:
-    """Of the text, the flags and the kind of machine."""
-    digest = sha256(_SOURCE.read_bytes())
-    digest.update("\0".join((*_FLAGS, sysconfig.get_platform())).encode())
+def key_of(machine: str = platform_tuple) -> str:
+    """Of the text, the flags and the machine, as FMI 3.0 calls it."""
+    digest = sha256(SOURCE.read_bytes())
+    digest.update("\0".join((*FLAGS, machine)).encode())
     return digest.hexdigest()[:16]

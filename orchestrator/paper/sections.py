@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.kinds import PYTHON
+from fmus.kinds import AUTO
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
@@ -61,7 +61,7 @@ class Section:
         return escape_markdown(self.scenario.title or self.scenario.name)
 
 
-def sections(references: Sequence[str], kind: str = PYTHON) -> list[Section]:
+def sections(references: Sequence[str], kind: str = AUTO) -> list[Section]:
     """The sections of some scenarios.
 
     Args:

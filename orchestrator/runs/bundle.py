@@ -11,6 +11,7 @@ import json
 import keyword
 import re
 import shutil
+import warnings
 from collections.abc import Mapping, Sequence
 from functools import cache
 from hashlib import sha256
@@ -21,10 +22,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from fmus.discovery import fingerprint
-from fmus.kinds import CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
+from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
-from orchestrator.machine.children import run_module
+from orchestrator.machine.children import find_fast_compiler, run_module
 from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
@@ -39,8 +40,8 @@ DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "n
 _ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 _CHECKSUMS, _BILL = "SHA256SUMS", "bom.cdx.json"
 
-#: What the FMUs of runs are in the user's cache folder.
-_CATEGORY = "fmus"
+#: What the FMUs of runs are among what is kept.
+CATEGORY = "fmus"
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
@@ -150,7 +151,7 @@ def _package(name: str) -> dict[str, Any]:
 
 
 def settings_of(folder: Path) -> dict[str, str]:
-    """How the FMUs in a folder were built."""
+    """How the FMUs in a folder were built: their kind, and more."""
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     return dict(content["settings"])
 
@@ -177,11 +178,12 @@ def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
 
 
 @cache
-def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
+def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
     """The folder with the FMUs of the installed sources, built if it is not there.
 
     Args:
-        kind: one of :data:`fmus.kinds.KINDS`.
+        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they are there or this machine
+            has a C compiler, else Python.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
 
     Raises:
@@ -189,13 +191,15 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
             written.
 
     """
+    if kind == AUTO:
+        return _best_fmus(fmi)
     if kind not in KINDS:
-        raise InputError(f"kind {kind!r}: use one of {', '.join(KINDS)}")
-    key = sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
+        raise InputError(f"kind {kind!r}: use one of {', '.join((AUTO, *KINDS))}")
+    key = key_of(kind, fmi)
     if found := _kept(key):
         return found
     try:
-        with hold_lock(category_folder(_CATEGORY), wait=True):
+        with hold_lock(category_folder(CATEGORY), wait=True):
             # Another process may have been first.
             return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
     except OSError as error:
@@ -205,9 +209,26 @@ def current_fmus(kind: str = PYTHON, fmi: str = FMI_VERSIONS[0]) -> Path:
         ) from error
 
 
+def _best_fmus(fmi: str) -> Path:
+    if found := _kept(key_of(NATIVE, fmi)):
+        return found
+    if find_fast_compiler():
+        try:
+            return current_fmus(NATIVE, fmi)
+        except InputError as error:
+            # The command may be there, and what it needs not.
+            warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
+    return current_fmus(PYTHON, fmi)
+
+
+def key_of(kind: str, fmi: str) -> str:
+    """Of the FMUs that the installed sources give."""
+    return sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
+
+
 def _kept(key: str) -> Path | None:
     """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in read_cached(_CATEGORY, key)), None)
+    return next((path.parent for path in read_cached(CATEGORY, key)), None)
 
 
 def _built(key: str, *options: str) -> Path:
@@ -215,7 +236,7 @@ def _built(key: str, *options: str) -> Path:
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         run_fmus("build", Path(temporary), *options)
         files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return write_cached(_CATEGORY, key, files)[0].parent
+    return write_cached(CATEGORY, key, files)[0].parent
 
 
 def new_controller(

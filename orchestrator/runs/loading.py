@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from fmus.kinds import FMI_VERSIONS, PYTHON
+from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE
 from orchestrator.figures.run_figures import check_figure
 from orchestrator.formats.osp_and_container import OSP_STRUCTURE, read_osp
 from orchestrator.formats.ssp import STRUCTURE
@@ -30,7 +30,7 @@ T = TypeVar("T")
 
 
 def load(
-    name: str | Path, kind: str = PYTHON, *, variant: str | None = None, strict: bool = False
+    name: str | Path, kind: str = AUTO, *, variant: str | None = None, strict: bool = False
 ) -> System:
     """The system of a scenario, or of a file of others, with its experiment.
 
@@ -39,7 +39,7 @@ def load(
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
             OspSystemStructure.xml; an SSP and the latter may also be a folder.
-        kind: of the bundle's FMUs, `python` or `native`.
+        kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where it is to be had.
         variant: which of the descriptions in an SSP; None: the default.
         strict: refuse what otherwise is a warning.
 
@@ -72,7 +72,7 @@ def notes_as_warnings(strict: bool = False) -> Iterator[Findings]:
 
 def load_scenario(
     name: str,
-    kind: str = PYTHON,
+    kind: str = AUTO,
     fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
@@ -82,7 +82,8 @@ def load_scenario(
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
             OspSystemStructure.xml; an SSP and the latter may also be a folder.
-        kind: of the bundle's FMUs, `python` or `native`; FMUs that a file names are as they are.
+        kind: of the bundle's FMUs: `python`, `native` or `auto`; FMUs that a file names are as
+            they are.
         fmi: their version of FMI. The master can step FMUs of the first only.
         variant: which of the descriptions in an SSP; None: the default.
         findings: takes what is wrong with it; None: harmless flaws are ignored.
@@ -162,7 +163,7 @@ def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> No
         InputError: it would not have any effect.
 
     """
-    if (kind, fmi) != (PYTHON, FMI_VERSIONS[0]):
+    if kind == NATIVE or fmi != FMI_VERSIONS[0]:
         raise InputError(f"{name}: brings its own FMUs; kind and fmi apply only to the bundle's")
 
 

@@ -124,7 +124,7 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
         "messages": list(ending.messages),
         "experiment": vars(header.experiment),
         "loop": header.loop,
-        "texts": sorted(header.strings),
+        "texts": sorted(name for name, one in header.standing.items() if one.c_type is None),
         "units": dict(header.units),
         "vehicles": [asdict(loop) for loop in loops],
         "events": [occurrence._asdict() for occurrence in ending.events],

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
-from fmus.kinds import KINDS, PYTHON
+from fmus.kinds import AUTO, KINDS
 from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, format_order, read_order
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.hooks.checkpoint import check_every
@@ -52,8 +52,8 @@ Kind = Annotated[
     str,
     CliOption(
         "kind of the bundle's FMUs: Python source, or its translation to C, with the same numbers; "
-        f"default: {PYTHON}",
-        choices=KINDS,
+        f"default: {AUTO}, native where it is available or there is a C compiler",
+        choices=(AUTO, *KINDS),
     ),
 ]
 
@@ -120,7 +120,7 @@ class Request:
             choices=COUPLINGS,
         ),
     ] = None
-    kind: Kind = PYTHON
+    kind: Kind = AUTO
     events: Annotated[
         str | Sequence[Mapping[str, Any]] | None,
         CliOption(

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fmus.kinds import PYTHON
+from fmus.kinds import AUTO
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.master.experiment import Order, format_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
@@ -193,7 +193,7 @@ def simulate(
     stop_time: float | None = None,
     step: float | None = None,
     order: Order | None = None,
-    kind: str = PYTHON,
+    kind: str = AUTO,
     progress: bool = False,
     isolate: bool = False,
     step_timeout: float | None = None,
@@ -223,7 +223,8 @@ def simulate(
         order: `gauss-seidel`, as the paper's scheme has it, `jacobi`, as most tools step, or the
             names of all components, one stepped after the other; None: the scenario's own, else
             `gauss-seidel`.
-        kind: of the bundle's FMUs, `python` or `native`: translated to C, with the same numbers.
+        kind: of the bundle's FMUs, `python`, `native`: translated to C, with the same numbers, or
+            `auto`, native where it is to be had.
         progress: show a bar on runs that take longer than some seconds.
         isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
             a failure of the run.

@@ -20,7 +20,6 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, Ledger
-from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import RealTime
@@ -385,13 +384,16 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
         for component in system.components.values()
         for causality in (("output",) if outputs else ("input", "output"))
         for variable in component.having(causality)
-        if variable.type in FMI_TYPES
     ]
     if outputs:
         return names
     patterns = [pattern.strip() for pattern in wanted.split(",") if pattern.strip()]
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
+    for name, component in system.components.items():
+        for variable, why in component.left_alone.items():
+            if f"{name}.{variable}" in patterns:
+                raise InputError(f"--columns: {name}.{variable} {why}")
     if is_companion:
         return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
     return matching(names, patterns)

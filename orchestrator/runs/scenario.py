@@ -23,7 +23,7 @@ from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
 from orchestrator.system.names import PortName, file_name, flatten, port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import finite, type_of, typed
+from orchestrator.system.values import EXACT, finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
@@ -185,22 +185,43 @@ def read_inputs(
         InputError: the table cannot be read, or a column is not an available input.
 
     """
-    file = inputs.file
-    names, rows = inputs.content
-    targets = tuple(map(system.named, names))
     try:
-        _check_rows(rows, targets)
-        for target, column in zip(targets, rows[:, 1:].T, strict=True):
-            if target in map(system.named, given):
-                raise InputError(f"{target} is given both a value and a column of the table")
-            _check_column(system, target, column)
-        linear = [_is_linear(system, target, inputs.between) for target in targets]
-        input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
-        start = system.start_time or 0.0
-        values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
-        return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
+        return with_input_table(system, *inputs.content, given, inputs.between)
     except InputError as error:
-        raise InputError(f"{file}: {error}") from error
+        raise InputError(f"{inputs.file}: {error}") from error
+
+
+def with_input_table(
+    system: System,
+    names: Sequence[PortName],
+    rows: np.ndarray,
+    given: Collection[PortName] = (),
+    between: str = "linear",
+) -> tuple[System, InputTable]:
+    """A system that begins with the first values of inputs over time, and what follows.
+
+    Args:
+        system: that has the inputs.
+        names: of the inputs.
+        rows: their values, time first.
+        given: ports that have values already.
+        between: what continuous Real inputs do between two rows.
+
+    Raises:
+        InputError: a column is not an available input, or cannot be followed.
+
+    """
+    targets = tuple(map(system.named, names))
+    _check_rows(rows, targets)
+    for target, column in zip(targets, rows[:, 1:].T, strict=True):
+        if target in map(system.named, given):
+            raise InputError(f"{target} is given both a value and a column of the table")
+        _check_column(system, target, column)
+    linear = [_is_linear(system, target, between) for target in targets]
+    input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
+    start = system.start_time or 0.0
+    values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
+    return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
 
 
 def _check_rows(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
@@ -227,6 +248,8 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
     is_real = type_of(variable) == "Real"
+    if type_of(variable) == "Integer" and abs(column).max() > EXACT:
+        raise InputError(f"{target}: a table holds integers up to 2^53 only")
     for value in (column.min(), column.max()) if is_real else np.unique(column):
         typed(str(target), variable, _number(value))
 

@@ -23,7 +23,7 @@ from orchestrator.master.hooks.events import (
 from orchestrator.system.names import PortName, flatten, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import INTEGERS, finite, is_finite, literal, type_of, typed
+from orchestrator.system.values import TYPES, Value, finite, is_finite, literal, type_of, typed
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -196,8 +196,8 @@ def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple
 def _altered(
     values: Mapping[str, Any],
     system: System,
-    arriving: Callable[[System, PortName, Connection | None, Any], float],
-) -> tuple[tuple[PortName, float], ...]:
+    arriving: Callable[[System, PortName, Connection | None, Any], Value],
+) -> tuple[tuple[PortName, Value], ...]:
     """The inputs that some signals reach, with what arrives there of their values."""
     return tuple(
         (route.target if route else port, arriving(system, port, route, one))
@@ -207,23 +207,23 @@ def _altered(
     )
 
 
-def _value(system: System, port: PortName, route: Connection | None, value: Any) -> float:
+def _value(system: System, port: PortName, route: Connection | None, value: Any) -> Value:
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
-    number = float(typed(str(port), variable, _text(value)))
+    found = typed(str(port), variable, _text(value))
     if route is None or route.transformation is None:
-        return number
-    return _arrived(port, route, value, route.transformation(number))
+        return found
+    return _arrived(port, route, value, route.transformation(float(found)))
 
 
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
     """What is added to an input where a signal is biased."""
     variable = system.component(port.component).variable(port.port)
-    if type_of(variable) not in ("Real", "Integer"):
-        raise InputError(f"{port} is of type {type_of(variable)}: nothing can be added to it")
-    least, most = INTEGERS
+    of = TYPES[variable.type]
+    if of.family not in ("Real", "Integer") or of.is_wide:
+        raise InputError(f"{port} is of type {variable.type}: nothing can be added to it")
     if not is_finite(value) or (
-        type_of(variable) == "Integer" and (value != int(value) or abs(value) > most - least)
+        of.family == "Integer" and (value != int(value) or abs(value) > of.most - of.least)
     ):
         raise InputError(f"{port}: {value!r} cannot be added to it")
     match route:
@@ -254,7 +254,7 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":
-                inputs.append((port, float(typed(str(port), variable, _text(one)))))
+                inputs.append((port, typed(str(port), variable, _text(one))))
             elif variable.variability != "tunable":
                 raise InputError(
                     f"{port} is a {variable.variability} parameter: it cannot change during a run"

@@ -18,7 +18,7 @@ from auv_fmu.closed_loop import LAWS, Moment, Setting, splits
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from auv_fmu.output_feedback import Gains
 from fmus.auv_plant.behaviour import check
-from fmus.kinds import PYTHON
+from fmus.kinds import AUTO
 from fmus.ports.port import Refusal
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
@@ -69,7 +69,7 @@ class BatchEngine:
     Where it makes them no FMUs are needed.
     """
 
-    def __init__(self, systems: Mapping[str, System], kind: str = PYTHON) -> None:
+    def __init__(self, systems: Mapping[str, System], kind: str = AUTO) -> None:
         """Take systems.
 
         Args:
@@ -142,7 +142,7 @@ class BatchEngine:
         return _table(job, rows[: made + 1], failure)
 
 
-def check_systems(systems: Mapping[str, System], kind: str = PYTHON) -> None:
+def check_systems(systems: Mapping[str, System], kind: str = AUTO) -> None:
     """Check that systems, by their names, are what the equations make.
 
     Raises:

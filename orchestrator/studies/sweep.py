@@ -6,7 +6,7 @@ import platform
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.util import find_spec
@@ -16,12 +16,13 @@ from typing import Annotated, Any
 from tqdm import tqdm
 
 from fmus.compilers import machines_compiler
-from fmus.kinds import PYTHON
+from fmus.kinds import AUTO, KINDS, PYTHON
 from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS
 from orchestrator.master.plan import PACKAGES
+from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, Kind, LoopName
@@ -72,7 +73,7 @@ class Means:
             choices=ENGINES,
         ),
     ] = None
-    kind: Kind = PYTHON
+    kind: Kind = AUTO
     loop: LoopName = LOOPS[0]
     scheduler: Annotated[
         str | None,
@@ -102,7 +103,7 @@ def sweep(
     study: str | Path | Mapping[str, Any],
     *,
     engine: str | None = None,
-    kind: str = PYTHON,
+    kind: str = AUTO,
     loop: str = LOOPS[0],
     scheduler: str | None = None,
     workers: int | None = None,
@@ -118,7 +119,8 @@ def sweep(
     Args:
         study: name of a ready study, path of a .toml file, or what such a file holds.
         engine: that makes the runs, `fmu` or `batch`; None: the study's own.
-        kind: of the bundle's FMUs, `python` or `native`.
+        kind: of the bundle's FMUs, `python`, `native`, or `auto`: the one that the study was begun
+            with, else native where it is to be had.
         loop: that makes their steps: `python`, `compiled` or `auto`.
         scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
             this machine.
@@ -167,7 +169,11 @@ def complete_study(
 
     """
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
-    systems = {name: load_scenario(name, means.kind) for name in study.scenario}
+    kind = _kind_begun(folder) if means.kind == AUTO else means.kind
+    systems = {name: load_scenario(name, kind) for name in study.scenario}
+    if any(scenario.digest for scenario, _ in systems.values()):
+        kind = settings_of(current_fmus(kind))["kind"]
+    means = replace(means, kind=kind)
     space = Space(study, systems)
     entries = read_figures(
         study.name, study.figures, space.columns, space.has_scenarios, space.indices
@@ -190,6 +196,14 @@ def complete_study(
         for note in notes:
             say(note)
     return result
+
+
+def _kind_begun(folder: Path) -> str:
+    """The kind of FMU that the study in a folder was begun with; if there is none, any."""
+    with suppress(InputError):
+        if (begun := read_study_record(folder).get("kind")) in KINDS:
+            return str(begun)
+    return AUTO
 
 
 def check_installed(needed: Sequence[str] = _NEEDED) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -16,22 +16,29 @@ from fmpy.model_description import ModelDescription, ModelVariable, ValidationEr
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
 from orchestrator.machine.user_files import unpack, unpacked_folder
-from orchestrator.system.values import Value, finite, integer, real, typed
+from orchestrator.system.values import Value, finite, integer, real, type_of, typed
+from orchestrator.system.variables import Variables, array_of, complete, variables_of
 
-_CAUSALITIES = {"parameter", "calculatedParameter", "input", "output", "local", "independent"}
+_CAUSALITIES = {
+    "structuralParameter", "parameter", "calculatedParameter", "input", "output", "local",
+    "independent",
+}  # fmt: skip
 
 #: Attributes that fmpy reads as Python reads numbers, which takes 1_000, and digits of any script.
 _INTEGERS = {
     "kg", "m", "s", "A", "K", "mol", "cd", "rad", "valueReference", "value", "index",
-    "dependencies", "derivative", "previous",
+    "dependencies", "derivative", "previous", "clocks",
 }  # fmt: skip
 _REALS = {"factor", "offset", "min", "max"}
+
+#: Attributes that hold several numbers.
+_LISTS = {"dependencies", "clocks"}
 
 #: Elements in which the same words may stand for something else.
 _OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 
 #: The versions of FMI that a system can be written with, and those that the master can step.
-WRITABLE, RUNNABLE = ("2.0", "3.0"), ("2.0",)
+WRITABLE = RUNNABLE = ("2.0", "3.0")
 
 
 class Described(NamedTuple):
@@ -55,14 +62,18 @@ def read_description(folder: Path) -> Described:
         Exception: it cannot be read; whatever it is, it says why.
 
     """
+    flaw: Exception | None = None
     try:
-        return Described(fmpy.read_model_description(folder), None)
+        description = fmpy.read_model_description(folder)
     except Exception as error:
         flaw = error
-    try:
-        return Described(fmpy.read_model_description(folder, validate=False), flaw)
-    except Exception:
-        raise flaw from None
+        try:
+            description = fmpy.read_model_description(folder, validate=False)
+        except Exception:
+            raise flaw from None
+    if description.fmiMajorVersion == 3:
+        complete(description, ElementTree.parse(folder / "modelDescription.xml").getroot())
+    return Described(description, flaw)
 
 
 @lru_cache(maxsize=256)
@@ -96,7 +107,9 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
     implementation = found.description.coSimulation
     if implementation is None:
-        raise InputError(f"{fmu}: is for model exchange only; only co-simulation is supported")
+        scheduled = found.description.modelExchange is None
+        which = "scheduled execution" if scheduled else "model exchange"
+        raise InputError(f"{fmu}: is for {which} only; only co-simulation is supported")
     if found.description.guid is None:
         raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
     identifier = implementation.modelIdentifier
@@ -121,7 +134,7 @@ def _misread(file: Path) -> Iterator[str]:
         for name in sorted(element.attrib.keys() & (_INTEGERS | _REALS)):
             text = element.attrib[name]
             try:
-                for one in text.split() if name == "dependencies" else [text]:
+                for one in text.split() if name in _LISTS else [text]:
                     (integer if name in _INTEGERS else real)(one)
             except ValueError:
                 shown = shortened(repr(text))
@@ -163,10 +176,33 @@ class Component:
         """
         return unpacked_folder(self.fmu, self.digest)
 
+    @property
+    def variables(self) -> Mapping[str, ModelVariable]:
+        """The FMU's variables by name, except the ones that are left alone."""
+        return self._variables.known
+
+    @property
+    def left_alone(self) -> Mapping[str, str]:
+        """Why others cannot be connected, set or recorded, by name."""
+        return self._variables.left_alone
+
+    @property
+    def remainder(self) -> str:
+        """Which variables are left alone, in words."""
+        return f"leaves {shortened(', '.join(self.left_alone))} alone: not supported"
+
     @cached_property
-    def variables(self) -> dict[str, ModelVariable]:
-        """The FMU's variables by name."""
-        return {variable.name: variable for variable in self.description.modelVariables}
+    def _variables(self) -> Variables:
+        return variables_of(self.description)
+
+    @cached_property
+    def arrays(self) -> dict[str, list[ModelVariable]]:
+        """The elements of each array, in their order."""
+        found: dict[str, list[ModelVariable]] = {}
+        for variable in self.variables.values():
+            if variable.shape:
+                found.setdefault(array_of(variable), []).append(variable)
+        return found
 
     @property
     def is_once_per_process(self) -> bool:
@@ -202,6 +238,9 @@ class Component:
             InputError: there is no such variable.
 
         """
+        for others in (self.left_alone, self._variables.other_names):
+            if name in others:
+                raise InputError(f"{self.name}.{name} {others[name]}")
         if name not in self.variables:
             hint = did_you_mean(name, self.variables)
             raise InputError(f"{self.name} has no port or parameter {name!r}{hint}")
@@ -209,7 +248,7 @@ class Component:
 
     def having(self, causality: str) -> list[ModelVariable]:
         """The variables of one causality, in the order of the description."""
-        return [v for v in self.description.modelVariables if v.causality == causality]
+        return [v for v in self.variables.values() if v.causality == causality]
 
     def start(self, name: str) -> Value | None:
         """The start value of a variable, in its type; None: its description names none.
@@ -249,13 +288,16 @@ class Component:
         """
         variable = self.variable(name)
         return variable.causality == "input" or (
-            variable.variability != "constant" and variable.initial in ("exact", "approx")
+            variable.variability != "constant"
+            and variable.initial in ("exact", "approx")
+            # Sizes of arrays are the ones that the description begins with.
+            and variable.causality != "structuralParameter"
         )
 
     def is_continuous(self, name: str) -> bool:
         """Whether a variable may change at any time (FMI 2.0.4, section 2.2.7)."""
         variable = self.variable(name)
-        return variable.type == "Real" and variable.variability in (None, "continuous")
+        return type_of(variable) == "Real" and variable.variability in (None, "continuous")
 
     def has_feedthrough(self, output: str) -> bool:
         """Whether an output depends on an input of the same instant."""
@@ -270,7 +312,7 @@ class Component:
             if unknown.dependencies is not None
             and not any(variable.causality == "input" for variable in unknown.dependencies)
         }
-        return frozenset(variable.name for variable in self.having("output")) - free
+        return frozenset(v.name for v in self.having("output") if array_of(v) not in free)
 
 
 def read_component(

@@ -8,15 +8,16 @@ from functools import cached_property
 from pathlib import Path
 from sys import float_info
 
+import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, listed, plain_file_names, splits
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.system.values import INTEGERS, Value, type_of, typed, unit_of
+from orchestrator.system.values import EXACT, TYPES, Value, typed, unit_of
 
-#: What can be fed from another type, besides from its own: no value is lost on the way.
+#: What can be fed from another family of types, besides from its own.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
 
 
@@ -220,10 +221,10 @@ class System:
                     f"{source} -> {target}: {end} is of causality {variable.causality}, "
                     f"not {wanted}"
                 )
-        if type_of(a) not in (type_of(b), *_FED_FROM.get(type_of(b), ())):
+        if not _can_feed(a, b):
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
         if connection.transformation not in (None, Linear()):
-            _check_transformed(connection, type_of(b))
+            _check_transformed(connection, b.type)
         if connection.transformation is not None or unit_of(a) == unit_of(b):
             return
         units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
@@ -236,21 +237,33 @@ class System:
             raise InputError(f"{source} -> {target}: units differ, {names}")
 
 
+def _can_feed(source: ModelVariable, target: ModelVariable) -> bool:
+    """Whether a variable takes all values of another, and none is lost on the way."""
+    start, end = TYPES[source.type], TYPES[target.type]
+    if start.family not in (end.family, *_FED_FROM.get(end.family, ())):
+        return False
+    if (start.family, end.family) == ("Integer", "Real"):
+        return bool(start.most < 2 ** np.finfo(np.dtype(end.c_type)).nmant)
+    return end.least <= start.least and start.most <= end.most
+
+
 def _check_transformed(connection: Connection, fmi_type: str) -> None:
     """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
     linear = isinstance(connection.transformation, Linear)
-    if fmi_type == "String" or (linear and fmi_type != "Real"):
+    of = TYPES[fmi_type]
+    is_real = of.family == "Real"
+    if of.family == "String" or (linear and not is_real):
         how = "transformed linearly" if linear else "mapped"
         raise InputError(
             f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
             f"{how}"
         )
     if isinstance(connection.transformation, Mapped):
-        least, most = {"Real": (-float_info.max, float_info.max), "Boolean": (0, 1)}.get(
-            fmi_type, INTEGERS
-        )
+        # Mappings are written in doubles.
+        exact = float_info.max if is_real else EXACT
+        least, most = max(of.least, -exact), min(of.most, exact)
         for _, value in connection.transformation.pairs:
-            if not least <= value <= most or (fmi_type != "Real" and value != int(value)):
+            if not least <= value <= most or (not is_real and value != int(value)):
                 raise InputError(
                     f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
                     f"FMI type {fmi_type} cannot hold"
@@ -298,4 +311,4 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
 def _could_feed(source: Component, variable: ModelVariable) -> bool:
     """Whether a component has an output of the name and type of an input."""
     output = source.variables.get(variable.name)
-    return output is not None and (output.causality, output.type) == ("output", variable.type)
+    return output is not None and output.causality == "output" and _can_feed(output, variable)

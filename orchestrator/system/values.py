@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import ctypes
 import sys
 from collections.abc import Iterable
-from math import isclose, isfinite
-from typing import TypeAlias
+from contextlib import suppress
+from math import copysign, isclose, isfinite
+from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, shortened
@@ -14,11 +17,68 @@ from orchestrator.machine.errors import InputError, shortened
 #: A value in the type of its variable.
 Value: TypeAlias = float | int | bool | str
 
-#: What FMI's Integers can hold.
-INTEGERS = -(2**31), 2**31 - 1
 
-#: What FMI 2.0 calls the types of FMI 3.0 that have a name there.
-FMI2_NAMES = {"Float64": "Real", "Int32": "Integer"}
+class Type(NamedTuple):
+    """A type of FMI's variables.
+
+    Attributes:
+        family: what FMI 2.0 calls this type, or the one that is its like.
+        c_type: of its values; None: they are texts.
+        least, most: the range of its numbers.
+
+    """
+
+    family: str
+    c_type: Any
+    least: float = 0
+    most: float = 0
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it has integers that no double is."""
+        return self.family == "Integer" and self.most > EXACT
+
+    @property
+    def stands(self) -> bool:
+        """Whether numbers of a row may stand for its values, and are not the values themselves."""
+        return self.c_type is None or self.is_wide
+
+
+def _real(c_type: Any) -> Type:
+    most = float(np.finfo(np.dtype(c_type)).max)
+    return Type("Real", c_type, -most, most)
+
+
+def _integer(c_type: Any, family: str = "Integer") -> Type:
+    info = np.iinfo(np.dtype(c_type))
+    return Type(family, c_type, int(info.min), int(info.max))
+
+
+#: Types that can be connected, set and recorded, in the order of their columns.
+TYPES = {
+    "Real": _real(ctypes.c_double),
+    "Float64": _real(ctypes.c_double),
+    "Float32": _real(ctypes.c_float),
+    "Integer": _integer(ctypes.c_int32),
+    "Int32": _integer(ctypes.c_int32),
+    "Int8": _integer(ctypes.c_int8),
+    "UInt8": _integer(ctypes.c_uint8),
+    "Int16": _integer(ctypes.c_int16),
+    "UInt16": _integer(ctypes.c_uint16),
+    "UInt32": _integer(ctypes.c_uint32),
+    "Int64": _integer(ctypes.c_int64),
+    "UInt64": _integer(ctypes.c_uint64),
+    "Enumeration": _integer(ctypes.c_int32, "Enumeration"),
+    "Boolean": Type("Boolean", ctypes.c_bool, 0, 1),
+    "String": Type("String", None),
+}
+
+#: Up to here every integer is a double.
+EXACT = 2**53
+
+#: Numbers from the first on, so far apart, stand for integers that no double is: all are doubles,
+#: and none of FMI's integers is so large.
+_BEYOND, _APART = 2.0**65, 2.0**13
 
 #: An FMU may keep a value in another unit, and round it by such a share.
 _ROUNDING = 1e-9
@@ -65,11 +125,12 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
     if isinstance(number, float) and not isfinite(number):
         raise InputError(f"{name}{shown}: must be finite")
     lower, upper = _range(variable)
-    if lower is not None and number < lower:
-        raise InputError(f"{name}{shown}: must be at least {lower:g}")
-    if upper is not None and number > upper:
-        raise InputError(f"{name}{shown}: must be at most {upper:.16g}")
-    return number
+    if number < lower:
+        raise InputError(f"{name}{shown}: must be at least {_written(lower)}")
+    if number > upper:
+        raise InputError(f"{name}{shown}: must be at most {_written(upper)}")
+    # What the FMU will hold.
+    return ctypes.c_float(number).value if variable.type == "Float32" else number
 
 
 def real(text: str) -> float:
@@ -123,19 +184,35 @@ def _transferable(text: str) -> str:
     return text
 
 
-def _range(variable: ModelVariable) -> tuple[float | None, float | None]:
-    lower, upper = (None if end is None else real(end) for end in (variable.min, variable.max))
-    if type_of(variable) == "Real":
-        return lower, upper
-    least, most = INTEGERS
-    # What a description says beyond them no FMU can be given.
-    lower, upper = least if lower is None else lower, most if upper is None else upper
-    return max(least, lower), min(most, upper)
+def _range(variable: ModelVariable) -> tuple[float, float]:
+    # What a description says beyond its type no FMU can be given.
+    _, _, least, most = TYPES[variable.type]
+    lower, upper = (None if end is None else _end(end) for end in (variable.min, variable.max))
+    return (
+        least if lower is None else max(least, lower),
+        most if upper is None else min(most, upper),
+    )
+
+
+def _end(text: str) -> float:
+    """An end of a range, exact where it is an integer."""
+    with suppress(ValueError):
+        return integer(text)
+    return real(text)
+
+
+def _written(end: float) -> str:
+    return str(end) if isinstance(end, int) else f"{end:.16g}"
+
+
+def family_of(fmi_type: str) -> str:
+    """What FMI 2.0 calls a type, or the one that is its like."""
+    return TYPES[fmi_type].family if fmi_type in TYPES else fmi_type
 
 
 def type_of(variable: ModelVariable) -> str:
-    """The type of a variable, as FMI 2.0 calls it."""
-    return FMI2_NAMES.get(variable.type, str(variable.type))
+    """The family of a variable's type."""
+    return family_of(variable.type)
 
 
 def items_of(variable: ModelVariable) -> dict[str, str]:
@@ -158,19 +235,30 @@ def same(wanted: Value, held: Value) -> bool:
 
 def is_of(variable: ModelVariable, value: object) -> bool:
     """Whether a value is one that the variable can have."""
-    fmi_type = type_of(variable)
-    if fmi_type in ("Integer", "Enumeration"):
-        return type(value) is int and is_integer(value)
+    family = type_of(variable)
     if isinstance(value, str):
         # Half of a UTF-16 pair is not text.
-        return fmi_type == "String" and value.encode(errors="ignore").decode() == value
-    return type(value) is {"Real": float, "Boolean": bool}.get(fmi_type)
+        return family == "String" and value.encode(errors="ignore").decode() == value
+    if type(value) is int:
+        of = TYPES[variable.type]
+        return family in ("Integer", "Enumeration") and of.least <= value <= of.most
+    return type(value) is {"Real": float, "Boolean": bool}.get(family)
 
 
-def is_integer(number: float) -> bool:
-    """Whether a number is one of FMI's Integers."""
-    least, most = INTEGERS
-    return least <= number <= most and number == int(number)
+def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
+    """Which numbers of a row a variable of a type can hold, apart from any that are not finite."""
+    of = TYPES[fmi_type]
+    if of.family == "Boolean":
+        # FMI 2.0 has integers for them.
+        of = TYPES["Integer"]
+    if of.c_type in (None, ctypes.c_double):
+        return np.ones(np.shape(numbers), dtype=bool)
+    fit = (of.least <= numbers) & (numbers <= of.most)
+    if of.family != "Real":
+        fit &= numbers == np.trunc(numbers)
+    if of.is_wide:
+        fit |= np.abs(numbers) >= _BEYOND
+    return np.asarray(fit)
 
 
 def unit_of(variable: ModelVariable) -> str | None:
@@ -184,7 +272,7 @@ class StringTable:
     """Texts by their numbers, which they keep: the first is empty, and the next one takes the next.
 
     What FMUs say is not forgotten, so that a run in which one has a new text in every step takes
-    memory for all of them.
+    memory for all of them. Integers that no double is are kept like texts.
     """
 
     def __init__(self) -> None:
@@ -213,6 +301,25 @@ class StringTable:
             raise ValueError(f"no text has the number {number:g}")
         return self._texts[int(number)]
 
+    def stand_in(self, value: Value) -> float:
+        """The number for a value in a row: itself, except for a text or where no double is it."""
+        if isinstance(value, str):
+            return self.number(value)
+        number = float(value)
+        if isinstance(value, int) and number != value:
+            return copysign(_BEYOND + _APART * self.number(str(value)), number)
+        return number
+
+    def integer(self, number: float) -> int:
+        """The integer that a number of a row is, or stands for.
+
+        Raises:
+            ValueError: it stands for none.
+
+        """
+        size = abs(number)
+        return int(number) if size < _BEYOND else int(self.text((size - _BEYOND) / _APART))
+
     def since(self, n: int) -> list[str]:
         """All texts but the first so many."""
         return self._texts[n:]
@@ -225,3 +332,34 @@ class StringTable:
         """Take on the texts of another process, with their numbers."""
         self._texts = list(state)
         self._numbers = {text: number for number, text in enumerate(self._texts)}
+
+
+class Standing(NamedTuple):
+    """What the numbers of a column of the row stand for.
+
+    Attributes:
+        fmi_type: of the values.
+        strings: that know them.
+
+    """
+
+    fmi_type: str
+    strings: StringTable
+
+    @property
+    def c_type(self) -> Any:
+        """Of the values; None: they are texts."""
+        return TYPES[self.fmi_type].c_type
+
+    def value(self, number: float) -> str | int:
+        """The text or the integer that a number stands for.
+
+        Raises:
+            ValueError: it stands for none.
+
+        """
+        return self.strings.text(number) if self.c_type is None else self.strings.integer(number)
+
+    def number(self, value: str | int) -> float:
+        """The number that stands for a value."""
+        return self.strings.stand_in(value)

@@ -16,7 +16,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import unit_of
+from orchestrator.system.values import type_of, unit_of
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, real_parameter, value_of, vehicle
 
 #: References that are farther apart are not the same [m].
@@ -96,7 +96,7 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     if not system.has(name):
         return None
     variable = system.component(name.component).variables[name.port]
-    is_one = (variable.causality, variable.type) == ("parameter", "Real")
+    is_one = (variable.causality, type_of(variable)) == ("parameter", "Real")
     value = system.value(name) if is_one else None
     return None if value is None else float(value)
 

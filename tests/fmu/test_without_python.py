@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from fmpy.build import build_platform_binary
 
-from fmus.compilers import FLAGS, machines_compiler
+from fmus.compilers import machines_compiler
 from fmus.kinds import TARGETS
 from orchestrator.exchange import c_host
 from orchestrator.exchange.verify import verify
@@ -115,24 +115,12 @@ def run_elsewhere(
 
 
 @pytest.fixture(scope="module")
-def windows(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The libraries that the build makes for Windows."""
-    folder = tmp_path_factory.mktemp("windows")
-    bundle.build_bundle(folder, kind="native", platforms="win64")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The libraries that the build makes for Windows and for ARM."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    bundle.build_bundle(folder, kind="native", platforms="win64,aarch64-linux")
     for name in NAMES:
         fmpy.extract(folder / f"{name}.fmu", unzipdir=folder / name)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Libraries for ARM, made from the sources: FMI 2.0 has no name for it."""
-    folder = tmp_path_factory.mktemp("arm")
-    for name in NAMES:
-        made = folder / name / "binaries" / "arm" / f"{name}.so"
-        made.parent.mkdir(parents=True)
-        command = [*zig("aarch64-linux"), *FLAGS, "-o", made, "fmi2.c", "-lm"]
-        subprocess.run(command, cwd=unpacked / name / "sources", check=True)
     return folder
 
 
@@ -140,11 +128,11 @@ def arm(unpacked: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @needs_zig
 @pytest.mark.skipif(WINE is None, reason="wine is not installed")
 @each_scenario
-def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, scenario: str):
+def test_windows_gives_the_same_but_for_rounding(native: Path, elsewhere: Path, scenario: str):
     """Its C library has another sine."""
-    library = place(windows, "win64", ".dll")
+    library = place(elsewhere, "win64", ".dll")
     there, here = run_elsewhere(
-        system_of(native, scenario), windows, "x86_64-windows", library, [str(WINE)], "host.exe"
+        system_of(native, scenario), elsewhere, "x86_64-windows", library, [str(WINE)], "host.exe"
     )
     np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
 
@@ -154,9 +142,11 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, windows: Path, sc
 @pytest.mark.skipif(QEMU is None, reason="qemu-aarch64 is not installed")
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
 @each_scenario
-def test_arm_gives_the_same_bit_for_bit(native: Path, arm: Path, scenario: str):
-    library, command = place(arm, "arm", ".so"), [str(QEMU), "-L", ARM_LIBRARIES]
-    there, here = run_elsewhere(system_of(native, scenario), arm, "aarch64-linux", library, command)
+def test_arm_gives_the_same_bit_for_bit(native: Path, elsewhere: Path, scenario: str):
+    library, command = place(elsewhere, "aarch64-linux", ".so"), [str(QEMU), "-L", ARM_LIBRARIES]
+    there, here = run_elsewhere(
+        system_of(native, scenario), elsewhere, "aarch64-linux", library, command
+    )
     np.testing.assert_array_equal(there, here)
 
 

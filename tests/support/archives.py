@@ -65,6 +65,34 @@ def fmu(path: Path, *variables: str) -> Path:
     return small_fmus.write(path, text)
 
 
+#: Variables of FMI 3.0: arrays, types of their own, and some that are not supported.
+_FMI3 = """
+<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+<UInt64 name="n" valueReference="1" causality="structuralParameter" start="3"/>
+<Float64 name="u" valueReference="2" causality="input" start="0"><Dimension valueReference="1"/>
+</Float64>
+<Float64 name="y" valueReference="3" causality="output"><Dimension valueReference="1"/></Float64>
+<Float64 name="A" valueReference="4" causality="parameter" variability="fixed" start="1 2 3 4">
+  <Dimension start="2"/><Dimension start="2"/></Float64>
+<String name="s" valueReference="5" causality="parameter" variability="fixed"><Dimension start="2"/>
+  <Start value="a b"/><Start value=""/></String>
+<Int32 name="k" valueReference="6" causality="parameter" variability="fixed" start="1"/>
+<Float64 name="x" valueReference="7" causality="input" start="0"/>
+<Float64 name="z" valueReference="8" causality="output"/>
+<Int64 name="i" valueReference="9" causality="parameter" variability="fixed" start="1"/>
+<Binary name="b" valueReference="10" causality="input"><Start value="00"/></Binary>
+<Binary name="c" valueReference="11" causality="output"/>
+<Clock name="t" valueReference="12" causality="input" intervalVariability="triggered"/>
+<Float32 name="v" valueReference="13" causality="input" start="0"/>
+"""
+
+
+def fmu3(path: Path) -> Path:
+    """An FMU of FMI 3.0 without a library."""
+    outputs = "".join(f'<Output valueReference="{n}" dependencies=""/>' for n in (3, 8, 11))
+    return small_fmus.write(path, small_fmus.description_of_fmi3("m3", _FMI3, outputs))
+
+
 def described(system: str, version: str = "1.0", after: str = "") -> str:
     """A description of a system, with the units and the enumeration."""
     bases = "".join(
@@ -127,15 +155,15 @@ def connection(start: str, end: str, inside: str = "", **more: str) -> str:
     return f"<ssd:Connection{ends}>{inside}</ssd:Connection>"
 
 
-def parameter_set(values: Mapping[str, str]) -> str:
+def parameter_set(values: Mapping[str, str], version: str = "1.0") -> str:
     """A parameter set; a value is the inside of a parameter, such as `Real value="1"`."""
     parameters = "".join(
         f'<ssv:Parameter name="{name}"><ssv:{value}/></ssv:Parameter>'
         for name, value in values.items()
     )
     return (
-        f'<ssv:ParameterSet {_NAMESPACES} version="1.0" name="set"><ssv:Parameters>{parameters}'
-        "</ssv:Parameters></ssv:ParameterSet>"
+        f'<ssv:ParameterSet {_NAMESPACES} version="{version}" name="set">'
+        f"<ssv:Parameters>{parameters}</ssv:Parameters></ssv:ParameterSet>"
     )
 
 

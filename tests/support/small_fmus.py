@@ -112,6 +112,27 @@ def description(
     )
 
 
+def description_of_fmi3(
+    identifier: str, variables: str, structure: str = "", attributes: str = ""
+) -> str:
+    """A modelDescription.xml of FMI 3.0.
+
+    Args:
+        identifier: of the model, its token, and its name.
+        variables: elements in ModelVariables.
+        structure: elements in ModelStructure.
+        attributes: of the element CoSimulation, besides its identifier.
+
+    """
+    return (
+        '<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="3.0" '
+        f'modelName="{identifier}" instantiationToken="{identifier}">'
+        f'<CoSimulation modelIdentifier="{identifier}" {attributes}/>'
+        f"<ModelVariables>{variables}</ModelVariables>"
+        f"<ModelStructure>{structure}</ModelStructure></fmiModelDescription>"
+    )
+
+
 @cache
 def _library_of(source: Path, *options: str) -> bytes:
     compiler = shutil.which("cc")

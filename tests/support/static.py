@@ -15,6 +15,9 @@ from orchestrator.system.values import StringTable
 from support.archives import fmu, variable
 from support.small_fmus import connected
 
+#: Where ports are in the row.
+_PLACES = {name: place for place, name in enumerate(("u", "v", "y", "z"))}
+
 #: Outputs, y and z, of inputs, u and v.
 Function = Callable[..., tuple[float, float]]
 
@@ -34,12 +37,12 @@ class Static(SimpleNamespace):
         self.exchanged += 1
         self._values[2:4] = self._function(*self._values[:2])
 
-    def derivatives(self, outputs: Sequence[int], of: int) -> list[float]:
-        return [float(np.asarray(self._slopes)[output - 2, of]) for output in outputs]
+    def derivatives(self, outputs: Sequence[str], of: str) -> list[float]:
+        slopes = np.asarray(self._slopes)
+        return [float(slopes[_PLACES[output] - 2, _PLACES[of]]) for output in outputs]
 
     def read(self, ports: Sequence[str]) -> dict[str, Any]:
-        places = {name: place for place, name in enumerate(("u", "v", "y", "z"))}
-        return {port: float(self._values[places[port]]) for port in ports}
+        return {port: float(self._values[_PLACES[port]]) for port in ports}
 
     def enter_initialization(self, values: Mapping[str, Any], start_time: float = 0.0) -> None:
         """Nothing is to be done."""

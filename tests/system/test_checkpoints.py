@@ -234,7 +234,7 @@ def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
     [
         (["--set", "plant.m44=26"], "plant.m44 differ"),
         (["--stop-time", "3", "--order", "jacobi"], "order, stop_time differ"),
-        (["--kind", "native"], "controller, disturbance, planner"),
+        (["--kind", "python"], "controller, disturbance, planner"),
     ],
 )
 def test_another_run_is_refused(left, capsys, change, words):

@@ -108,7 +108,7 @@ def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
 @pytest.mark.parametrize(
     ("act", "words"),
     [
-        ("SILENT_ERROR", "fmi2DoStep 3"),
+        ("SILENT_ERROR", "doStep 3"),
         ("FATAL", "beyond repair"),
         ("EXITS", "3 doStep"),
         ("CRASHES", "SIGSEGV doStep"),
@@ -268,7 +268,7 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
     thread.join()
     assert table.ending.messages == ()
     assert table.failure is not None
-    assert mentions(table.failure, "bad: fmi2DoStep 3")
+    assert mentions(table.failure, "bad: doStep 3")
 
 
 @pytest.fixture(scope="module")

@@ -132,20 +132,20 @@ def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> S
     ("act", "call", "rows", "words"),
     [
         ("DISCARD", "SET", 8, "3.5 s: bad: inputs 2 discard"),
-        ("DISCARD", "STEP", 7, "3 s: bad: fmi2DoStep 2 discard"),
+        ("DISCARD", "STEP", 7, "3 s: bad: doStep 2 discard"),
         ("DISCARD", "GET", 7, "3 s: bad: outputs 2 discard"),
-        ("FAIL", "STEP", 7, "3 s: bad: fmi2DoStep 3 error"),
+        ("FAIL", "STEP", 7, "3 s: bad: doStep 3 error"),
         *(
             (act, call, rows, f"{name} {status} illegal")
             for act, status in (("BELOW_ALL", -1), ("BEYOND_ALL", 6))
             for call, rows, name in (
                 ("SET", 8, "3.5 s: bad: inputs"),
-                ("STEP", 7, "3 s: bad: fmi2DoStep"),
+                ("STEP", 7, "3 s: bad: doStep"),
                 ("GET", 7, "3 s: bad: outputs"),
             )
         ),
         ("FATAL", "SET", 8, "3.5 s: bad: inputs 4 fatal"),
-        ("FATAL", "STEP", 7, "3 s: bad: fmi2DoStep 4 fatal"),
+        ("FATAL", "STEP", 7, "3 s: bad: doStep 4 fatal"),
         ("FATAL", "GET", 7, "3 s: bad: outputs 4 fatal"),
         ("SAYS", "STEP", 7, "3 s: bad: tired"),
         ("NOT_A_NUMBER", "STEP", 7, "3.5 s: bad.output.Real0 nan"),

@@ -92,7 +92,7 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "planted.so", source], check=True)
     forged = Path(mkdtemp())
     monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
-    write_cached("loop", stepper._key(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
+    write_cached("loop", stepper.key_of(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
     write_cached("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
     monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
     for path in (forged, *forged.rglob("*")):

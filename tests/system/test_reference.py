@@ -10,7 +10,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.util import read_csv, read_ref_opt_file
 
-from fmus.discovery import components
+from fmus.discovery import REFERENCE, components, package_folder
 from orchestrator.commands.main import main
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
@@ -23,26 +23,29 @@ from reference import reference_outputs
 from support.runs import run, write
 from support.texts import mentions, numbers_in, tells
 
-COMMITTED = Path(__file__).parents[2] / "reference"
-NAMES = list(components())
+COMMITTED = Path(__file__).parents[2] / REFERENCE
+
+#: Packages of the components, by name.
+COMPONENTS = components()
 
 #: Orders in which tools step the components.
 ORDER = ("plant", "controller", "disturbance", "planner")
 OTHER_ORDER = ("controller", "plant", "planner", "disturbance")
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", COMPONENTS)
 def test_a_fresh_run_of_each_fmu_is_the_reference(dist: Path, name: str):
     """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""
     component = read_component(name, dist / f"{name}.fmu")
-    path = COMMITTED / f"{name}_in.csv"
+    committed = package_folder(COMPONENTS[name]) / REFERENCE
+    path = committed / f"{name}_in.csv"
     inputs = read_csv(path) if path.is_file() else None
     outputs = reference_outputs(component, inputs)
-    expected = read_csv(COMMITTED / f"{name}_ref.csv")
+    expected = read_csv(committed / f"{name}_ref.csv")
     assert outputs.dtype.names == expected.dtype.names
     for port in expected.dtype.names:
         np.testing.assert_allclose(outputs[port], expected[port], rtol=1e-9, atol=1e-9)
-    assert read_ref_opt_file(COMMITTED / f"{name}_ref.opt")["StopTime"] == expected["time"][-1]
+    assert read_ref_opt_file(committed / f"{name}_ref.opt")["StopTime"] == expected["time"][-1]
 
 
 def test_a_fresh_run_of_the_system_is_the_reference(system: System):

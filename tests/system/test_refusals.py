@@ -196,7 +196,7 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
         ("build --platforms linux64", "--platforms --kind native"),
         ("build --kind native --loader plain", "--loader --kind python"),
         ("build --kind native --platforms win32", "'win32' 2.0"),
-        ("build --kind native --platforms aarch64-linux", "--fmi 3"),
+        ("build --kind native --platforms x86_64-linux", "--fmi 3"),
         ("build own.py --kind native", "own.py"),
         (["plot", ""], "plot"),
         ("plot .", "result"),

@@ -7,19 +7,15 @@ a file only if it is valid to the letter, and does not decode the addresses of f
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable
-from functools import cache
 from pathlib import Path
 from typing import TypeVar
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
-import fmpy.ssp
-from lxml import etree
-
 from orchestrator.formats.ssp import NAMESPACES, STRUCTURE
+from orchestrator.formats.ssp.validity import VERSIONS, violations
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
 from orchestrator.machine.user_files import check_file, is_folder, unpack
 from orchestrator.system.names import listed
@@ -29,20 +25,10 @@ from orchestrator.system.values import finite, integer
 #: Elements in which others than the standard's are at home.
 _OPEN = ("Annotations", "MetaData", "Signature")
 
-#: Schemas by the root elements of the files that they are for.
-_SCHEMAS = {
-    "SystemStructureDescription": "SystemStructureDescription.xsd",
-    "ParameterSet": "SystemStructureParameterValues.xsd",
-    "ParameterMapping": "SystemStructureParameterMapping.xsd",
-}
-
 _SUFFIX = Path(STRUCTURE).suffix
 
 #: Endings of descriptions that are read where they are, with the files beside them.
 _LOOSE = (_SUFFIX, ".xml")
-
-#: The version whose words are read; later ones have more of them, of which each is refused.
-_VERSION = "1.0"
 
 #: A number, or that there may be none.
 _Float = TypeVar("_Float", float, None)
@@ -102,7 +88,7 @@ class _Reader:
             self._note(f"the prefix {prefix!r} is not declared")
         elif not self._open and namespace not in NAMESPACES:
             where = f"the namespace {namespace!r}" if namespace else "no namespace"
-            self._note(f"elements are in {where}, which does not belong to SSP 1.0")
+            self._note(f"elements are in {where}, which does not belong to SSP")
         self.builder.start(name, plain)
 
     def end(self, tag: str) -> None:
@@ -114,29 +100,6 @@ class _Reader:
     def doctype(self, *_: object) -> None:
         """Refuse what could name further files, or unfold into more than memory holds."""
         raise ValueError("it has a document type, which files of an SSP must not have")
-
-
-def _violations(root: str, text: bytes) -> list[str]:
-    """What is not as the schema has it, with the number of its line.
-
-    Args:
-        root: name of the root element.
-        text: the file.
-
-    """
-    if root not in _SCHEMAS:
-        return [f"<{root}> is not an element of SSP"]
-    try:
-        _schema(_SCHEMAS[root]).assertValid(etree.fromstring(text))
-    except etree.LxmlError as error:
-        said = [(entry.line, entry.message) for entry in error.error_log]
-        return [f"line {line}: {re.sub('{[^}]*}', '', message)}" for line, message in said]
-    return []
-
-
-@cache
-def _schema(name: str) -> etree.XMLSchema:
-    return etree.XMLSchema(etree.parse(Path(*fmpy.ssp.__path__, "schema", name)))
 
 
 class Archive:
@@ -210,11 +173,11 @@ class Archive:
         except Exception as error:
             raise InputError(f"{self.path}: not a readable SSP: {name}: {reason(error)}") from error
         version = root.get("version")
-        if version != _VERSION:
+        if version not in VERSIONS:
             stated = "no version" if version is None else f"version {version!r}"
-            remarks.append(f"names {stated} of SSP; it is read as {_VERSION}")
+            remarks.append(f"names {stated} of SSP; it is read as {VERSIONS[-1]}")
         # Of other namespaces and versions the schemas know nothing.
-        if not remarks and (wrong := _violations(root.tag, text)):
+        if not remarks and (wrong := violations(root.tag, text)):
             remarks.append(f"not valid: {listed(wrong, '; ')}")
         for remark in dict.fromkeys(remarks):
             self.note(f"{name}: {remark}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from math import prod
 from typing import TypeAlias
 from xml.etree.ElementTree import Element
 
@@ -13,7 +14,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import listed
 from orchestrator.system.units import BASE_UNITS, Unit, Units, unit_of_port
-from orchestrator.system.values import FMI2_NAMES, items_of, type_of
+from orchestrator.system.values import family_of, integer, items_of, type_of
+from orchestrator.system.variables import MOST_ELEMENTS, element_names
 
 #: An enumeration's values by the names of its items.
 Items: TypeAlias = Mapping[str, int]
@@ -70,6 +72,22 @@ def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Defin
     return Definitions(units, {**outer.enumerations, **enumerations})
 
 
+def shape_of(content: Element) -> list[int]:
+    """The lengths of an array as a connector or parameter states them; of a scalar, none.
+
+    Raises:
+        ValueError: it does not state them, or they are of no use.
+
+    """
+    try:
+        shape = [integer(dimension.get("size", "")) for dimension in content.findall("Dimension")]
+    except ValueError:
+        raise ValueError("is an array of a size that is not stated") from None
+    if any(length < 1 for length in shape) or prod(shape) > MOST_ELEMENTS:
+        raise ValueError(f"is an array of no element, or of more than {MOST_ELEMENTS:,}")
+    return shape
+
+
 @dataclass(frozen=True)
 class Node:
     """A connector, or a variable of a component.
@@ -94,9 +112,10 @@ class Connector:
 
     Attributes:
         causality: of the connector; None: it does not say.
-        type: as FMI 2.0 calls it, or what FMI 2.0 does not have; None: it does not say.
+        type: what FMI 2.0 calls it or its like; None: it does not say.
         unit: None: it names none.
         items: of an enumeration.
+        elements: the names of an array's elements, which are connectors as well.
 
     """
 
@@ -104,6 +123,7 @@ class Connector:
     type: str | None = None
     unit: Unit | None = None
     items: Items = field(default_factory=dict)
+    elements: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -129,6 +149,10 @@ class Leaf:
         """A connector as the FMU has it; None: it has none of that name."""
         if self.component is None:
             return self.connectors.get(name, Connector())
+        if name in self.component.arrays:
+            elements = tuple(element.name for element in self.component.arrays[name])
+            first = self.connector(elements[0])
+            return None if first is None else replace(first, elements=elements)
         variable = self.component.variables.get(name)
         if variable is None:
             return None
@@ -138,8 +162,17 @@ class Leaf:
         return Connector(variable.causality, type_of(variable), unit, items)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
-        """The variable of a name."""
-        if self.component is not None and (connector := self.connector(name)) is not None:
+        """The variable of a name.
+
+        Raises:
+            InputError: it is of a type that is not supported.
+
+        """
+        if self.component is None:
+            return
+        if name in self.component.left_alone:
+            self.component.variable(name)
+        if (connector := self.connector(name)) is not None:
             yield Node(self.way, name), connector
 
 
@@ -281,8 +314,12 @@ class Builder:
     def _compare(self, leaf: Leaf) -> None:
         """Say where connectors are not what their FMU has."""
         absent = []
+        elements = {name for stated in leaf.connectors.values() for name in stated.elements}
+        known = leaf.component.left_alone if leaf.component else {}
         for name, stated in leaf.connectors.items():
             own = leaf.connector(name)
+            if name in known or (own is not None and name in elements):
+                continue
             if own is None:
                 absent.append(name)
                 continue
@@ -302,16 +339,25 @@ class Builder:
             )
 
     def _connectors(self, content: Element) -> dict[str, Connector]:
-        return {
-            connector.get("name", ""): self._connector(connector)
-            for connector in content.findall("Connectors/Connector")
-        }
+        found: dict[str, Connector] = {}
+        for connector in content.findall("Connectors/Connector"):
+            name, stated = connector.get("name", ""), self._connector(connector)
+            elements: tuple[str, ...] = ()
+            try:
+                if shape := shape_of(connector):
+                    elements = tuple(element_names(name, shape))
+            except ValueError as error:
+                # Of a component the FMU says it.
+                if content.tag != "Component":
+                    self._archive.problem(f"{content.get('name', '')}.{name} {error}")
+            found |= {name: replace(stated, elements=elements), **dict.fromkeys(elements, stated)}
+        return found
 
     def _connector(self, connector: Element) -> Connector:
         causality = connector.get("kind")
         for stated in connector:
             if stated.tag not in _NO_TYPES:
-                of = FMI2_NAMES.get(stated.tag, stated.tag)
+                of = family_of(stated.tag)
                 unit, items = self._definitions.unit(stated), self._definitions.items(stated)
                 return Connector(causality, of, unit, items)
         return Connector(causality)

@@ -19,19 +19,18 @@ from orchestrator.formats.ssp.hierarchy import (
     Leaf,
     Node,
     definitions_of,
+    shape_of,
 )
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, Mapped, Transformation, Unit, combine
-from orchestrator.system.values import BOOLEANS, finite
+from orchestrator.system.values import BOOLEANS, family_of, finite
+from orchestrator.system.variables import element_names
 
 _TABLES = (
     "BooleanMappingTransformation", "IntegerMappingTransformation",
     "EnumerationMappingTransformation",
 )  # fmt: skip
-
-#: Parts of arrays and the like, which FMI 2.0 does not have.
-_UNSUPPORTED = ("startIndices", "endIndices")
 
 #: The types of files that are known.
 _VALUES, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
@@ -148,24 +147,25 @@ def segments_of(archive: Archive, top: Group) -> dict[Node, Segment]:
 def _add(found: dict[Node, Segment], group: Group, connection: Element) -> None:
     start, end = (_End.of(group, connection, which) for which in ("start", "end"))
     named = f"{start.node} -> {end.node}"
-    if any(connection.get(name) for name in _UNSUPPORTED):
-        raise InputError(f"{named}: connections of elements of arrays are not supported")
     if (start.takes and end.takes) or (start.gives and end.gives):
         both = "take their value from elsewhere" if start.takes else "give one"
         raise InputError(f"{named}: cannot be connected, as both {both}")
     # The standard lets a connection be written from either end.
     source, target = (end, start) if start.takes or end.gives else (start, end)
-    if (before := found.get(target.node)) is not None:
-        raise InputError(
-            f"{target.node} is fed by {before.source} and by {source.node}; an input takes one "
-            "connection"
-        )
+    if source.indices != target.indices:
+        raise InputError(f"{named}: arrays of different dimensions cannot be connected")
     try:
         stated = _transformation(connection, source.connector.items, target.connector.items)
     except ValueError as error:
         raise InputError(f"{named}: {error}") from None
-    unit = target.connector.unit
-    found[target.node] = Segment(source.node, unit, stated, _converts_units(connection))
+    unit, converts = target.connector.unit, _converts_units(connection)
+    for index in source.indices:
+        begin, stop = source.element(index), target.element(index)
+        if (before := found.get(stop)) is not None:
+            raise InputError(
+                f"{stop} is fed by {before.source} and by {begin}; an input takes one connection"
+            )
+        found[stop] = Segment(begin, unit, stated, converts)
 
 
 @dataclass(frozen=True)
@@ -184,6 +184,15 @@ class _End:
     gives: bool
     takes: bool
 
+    @property
+    def indices(self) -> list[str]:
+        """What follows its name in the names of its elements; of a scalar, nothing."""
+        return _indices(self.node, self.connector)
+
+    def element(self, index: str) -> Node:
+        """One of its elements."""
+        return Node(self.node.way, self.node.port + index)
+
     @classmethod
     def of(cls, group: Group, connection: Element, which: str) -> _End:
         """The start or the end of a connection."""
@@ -191,6 +200,8 @@ class _End:
         name, port = connection.get(f"{which}Element") or None, connection.get(f"{which}Connector")
         if not port:
             raise InputError(f"a <{connection.tag}> without {which}Connector")
+        if indices := connection.get(f"{which}Indices"):
+            port = f"{port}[{','.join(indices.split())}]"
         element: Leaf | Bus | Group | None = group if name is None else group.members.get(name)
         if element is None:
             raise InputError(
@@ -209,6 +220,11 @@ class _End:
         # Seen from within, a system's inputs give and its outputs take.
         gives, takes = (inwards, outwards) if element is group else (outwards, inwards)
         return cls(Node(element.way, port), connector, gives, takes)
+
+
+def _indices(node: Node, connector: Connector) -> list[str]:
+    """What follows a name in the names of the elements of its array; of a scalar, nothing."""
+    return [name.removeprefix(node.port) for name in connector.elements] or [""]
 
 
 @dataclass(frozen=True)
@@ -246,6 +262,9 @@ class Given:
 #: What is given to nodes, and what is known of each of these.
 Values: TypeAlias = dict[Node, tuple[Given, Connector]]
 
+#: The values of a parameter's elements, by what follows its name in theirs; of a scalar, nothing.
+_Elements: TypeAlias = dict[str, Given]
+
 
 class Bindings:
     """The values of all parameter sets of a description."""
@@ -282,11 +301,18 @@ class Bindings:
             entries = self._content(mapping, element, where, "ParameterMapping", _MAPPING)
             parameters = {} if entries is None else self._mapped(parameters, entries, where)
         unknown = []
-        for name, value in parameters.items():
-            reached = {node: (value, connector) for node, connector in element.named(name)}
-            given.update(reached)
-            if not reached:
-                unknown.append(name)
+        for name, values_of in parameters.items():
+            for node, connector in element.named(name):
+                if _indices(node, connector) != list(values_of):
+                    raise InputError(
+                        f"{node}: {len(values_of)} values for {len(connector.elements) or 1}: "
+                        "the dimensions must be the same"
+                    )
+            for index, value in values_of.items():
+                reached = {node: (value, of) for node, of in element.named(name + index)}
+                given.update(reached)
+                if not reached:
+                    unknown.append(name + index)
         if unknown and not (isinstance(element, Leaf) and element.component is None):
             self._archive.note(
                 f"{where} has nothing named {listed(unknown)}; values for it have no effect"
@@ -316,8 +342,8 @@ class Bindings:
         return None if file is None else self._archive.read(file)
 
     def _mapped(
-        self, parameters: dict[str, Given], mapping: Element, where: str
-    ) -> dict[str, Given]:
+        self, parameters: dict[str, _Elements], mapping: Element, where: str
+    ) -> dict[str, _Elements]:
         """Those parameters that a mapping names, under their new names."""
         found = {}
         for entry in mapping.findall("MappingEntry"):
@@ -325,27 +351,43 @@ class Bindings:
                 self._archive.required(entry, end, where) for end in ("source", "target")
             )
             if source in parameters:
-                found[target] = replace(parameters[source], entry=entry)
+                values = parameters[source].items()
+                found[target] = {index: replace(given, entry=entry) for index, given in values}
         return found
 
-    def _parameters(self, values: Element, where: str) -> dict[str, Given]:
+    def _parameters(self, values: Element, where: str) -> dict[str, _Elements]:
         """The values of a parameter set by their names."""
         known = definitions_of(self._archive, values, self._definitions)
-        found: dict[str, Given] = {}
+        found: dict[str, _Elements] = {}
         for parameter in values.findall("Parameters/Parameter"):
             name = self._archive.required(parameter, "name", where)
             value = next(iter(parameter), None)
-            text = None if value is None else value.get("value")
-            if value is None or text is None:
+            try:
+                shape = shape_of(parameter)
+            except ValueError as error:
+                self._archive.problem(f"{where}: {name} {error}")
+                continue
+            texts = [] if value is None else _texts(value, bool(shape))
+            indices = list(element_names("", shape))
+            if value is None or not texts:
                 self._archive.problem(f"{where}: {name}: a parameter without a value")
                 continue
-            if parameter.find("Dimension") is not None:
-                self._archive.problem(f"{where}: {name}: arrays are not supported")
+            if len(texts) != len(indices):
+                self._archive.problem(f"{where}: {name}: {len(texts)} values for {len(indices)}")
                 continue
             if name in found:
                 self._archive.note(f"{where}: {name} appears twice in a parameter set")
-            found[name] = Given(text, known.unit(value), known.items(value))
+            of = known.unit(value), known.items(value)
+            found[name] = {i: Given(text, *of) for i, text in zip(indices, texts, strict=True)}
         return found
+
+
+def _texts(value: Element, is_array: bool) -> list[str]:
+    """The values of a parameter, in the order of an array's elements."""
+    if is_array and family_of(value.tag) in ("Real", "Integer", "Boolean"):
+        return value.get("value", "").split()
+    several = value.findall("Value")
+    return [text for one in several or [value] if (text := one.get("value")) is not None]
 
 
 def _inside_out(group: Group) -> Iterator[Leaf | Bus | Group]:

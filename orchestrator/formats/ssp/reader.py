@@ -6,7 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from xml.etree.ElementTree import Element
+from urllib.parse import quote
+from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.formats.ssp import LEFT_OPEN
 from orchestrator.formats.ssp.archive import Archive
@@ -56,6 +57,30 @@ def read_ssp(path: Path, variant: str | None = None, findings: Findings | None =
         system = _read(archive, root, content)
     except RecursionError:
         raise InputError(f"{path}: not a readable SSP: nested too deeply") from None
+    findings.refuse()
+    return system
+
+
+def bind_parameter_set(fmu: Path, name: str, parameters: Path, findings: Findings) -> System:
+    """A system of one FMU that a parameter set is bound to, without a prefix or a mapping.
+
+    Args:
+        fmu: the file.
+        name: of the component.
+        parameters: the SSV.
+        findings: takes all that is wrong with it.
+
+    Raises:
+        InputError: the set cannot be read, or a value is not of the type of its variable.
+
+    """
+    root = Element(_ROOT)
+    content = SubElement(root, "System", name=name)
+    source = quote(str(fmu.resolve()))
+    component = SubElement(SubElement(content, "Elements"), "Component", name=name, source=source)
+    bindings = SubElement(component, "ParameterBindings")
+    SubElement(bindings, "ParameterBinding", source=quote(parameters.name))
+    system = _read(Archive(parameters.parent, findings), root, content)
     findings.refuse()
     return system
 
@@ -258,6 +283,9 @@ class _Ports:
         component, connector = leaf.component, leaf.connector(port.port)
         if component is None or connector is None:
             return
+        if connector.causality == "structuralParameter":
+            self._keep_size(port, component, given.text)
+            return
         if not component.is_settable(port.port):
             self._archive.note(
                 f"{port}: is of causality {connector.causality} and cannot be set; the value that "
@@ -271,6 +299,11 @@ class _Ports:
         if isinstance(value, float) and value.is_integer() and connector.type != "Real":
             value = int(value)
         self.parameters[port] = typed(str(port), component.variable(port.port), value)
+
+    def _keep_size(self, port: PortName, component: Component, text: str) -> None:
+        """Refuse another size of arrays than the one that their FMU describes."""
+        if typed(str(port), component.variable(port.port), text) != component.start(port.port):
+            raise InputError(f"{port} = {shortened(text)}: sizes of arrays cannot be changed")
 
 
 def _number(port: PortName, text: str) -> float:

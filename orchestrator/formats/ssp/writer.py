@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 from zipfile import ZipFile, ZipInfo
 
+from fmpy.model_description import ModelVariable
+
 from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTURE
+from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.units import BASE_UNITS, Linear, Mapped
-from orchestrator.system.values import items_of, literal, type_of
+from orchestrator.system.values import Value, items_of, literal, type_of
+from orchestrator.system.variables import array_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
 PARAMETER_SET = "scenario"
@@ -48,7 +53,7 @@ def ssp_bytes(system: System) -> bytes:
     with ZipFile(archive, "w") as content:
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
         for name, source in _parameter_sources(system).items():
-            values = _parameter_set_xml(system, system.components[name])
+            values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
         for fmu, source in _sources(system).items():
             content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
@@ -67,18 +72,40 @@ def _parameter_sources(system: System) -> dict[str, str]:
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 
-def _parameter_set_xml(system: System, component: Component) -> bytes:
-    """The values that a system sets in one component, as an SSV."""
-    root = Element(_tag("ssv:ParameterSet"), name=PARAMETER_SET, version=_version(component))
+def parameter_set_xml(
+    component: Component, values: Mapping[str, Value], name: str = PARAMETER_SET
+) -> bytes:
+    """Values of one component by the names of its variables, as an SSV."""
+    root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")
-    for name, value in system.parameters_of(component.name).items():
-        variable = component.variable(name)
-        # Values of an enumeration have names there.
-        items = (item for item, number in items_of(variable).items() if int(number) == value)
-        element = _add(parameters, "ssv:Parameter", name=name)
-        written = next(items, literal(value))
-        _add(element, f"ssv:{variable.type}", value=written)
+    for port in dict.fromkeys(array_of(component.variable(port)) for port in values):
+        members = component.arrays.get(port) or [component.variable(port)]
+        element = _add(parameters, "ssv:Parameter", name=port)
+        texts = [_text(component, member, values) for member in members]
+        value = _add(element, f"ssv:{members[0].type}")
+        if not members[0].shape or type_of(members[0]) not in ("String", "Enumeration"):
+            value.set("value", " ".join(texts))
+        else:
+            for text in texts:
+                _add(value, "ssv:Value", value=text)
+        _add_dimensions(element, members[0])
     return _serialised(root)
+
+
+def _text(component: Component, variable: ModelVariable, values: Mapping[str, Value]) -> str:
+    """A value as a parameter set has it; values of an enumeration have names there."""
+    value = values.get(variable.name, component.start(variable.name))
+    if value is None:
+        raise InputError(
+            f"{component.name}.{variable.name} has no value, and an SSP holds whole arrays only"
+        )
+    items = (item for item, number in items_of(variable).items() if int(number) == value)
+    return next(items, literal(value))
+
+
+def _add_dimensions(parent: Element, variable: ModelVariable) -> None:
+    for length in variable.shape or ():
+        _add(parent, "ssc:Dimension", size=str(length))
 
 
 def _tag(name: str) -> str:
@@ -121,9 +148,13 @@ def structure_xml(system: System) -> bytes:
             _add(_annotation(element, _LIBCOSIM), "osp:StepSizeHint", value=hint)
     # The schema has no empty list of connections.
     if system.connections:
-        connections = _add(structure, "ssd:Connections")
+        connections, written = _add(structure, "ssd:Connections"), set[Connection]()
+        connected = set(system.connections)
         for connection in system.connections:
-            _add_connection(connections, connection, system)
+            if connection not in written:
+                whole = _whole(connection, system, connected)
+                written |= whole
+                _add_connection(connections, connection, system, bool(whole))
     if system.step is not None:
         _add_master(structure, system.step)
     _add_enumerations(root, system)
@@ -132,10 +163,43 @@ def structure_xml(system: System) -> bytes:
     return _serialised(root)
 
 
-def _add_connection(connections: Element, connection: Connection, system: System) -> None:
+def _whole(
+    connection: Connection, system: System, connected: Collection[Connection]
+) -> set[Connection]:
+    """All connections between two arrays that are connected as a whole; empty: they are not."""
+    start, end = connection.source, connection.target
+    starts, ends = system.component(start.component), system.component(end.component)
+    source, target = starts.variable(start.port), ends.variable(end.port)
+    if not source.shape or source.shape != target.shape:
+        return set()
+    members = zip(starts.arrays[array_of(source)], ends.arrays[array_of(target)], strict=True)
+    found = {
+        replace(
+            connection,
+            source=PortName(start.component, a.name),
+            target=PortName(end.component, b.name),
+        )
+        for a, b in members
+    }
+    return found if found.issubset(connected) else set()
+
+
+def _end(which: str, port: PortName, system: System, is_whole: bool) -> dict[str, str]:
+    """The attributes of an end of a connection, which may be an element of an array."""
+    variable = system.component(port.component).variable(port.port)
+    end = {f"{which}Element": port.component, f"{which}Connector": array_of(variable)}
+    if variable.shape and not is_whole:
+        indices = port.port.removeprefix(array_of(variable))[1:-1]
+        end[f"{which}Indices"] = indices.replace(",", " ")
+    return end
+
+
+def _add_connection(
+    connections: Element, connection: Connection, system: System, is_whole: bool
+) -> None:
     source, target, made = connection.source, connection.target, connection.transformation
-    start = {"startElement": source.component, "startConnector": source.port}
-    end = {"endElement": target.component, "endConnector": target.port}
+    start = _end("start", source, system, is_whole)
+    end = _end("end", target, system, is_whole)
     element = _add(connections, "ssd:Connection", **start, **end)
     if made is not None:
         # Where units differ, it has been made of them.
@@ -191,18 +255,22 @@ def _add_component(
     media_type = "application/x-fmu-sharedlibrary"
     element = _add(elements, "ssd:Component", name=component.name, source=source, type=media_type)
     connectors = _add(element, "ssd:Connectors")
-    for variable in component.description.modelVariables:
+    written = set[str]()
+    for variable in component.variables.values():
+        name = array_of(variable)
         # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends
         # at from another's source. Parameter sets reach variables without a connector.
         is_text = variable.causality == "parameter" and variable.type == "String"
-        left_out = is_text or PortName(component.name, variable.name) in left_open
+        is_open = PortName(component.name, variable.name) in left_open
+        left_out = is_text or is_open or name in written
         if variable.causality in ("input", "output", "parameter") and not left_out:
-            named = {"name": variable.name, "kind": variable.causality}
-            connector = _add(connectors, "ssd:Connector", **named)
+            written.add(name)
+            connector = _add(connectors, "ssd:Connector", name=name, kind=variable.causality)
             stated = {"unit": variable.unit} if variable.unit else {}
             if type_of(variable) == "Enumeration" and variable.declaredType is not None:
                 stated = {"name": variable.declaredType.name}
             _add(connector, f"ssc:{variable.type}", **stated)
+            _add_dimensions(connector, variable)
     width, height = _BOX
     left = position * (width + _GAP)
     corners = {"x1": str(left), "y1": "0.0", "x2": str(left + width), "y2": str(height)}
@@ -214,7 +282,7 @@ def _add_enumerations(root: Element, system: System) -> None:
     enumerations = {
         variable.declaredType.name: variable.declaredType.items
         for component in system.components.values()
-        for variable in component.description.modelVariables
+        for variable in component.variables.values()
         if type_of(variable) == "Enumeration" and variable.declaredType is not None
     }
     if not enumerations:

@@ -18,22 +18,18 @@ from threading import Lock
 from typing import Any, NamedTuple
 
 import fmpy
-from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2Error, fmi2Status
 from fmpy.model_description import read_build_description
 
 from orchestrator.machine import cache
 from orchestrator.machine.children import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.master.fmi.slaves import slave_class
 from orchestrator.master.fmi.surroundings import restore_mode, within_folder
 from orchestrator.system.component import Component
 
 #: How this program names itself in descriptions of FMUs.
 _OWN = "auv-fmu "
-
-#: What only FMUs with some capability need, and some of the others lack.
-_OPTIONAL = ("FMUstate", "Derivative", "Status", "CancelStep", "DebugLogging")
 
 #: How ELF files of 32 and of 64 bits say where they have what: the place and form of that part of
 #: their header, and the length and form of the entries for their segments.
@@ -59,57 +55,12 @@ _libraries: dict[Path, Library] = {}
 _LOCK = Lock()
 
 
-class FMU2OfOthers(FMU2Slave):  # type: ignore[misc]
-    """An FMU that may lack functions that its capabilities do not ask for.
-
-    By the beginning of the class's name fmpy knows the version.
-    """
-
-    dll: Any
-
-    def _loadFunctions(self) -> None:
-        dll = self.dll
-        self.dll = _Lenient(dll)
-        super()._loadFunctions()
-        self.dll = dll
-
-    def _call(self, fname: str, *args: Any) -> Any:
-        try:
-            result = super()._call(fname, *args)
-        finally:
-            restore_mode()
-        # fmpy takes anything below FMI's statuses for success.
-        if self._functions[fname].restype is fmi2Status and result < 0:
-            raise FMICallException(fname, result)
-        return result
-
-    def freeLibrary(self) -> None:
-        """Unload the library."""
-        super().freeLibrary()
-        restore_mode()
-
-
-class _Lenient:
-    """A library in which optional functions are found that are not there."""
-
-    def __init__(self, dll: Any) -> None:
-        self._dll = dll
-
-    def __getattr__(self, name: str) -> Any:
-        try:
-            return getattr(self._dll, name)
-        except AttributeError:
-            if not any(part in name for part in _OPTIONAL):
-                raise
-            return lambda *_: fmi2Error
-
-
 class Library:
     """A loaded FMU, which serves all its instances in this process.
 
     Attributes:
         fmu: fmpy's view of it.
-        corrupted: whether one of them has ended with fmi2Fatal: FMI then forbids every further
+        corrupted: whether one of them has ended with status fatal: FMI then forbids every further
             call, also for the others, even to free them.
         runs_python: whether PythonFMU has made it.
         is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
@@ -131,10 +82,11 @@ class Library:
         try:
             # fmpy changes the current folder meanwhile, and leaves it so if it fails.
             with within_folder(folder):
-                self.fmu = FMU2OfOthers(
+                self.fmu = slave_class(component)(
                     guid=component.description.guid,
                     modelIdentifier=component.description.coSimulation.modelIdentifier,
                     unzipDirectory=str(folder),
+                    libraryPath=str(binary_of(component, folder)),
                 )
         except Exception as error:
             raise InputError(
@@ -168,10 +120,11 @@ def check_place(folder: Path) -> None:
     # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
     # loader, which has PythonFMU's library beside it, does that for it.
     loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
+    within_drive = folder.relative_to(folder.anchor).as_posix()
     if (
         runs_python(folder)
         and not loader
-        and (odd := re.sub(r"[\w./~-]| ", "", str(folder), flags=re.ASCII))
+        and (odd := re.sub(r"[\w./~-]| ", "", within_drive, flags=re.ASCII))
     ):
         raise InputError(
             f"temporary folder {str(folder)!r}: PythonFMU cannot handle {odd[0]!r} in it; set "
@@ -180,10 +133,21 @@ def check_place(folder: Path) -> None:
 
 
 def binary_of(component: Component, folder: Path) -> Path:
-    """Where the library of an unpacked FMU for this machine is, if it has one."""
+    """Where the library of an unpacked FMU for this machine is, if it has one.
+
+    fmpy knows only the old names of platforms, which FMI 2.0.4 has for x86, and some tools for ARM.
+    """
     identifier = component.description.coSimulation.modelIdentifier
     name = f"{identifier}{fmpy.sharedLibraryExtension}"
-    return Path(folder, "binaries", fmpy.platform, name)
+    platforms = _platform(component), fmpy.platform_tuple
+    old, named = (Path(folder, "binaries", platform, name) for platform in platforms)
+    return named if named.is_file() else old
+
+
+def _platform(component: Component) -> str:
+    """What the FMU's version calls the folder of this machine's libraries."""
+    platform: str = slave_class(component).platform
+    return platform
 
 
 def make_binary(component: Component, folder: Path) -> None:
@@ -236,7 +200,7 @@ def check_binary(component: Component, folder: Path) -> None:
         _check_compiler(component)
         return
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
-    named_otherwise = sorted(path.name for path in (binaries / fmpy.platform).glob(f"*{suffix}"))
+    named_otherwise = sorted(path.name for path in binary.parent.glob(f"*{suffix}"))
     if others:
         there = f"binaries for {', '.join(others)} only"
     elif named_otherwise:
@@ -244,8 +208,8 @@ def check_binary(component: Component, folder: Path) -> None:
     else:
         there = "no binaries at all"
     raise InputError(
-        f"{name_with_fmu(component)} has no {binary.name} for this machine, {fmpy.platform}: "
-        f"it has {there}"
+        f"{name_with_fmu(component)} has no {binary.name} for this machine, "
+        f"{_platform(component)}: it has {there}"
     )
 
 
@@ -365,7 +329,7 @@ def _check_compiler(component: Component) -> None:
     """
     if find_compiler() is None and not cache.read_cached(_CATEGORY, _key(component)):
         raise InputError(
-            f"{component.fmu}: has no binary for this machine, {fmpy.platform}, and must be "
+            f"{component.fmu}: has no binary for this machine, {_platform(component)}, and must be "
             "compiled: install gcc or clang, or `pip install ziglang`"
         )
 
@@ -375,8 +339,8 @@ def _compiled(component: Component, sources: Sources) -> bytes:
     run = find_compiler()
     assert run is not None
     warnings.warn(
-        f"{component.fmu.name} has no binary for this machine, {fmpy.platform}: its C sources "
-        "are compiled now, and kept",
+        f"{component.fmu.name} has no binary for this machine, {_platform(component)}: its C "
+        "sources are compiled now, and kept",
         stacklevel=2,
     )
     cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)

@@ -15,7 +15,7 @@ from orchestrator.master.fmi.transfer import CMember
 from orchestrator.system.values import StringTable, Value
 
 #: What a component is asked for in every step, one after the other.
-CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "fmi2DoStep", "getting outputs"
+CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "doStep", "getting outputs"
 
 #: Messages that are kept: an FMU may have something to say in every step.
 _MOST_MESSAGES = 100
@@ -28,7 +28,7 @@ class ComponentFailed(Exception):
     """A component failed to do what it was asked to; the text names it and says why.
 
     Attributes:
-        fatal: whether it is lost: FMI's fmi2Fatal, or its process has ended or hangs.
+        fatal: whether it is lost: FMI's status fatal, or its process has ended or hangs.
 
     """
 
@@ -58,8 +58,8 @@ class Part(NamedTuple):
 
     Attributes:
         causality: `input` or `output`.
-        fmi_type: one of :data:`.transfer.FMI_TYPES`.
-        references: value references.
+        fmi_type: one of :data:`.values.TYPES`.
+        references: value references, one for each array.
         place: of their values among the component's.
 
     """
@@ -112,7 +112,7 @@ class Instance(Protocol):
         Args:
             values: of the row, from its first on.
             parts: of them.
-            strings: the texts for which numbers stand there.
+            strings: what numbers there stand for.
 
         """
 
@@ -129,8 +129,8 @@ class Instance(Protocol):
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
 
-    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
-        """How some outputs change with one input at the same time, by their value references.
+    def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
+        """How some outputs change with one input at the same time.
 
         Raises:
             ComponentFailed: the FMU does not say it.

@@ -21,7 +21,7 @@ from orchestrator.master.fmi.instance import ComponentFailed, Ended, Log, Part
 from orchestrator.master.fmi.transfer import CMember
 from orchestrator.master.fmi.worker import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
 from orchestrator.system.component import Component
-from orchestrator.system.values import StringTable, Value, is_integer, is_of
+from orchestrator.system.values import TYPES, Standing, StringTable, Value, are_of, is_of
 
 #: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
 STEP_TIMEOUT = 60.0
@@ -109,11 +109,14 @@ class IsolatedInstance:
         self._doing, self._hangs, self._steps = "start", False, False
         connection.settimeout(min(timeout, _GLANCE))
         self._inputs, self._outputs = np.zeros(0), np.zeros(0)
-        self._text_inputs: list[int] = []
-        self._text_outputs: list[int] = []
-        self._integer_outputs: list[int] = []
-        # The run's, and the ones in the process there, which numbers its own.
-        self._strings, self._theirs, self._told = StringTable(), StringTable(), len(StringTable())
+        # Where numbers may stand for values, in the run and in the process, and outputs by types.
+        self._standing: dict[str, list[tuple[int, Standing, Standing]]] = {
+            "input": [],
+            "output": [],
+        }
+        self._typed_outputs: list[tuple[str, slice]] = []
+        # What numbers stand for in the process, which has its own, and how many it knows of.
+        self._theirs, self._told = StringTable(), len(StringTable())
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
 
@@ -134,16 +137,15 @@ class IsolatedInstance:
         inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
         first = next((part.place.start for part in parts if part.causality == "output"), inputs)
         self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
-        self._strings = strings
         for part in parts:
-            if part.fmi_type == "String":
-                places = range(part.place.start, part.place.stop)
-                if part.causality == "input":
-                    self._text_inputs += places
-                else:
-                    self._text_outputs += [place - first for place in places]
-            elif part.fmi_type != "Real" and part.causality == "output":
-                self._integer_outputs += range(part.place.start - first, part.place.stop - first)
+            of, is_input = TYPES[part.fmi_type], part.causality == "input"
+            begin = part.place.start - (0 if is_input else first)
+            end = begin + part.place.stop - part.place.start
+            if of.stands:
+                ours, theirs = (Standing(part.fmi_type, s) for s in (strings, self._theirs))
+                self._standing[part.causality] += [(i, ours, theirs) for i in range(begin, end)]
+            if not is_input and of.family != "Real":
+                self._typed_outputs.append((part.fmi_type, slice(begin, end)))
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
@@ -159,8 +161,8 @@ class IsolatedInstance:
         self._ask("exchange")
         self._read_outputs()
 
-    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
-        """How some outputs change with one input at the same time, by their value references."""
+    def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
+        """How some outputs change with one input at the same time."""
         found = self._ask("derivatives", list(outputs), of)
         if not (isinstance(found, list) and len(found) == len(outputs)):
             raise self._nonsense()
@@ -270,17 +272,17 @@ class IsolatedInstance:
         """Have the inputs go with the next message."""
         inputs = self._channel.outgoing[2:]
         inputs[:] = self._inputs
-        for i in self._text_inputs:
-            inputs[i] = self._theirs.number(self._strings.text(inputs[i]))
+        for i, ours, theirs in self._standing["input"]:
+            inputs[i] = theirs.number(ours.value(inputs[i]))
 
     def _read_outputs(self) -> None:
         """Take the outputs that have come with a message."""
         outputs = self._channel.incoming
-        if not all(is_integer(outputs[i]) for i in self._integer_outputs):
+        if not all(are_of(of, outputs[place]).all() for of, place in self._typed_outputs):
             raise self._nonsense()
         try:
-            for i in self._text_outputs:
-                outputs[i] = self._strings.number(self._theirs.text(outputs[i]))
+            for i, ours, theirs in self._standing["output"]:
+                outputs[i] = ours.number(theirs.value(outputs[i]))
         except ValueError as error:
             raise self._nonsense(error) from error
         self._outputs[:] = outputs

@@ -4,65 +4,37 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from copy import copy
-from functools import partial
-from itertools import count
 from pathlib import Path
-from time import sleep
-from typing import Any, TypeAlias
+from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-    fmi2Component,
     fmi2Discard,
-    fmi2DoStepStatus,
-    fmi2Error,
     fmi2Fatal,
     fmi2FMUstate,
-    fmi2LastSuccessfulTime,
     fmi2OK,
     fmi2Pending,
-    fmi2Status,
-    fmi2Terminated,
     fmi2Warning,
 )
-from fmpy.logging import addLoggerProxy
-from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.binary import Library, library_of, name_with_fmu
 from orchestrator.master.fmi.instance import DO_STEP, ComponentFailed, Ended, Listener, Part
 from orchestrator.master.fmi.surroundings import restore_mode
-from orchestrator.master.fmi.transfer import (
-    DO_STEP_TYPES,
-    CMember,
-    CMove,
-    DoStepCallback,
-    PortBlock,
-    address_of,
-    decode_text,
-)
+from orchestrator.master.fmi.transfer import CMember, CMove, PortBlock, decode_text
 from orchestrator.system.component import Component
 from orchestrator.system.values import StringTable, Value
+from orchestrator.system.variables import array_of
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
 _LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
-_DoStep: TypeAlias = Callable[[Any, Any, int], int]
-
 #: Messages that are remembered, to say why something has failed.
 _MOST_COMPLAINTS = 3
-
-#: How often is looked whether a step has ended that goes on after its call [s].
-_GLANCE = 1e-3
 
 
 class LoadedInstance:
@@ -82,6 +54,7 @@ class LoadedInstance:
         self.get_outputs: list[Callable[[], int]] = []
         self._inputs: list[PortBlock] = []
         self._outputs: list[PortBlock] = []
+        self._component = component
         self._variables = component.variables
         self._gives_state = component.gives_state
         self.gives_derivatives = component.gives_derivatives
@@ -92,80 +65,44 @@ class LoadedInstance:
         self._listener = listener
         self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
         self._worst = 0
-        self._environment = next(_environments)
-        _instances[self._environment] = self
         # The functions of the library serve all instances; only what differs is theirs.
         self._fmu = copy(library.fmu)
         self._fmu.instanceName = component.name
-        callbacks = fmi2CallbackFunctions.from_buffer_copy(_SHARED)
-        callbacks.componentEnvironment = self._environment
         try:
-            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
+            self._fmu.begin(self)
         except Exception as error:
-            del _instances[self._environment]
             heard = [text.removeprefix(f"{self.name}: ") for text in self._complaints]
             why = " ".join(heard) or reason(error)
             needs = component.description.coSimulation.needsExecutionTool
             tool = "; it needs the tool that it was made with" * needs
             text = f"{name_with_fmu(component)} cannot be instantiated: {why}{tool}"
             raise InputError(text) from error
-        self.do_step = self.function("DoStep")
-        self._called_back: Any = None
-        if component.description.coSimulation.canRunAsynchronuously:
-            # Called back with numbers of Python, too.
-            self.do_step = do_step = self._awaited(self.function("DoStep", DO_STEP_TYPES))
-            self._called_back = DoStepCallback(lambda _, *step: do_step(*step))
-
-    def _awaited(self, do_step: _DoStep) -> _DoStep:
-        """Steps that the FMU may go on with after the call, as calls that end when they do."""
-        ask = self.function("GetStatus", (fmi2Component, ctypes.c_int, ctypes.POINTER(fmi2Status)))
-
-        def awaited(t: Any, h: Any, no_rollback: int) -> int:
-            status = fmi2Status(do_step(t, h, no_rollback))
-            while status.value == fmi2Pending:
-                sleep(_GLANCE)
-                if ask(fmi2DoStepStatus, ctypes.byref(status)) not in (fmi2OK, fmi2Warning):
-                    return int(fmi2Error)
-            return int(status.value)
-
-        return awaited
-
-    def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
-        """One of the FMU's functions, for calls of every step.
-
-        fmpy's own methods look the function up and convert its arguments in every call, which
-        costs as much as the call.
-
-        Args:
-            name: of the function, without fmi2.
-            types: of its arguments; None: they come as values of ctypes.
-
-        """
-        called = self._fmu.dll[f"fmi2{name}"]
-        called.argtypes, called.restype = types, fmi2Status
-        return partial(called, fmi2Component(self._fmu.component))
+        self.do_step, self._stepped = self._fmu.stepping(component)
 
     def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Say where its values are."""
         for part in parts:
-            block = PortBlock(*part[:3], values[part.place], strings)
-            function = self.function(block.function)
+            moved = self._fmu.moved(part.fmi_type)
+            row = values[part.place]
+            block = PortBlock(part.causality, part.fmi_type, moved, part.references, row, strings)
+            call = block.mover(self._fmu.function(block.function))
             if part.causality == "input":
                 self._inputs.append(block)
-                self.set_inputs.append(block.setter(function))
+                self.set_inputs.append(call)
             else:
                 self._outputs.append(block)
-                self.get_outputs.append(block.getter(function))
+                self.get_outputs.append(call)
 
     def pointers(self) -> CMember:
         """The same calls for the compiled loop."""
         inputs, outputs = (
-            [block.move(address_of(self._fmu.dll[f"fmi2{block.function}"])) for block in blocks]
+            [block.move(self._fmu.address(block.function)) for block in blocks]
             for blocks in (self._inputs, self._outputs)
         )
         return CMember(
             self._fmu.component,
-            address_of(self._called_back or self._fmu.dll["fmi2DoStep"]),
+            self._stepped.do_step,
+            self._stepped.told,
             (CMove * len(inputs))(*inputs),
             (CMove * len(outputs))(*outputs),
             len(inputs),
@@ -174,13 +111,14 @@ class LoadedInstance:
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        self._set(values)
+        # There is nothing to be read yet.
+        whole = self._whole(values, self._starts)
+        self._set(whole)
         # No stop time: k h ends beyond it by a rounding error, which many FMUs refuse.
-        self._call("setupExperiment", startTime=start_time)
-        self._call("enterInitializationMode")
+        self._call("enter_initialization", start_time)
         # FMI has it that guesses are set only before.
         variables = self._variables
-        self._set({port: v for port, v in values.items() if variables[port].initial == "exact"})
+        self._set({port: v for port, v in whole.items() if variables[port].initial == "exact"})
 
     def exit_initialization(self) -> None:
         """Get ready for the first step, in which no FMU is to log more than what goes wrong.
@@ -200,18 +138,25 @@ class LoadedInstance:
                 raise self.failed(status, "exchanging values")
         restore_mode()
 
-    def derivatives(self, outputs: Sequence[int], of: int) -> Sequence[float]:
-        """How some outputs change with one input at the same time, by their value references."""
-        found: list[float] = self._call("getDirectionalDerivative", outputs, [of], [1.0])
-        return found
+    def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
+        """How some outputs change with one input at the same time."""
+        unknowns, knowns = self._arrays(outputs), self._arrays([of])
+        seed = [float(port == of) for ports in knowns for port in ports]
+        found = self._call(
+            "derivatives", self._references(unknowns), self._references(knowns), seed,
+            sum(map(len, unknowns)),
+        )  # fmt: skip
+        by_name = dict(zip((port for ports in unknowns for port in ports), found, strict=True))
+        return [by_name[port] for port in outputs]
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
-        return {port: self._get(self._variables[port]) for port in ports}
+        held = {port: v for array in self._arrays(ports) for port, v in self._get(array).items()}
+        return {port: held[port] for port in ports}
 
     def tune(self, values: Mapping[str, Value]) -> None:
         """Set tunable parameters between two steps."""
-        self._set(values)
+        self._set(self._whole(values, self.read))
 
     def reset(self) -> None:
         """Return to the state before the initialisation."""
@@ -223,7 +168,7 @@ class LoadedInstance:
 
     def go_back(self) -> None:
         """Go back to the state that was kept."""
-        self._call("setFMUstate", self._kept)
+        self._call("setFMUState", self._kept)
 
     def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
         """Let some inputs change linearly in the steps from now on."""
@@ -232,16 +177,16 @@ class LoadedInstance:
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
-        with self._held("getFMUstate") as state:
-            serialised: bytes = self._call("serializeFMUstate", state)
+        with self._held("getFMUState") as state:
+            serialised: bytes = self._call("serializeFMUState", state)
         return serialised
 
     def restore(self, state: bytes) -> None:
         """Take on a state."""
         self._complaints.clear()
         self._worst = 0
-        with self._held("deSerializeFMUstate", state) as read:
-            self._call("setFMUstate", read)
+        with self._held("deserializeFMUState", state) as read:
+            self._call("setFMUState", read)
         # Some say only in a message that it is not theirs.
         if self._worst >= fmi2Discard:
             raise ComponentFailed(self._complaints[-1])
@@ -256,7 +201,7 @@ class LoadedInstance:
             yield state
         finally:
             if not self._library.corrupted:
-                self._call("freeFMUstate", state)
+                self._call("freeFMUState", state)
 
     def terminate(self) -> None:
         """Let the FMU finish what it has begun."""
@@ -270,10 +215,8 @@ class LoadedInstance:
             return
         if self._kept:
             with suppress(FMICallException):
-                self._fmu.freeFMUstate(self._kept)
-        # FMU2Slave.freeInstance would unload the library as well.
-        self._fmu.fmi2FreeInstance(self._fmu.component)
-        del _instances[self._environment]
+                self._fmu.freeFMUState(self._kept)
+        self._fmu.free()
 
     def hear(self, status: int, message: str) -> None:
         """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
@@ -285,17 +228,48 @@ class LoadedInstance:
             self._worst = status
         self._listener.take(status, text)
 
-    def _set(self, values: Mapping[str, Value]) -> None:
-        for port, value in values.items():
-            variable = self._variables[port]
-            self._call(f"set{_fmi_type(variable)}", [variable.valueReference], [value])
+    def _arrays(self, ports: Iterable[str]) -> list[list[str]]:
+        """The names of some variables, each with those of all others of its array."""
+        arrays = self._component.arrays
+        names = dict.fromkeys(array_of(self._variables[port]) for port in ports)
+        return [[v.name for v in arrays[name]] if name in arrays else [name] for name in names]
 
-    def _get(self, variable: ModelVariable) -> Value:
-        value: Value | bytes | None
-        (value,) = self._call(f"get{_fmi_type(variable)}", [variable.valueReference])
-        if value is None or isinstance(value, bytes):
-            return decode_text(value)
-        return bool(value) if variable.type == "Boolean" else value
+    def _references(self, arrays: Sequence[Sequence[str]]) -> list[int]:
+        return [self._variables[ports[0]].valueReference for ports in arrays]
+
+    def _whole(
+        self, values: Mapping[str, Value], others: Callable[[list[str]], Mapping[str, Value]]
+    ) -> dict[str, Value]:
+        """Values with those of all other elements of their arrays, which are set as a whole."""
+        ports = [port for array in self._arrays(values) for port in array]
+        return {**others([port for port in ports if port not in values]), **values}
+
+    def _starts(self, ports: Iterable[str]) -> dict[str, Value]:
+        """The start values of some variables."""
+        starts = self._component.starts
+        for port in ports:
+            if port not in starts:
+                raise ComponentFailed(
+                    f"{self.name}.{port} has no start value in its description: set all elements "
+                    "of the array"
+                )
+        return {port: starts[port] for port in ports}
+
+    def _set(self, values: Mapping[str, Value]) -> None:
+        for ports in self._arrays(values):
+            variable = self._variables[ports[0]]
+            taken = [values[port] for port in ports]
+            self._call("set", variable.type, [variable.valueReference], taken)
+
+    def _get(self, ports: Sequence[str]) -> dict[str, Value]:
+        """Values of a variable, or of all elements of an array."""
+        variable = self._variables[ports[0]]
+        values = self._call("get", variable.type, [variable.valueReference], len(ports))
+        if variable.type == "String":
+            values = map(decode_text, values)
+        elif variable.type == "Boolean":
+            values = map(bool, values)
+        return dict(zip(ports, values, strict=True))
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
         """One of fmpy's methods, which are slow and convenient."""
@@ -309,10 +283,14 @@ class LoadedInstance:
         restore_mode()
         if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
             with suppress(FMICallException):
-                if self._fmu.getBooleanStatus(fmi2Terminated):
-                    time = self._fmu.getRealStatus(fmi2LastSuccessfulTime)
+                if (time := self._fmu.ended_at()) is not None:
                     text = f"{self.name} has ended the simulation, at {time:.12g} s"
                     return Ended(text, self.name, time)
+        if function == DO_STEP and (time := self._fmu.returned_at()) is not None:
+            return ComponentFailed(
+                f"{self.name}: has returned from its step early, at {time:.12g} s, which it was "
+                "not allowed to"
+            )
         if status == fmi2Pending:
             return ComponentFailed(
                 f"{self.name}: its step goes on after {function}, and its description does not "
@@ -326,10 +304,6 @@ class LoadedInstance:
             self._library.corrupted = True
         last = self._complaints[-1] if self._complaints else f"{self.name}: {error}"
         return ComponentFailed(last, fatal)
-
-
-def _fmi_type(variable: ModelVariable) -> str:
-    return "Integer" if variable.type == "Enumeration" else str(variable.type)
 
 
 @contextmanager
@@ -354,38 +328,3 @@ def load_instance(
             yield instance
         finally:
             instance.free()
-
-
-#: Instances by the component environments that their FMUs hand back with every message.
-_instances: dict[int, LoadedInstance] = {}
-_environments = count(1)
-
-
-@fmi2CallbackLoggerTYPE  # type: ignore[untyped-decorator]
-def _log(
-    environment: int | None, name: bytes, status: int, _: bytes, message: bytes | None
-) -> None:
-    instance = _instances.get(environment or 0) or _bearing(name)
-    if instance is not None:
-        instance.hear(status, (message or b"").decode(errors="replace"))
-
-
-def _bearing(name: bytes | None) -> LoadedInstance | None:
-    """The instance with a name: some FMUs do not hand the environment back."""
-    text = (name or b"").decode(errors="replace")
-    return next((found for found in _instances.values() if found.name == text), None)
-
-
-def _shared_callbacks() -> fmi2CallbackFunctions:
-    """Callbacks of all instances: fmpy's proxy, which formats messages, knows one logger only."""
-    callbacks = fmi2CallbackFunctions()
-    callbacks.logger = _log
-    # The functions of C themselves: made into callbacks of Python, they would cost an FMU that
-    # allocates in every step more than the step.
-    callbacks.allocateMemory = ctypes.cast(fmpy.calloc, fmi2CallbackAllocateMemoryTYPE)
-    callbacks.freeMemory = ctypes.cast(fmpy.free, fmi2CallbackFreeMemoryTYPE)
-    addLoggerProxy(ctypes.byref(callbacks))
-    return callbacks
-
-
-_SHARED = _shared_callbacks()

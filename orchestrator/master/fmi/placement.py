@@ -8,8 +8,9 @@ from contextlib import ExitStack, contextmanager
 from functools import partial
 from threading import Lock
 
-from orchestrator.machine.errors import StartError, reason
+from orchestrator.machine.errors import InputError, StartError, reason
 from orchestrator.machine.interrupts import Interrupts
+from orchestrator.machine.operating_system import can_isolate
 from orchestrator.master.fmi.binary import make_binary
 from orchestrator.master.fmi.instance import Instance, Log
 from orchestrator.master.fmi.isolated import IsolatedInstance, Isolation
@@ -82,7 +83,18 @@ def _has_room(component: Component) -> Iterator[bool]:
 def isolate_instances(
     components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
 ) -> Iterator[dict[str, Instance]]:
-    """Place instances, each in a separate process; all end with it."""
+    """Place instances, each in a separate process; all end with it.
+
+    Raises:
+        InputError: this system has no such processes.
+        StartError: no process can be started.
+
+    """
+    if not can_isolate():
+        raise InputError(
+            f"{', '.join(components)}: FMUs cannot be run in separate processes on Windows: leave "
+            "--isolate out; and of an FMU that allows one instance in a process, use one"
+        )
     with ExitStack() as stack:
         try:
             pairs = [socket.socketpair() for _ in components]

@@ -6,7 +6,6 @@ without end; and it outlives the process that has started it for as long as that
 
 from __future__ import annotations
 
-import ctypes
 import json
 import os
 import select
@@ -24,6 +23,7 @@ from time import monotonic
 from typing import Any
 
 from orchestrator.machine.errors import escape_unprintable
+from orchestrator.machine.operating_system import die_with_parent
 from orchestrator.master.fmi.isolated import FAREWELL
 from orchestrator.master.fmi.worker import serve
 from orchestrator.system.component import Component
@@ -39,8 +39,6 @@ _PIPE, _PIECE = 1 << 16, 1 << 12
 
 #: How often it looks whether its parent is still there [ms].
 _PATIENCE = 500
-
-_PR_SET_PDEATHSIG = 1
 
 #: What the supervisor begins with: the modules that this process would find, and no main module.
 _BEGIN = """
@@ -159,11 +157,7 @@ def _alone_with(descriptor: int) -> socket.socket:
     os.dup2(descriptor, 3)
     os.set_inheritable(3, False)
     os.closerange(4, os.sysconf("SC_OPEN_MAX"))
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
-        # Where memory gets short, this is the process to end.
-        with suppress(OSError):
-            Path("/proc/self/oom_score_adj").write_text("1000")
+    die_with_parent()
     return socket.socket(fileno=3)
 
 

@@ -8,12 +8,13 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import chdir, contextmanager, suppress
-from functools import partial
 from pathlib import Path
 
 import numpy as np
+
+from orchestrator.machine.operating_system import floating_point_calls
 
 #: Factors whose product passes through the smallest numbers, and is rounded up and down: with
 #: another mode it is another one.
@@ -26,18 +27,7 @@ _SIZE = 1024
 _MODULES = (builtins, json, os, np)
 
 
-def _functions() -> Iterator[Callable[..., object]]:
-    """C's functions: to take on the default mode, and to get and to set one."""
-    c = ctypes.PyDLL(None)
-    if sys.platform == "darwin":
-        yield partial(c.fesetenv, ctypes.byref(ctypes.c_char.in_dll(c, "_FE_DFL_ENV")))
-    else:
-        yield partial(c.fesetenv, ctypes.c_void_p(-1))
-    yield c.fegetenv
-    yield c.fesetenv
-
-
-_take_default, _get, _set = _functions()
+_take_default, _get, _set = floating_point_calls()
 
 
 def restore_mode() -> None:

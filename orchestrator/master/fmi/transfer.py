@@ -2,42 +2,63 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable, Sequence
 from ctypes import CFUNCTYPE, POINTER, Structure, addressof, c_size_t, c_void_p, cast
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from fmpy.fmi2 import (
     fmi2Boolean,
     fmi2Component,
     fmi2Error,
-    fmi2Integer,
+    fmi2OK,
     fmi2Real,
     fmi2Status,
     fmi2String,
     fmi2ValueReference,
+    fmi2Warning,
 )
 
-from orchestrator.system.values import StringTable
+from orchestrator.system.values import StringTable, are_of
 
-#: Kinds of values that can be connected and recorded, with FMI's functions for them and the types
-#: that they are moved in: for a String moves the number of its text.
-FMI_TYPES = {
-    "Real": ("Real", fmi2Real),
-    "Integer": ("Integer", fmi2Integer),
-    "Enumeration": ("Integer", fmi2Integer),
-    "Boolean": ("Boolean", fmi2Boolean),
-    "String": ("String", fmi2Integer),
-}
-
-#: Types of the arguments of FMI's doStep, and a function of Python in its place for the compiled
-#: loop.
+#: Types of the arguments of doStep in FMI 2.0, and a function of Python in its place for the
+#: compiled loop.
 DO_STEP_TYPES = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
 DoStepCallback = CFUNCTYPE(fmi2Status, *DO_STEP_TYPES)
 
-#: The same in place of FMI's functions that move Integers.
-_MoveCallback = CFUNCTYPE(fmi2Status, fmi2Component, c_void_p, c_size_t, c_void_p)
+#: A function of Python in place of one that moves values.
+_MoveCallback = CFUNCTYPE(fmi2Status)
+
+#: The kinds of values that the compiled loop moves by itself, by their types in C; any others a
+#: function of Python moves: see stepper.c.
+_KINDS = {
+    c_type: kind
+    for kind, c_type in enumerate(
+        (
+            *(ctypes.c_double, ctypes.c_float, ctypes.c_int8, ctypes.c_uint8),
+            *(ctypes.c_int16, ctypes.c_uint16, ctypes.c_int32, ctypes.c_uint32),
+        )
+    )
+}
+_KINDS[ctypes.c_bool] = _KINDS[ctypes.c_uint8]
+_MOVED_BY_PYTHON = 8
+
+
+class Moved(NamedTuple):
+    """How values of a type are moved.
+
+    Attributes:
+        function: the one of FMI, without its prefix and Get or Set.
+        c_type: of the values.
+        is_counted: whether the function is told how many values there are.
+
+    """
+
+    function: str
+    c_type: Any
+    is_counted: bool = False
 
 
 class CMove(Structure):
@@ -46,9 +67,23 @@ class CMove(Structure):
     _fields_ = (
         ("call", c_void_p),
         ("references", c_void_p),
+        ("n_references", c_size_t),
         ("n", c_size_t),
+        ("row", c_void_p),
         ("values", c_void_p),
-        ("integers", c_void_p),
+        ("kind", ctypes.c_int),
+        ("is_counted", ctypes.c_int),
+    )
+
+
+class CTold(Structure):
+    """What doStep of FMI 3.0 tells: see stepper.c."""
+
+    _fields_ = (
+        ("event", ctypes.c_bool),
+        ("terminate", ctypes.c_bool),
+        ("early", ctypes.c_bool),
+        ("last", ctypes.c_double),
     )
 
 
@@ -58,6 +93,7 @@ class CMember(Structure):
     _fields_ = (
         ("component", c_void_p),
         ("do_step", c_void_p),
+        ("told", POINTER(CTold)),
         ("inputs", POINTER(CMove)),
         ("outputs", POINTER(CMove)),
         ("n_inputs", c_size_t),
@@ -69,7 +105,7 @@ class PortBlock:
     """Values of one type, side by side in the row of all values, moved by one FMI call.
 
     Attributes:
-        function: the one of FMI that moves them, without fmi2.
+        function: the one of FMI that moves them, without its prefix.
 
     """
 
@@ -77,6 +113,7 @@ class PortBlock:
         self,
         causality: str,
         fmi_type: str,
+        moved: Moved,
         references: Sequence[int],
         row: np.ndarray,
         strings: StringTable,
@@ -85,47 +122,59 @@ class PortBlock:
 
         Args:
             causality: `input` or `output`.
-            fmi_type: one of :data:`FMI_TYPES`.
-            references: value references.
+            fmi_type: one of :data:`.values.TYPES`.
+            moved: how its values are moved.
+            references: value references, one for each array.
             row: the part of the row of all values where the values are, a view.
-            strings: the texts whose numbers stand in the row.
+            strings: know what numbers in the row stand for.
 
         """
-        self._fmi_type, c_type = FMI_TYPES[fmi_type]
-        self._strings = strings
-        self.function = f"{'Set' if causality == 'input' else 'Get'}{self._fmi_type}"
+        self._is_input = causality == "input"
+        self._fmi_type, self._moved, self._strings = fmi_type, moved, strings
+        self.function = f"{'Set' if self._is_input else 'Get'}{moved.function}"
         self._row = row
-        n = len(references)
-        self._n = c_size_t(n)
-        self._references = (fmi2ValueReference * n)(*references)
-        if self._fmi_type == "Real":
-            self._values = (c_type * n).from_buffer(row)
+        n, n_references = len(row), len(references)
+        self._references = (fmi2ValueReference * n_references)(*references)
+        self._kind = _KINDS.get(moved.c_type, _MOVED_BY_PYTHON)
+        if moved.c_type is fmi2Real:
+            self._values = (moved.c_type * n).from_buffer(row)
         else:
-            self._values = (c_type * n)()
-            self._integers = np.frombuffer(self._values, dtype=np.intc)
+            self._values = (moved.c_type * n)()
+        if self._kind != _MOVED_BY_PYTHON:
+            # A byte of a Boolean may be neither 0 nor 1.
+            of = np.uint8 if moved.c_type is ctypes.c_bool else np.dtype(moved.c_type)
+            self._numbers = np.frombuffer(self._values, dtype=of)
+        self._arguments: tuple[Any, ...] = (self._references, c_size_t(n_references), self._values)
+        if moved.is_counted:
+            self._arguments += (c_size_t(n),)
 
-    def setter(self, function: Callable[..., int]) -> Callable[[], int]:
-        """A call that hands the values to an FMU, by its function of this block."""
-        call = self._call(function)
-        if self._fmi_type == "Real":
+    def mover(self, function: Callable[..., int]) -> Callable[[], int]:
+        """A call that hands the values to an FMU or takes them, by its function of this block."""
+        call = partial(function, *self._arguments)
+        if self._moved.c_type is fmi2Real:
             return call
+        if self._kind == _MOVED_BY_PYTHON:
+            move = partial(self._set_each if self._is_input else self._get_each, call)
+            self._called_back = _MoveCallback(move)
+            return move
+        return self._setter(call) if self._is_input else self._getter(call)
 
-        row, integers = self._row, self._integers
+    def _setter(self, call: Callable[[], int]) -> Callable[[], int]:
+        row, numbers = self._row, self._numbers
 
         def set_converted() -> int:
-            integers[:] = row
+            numbers[:] = row
             # Lists are compared in a third of the time. The row says which value it is.
-            return call() if integers.tolist() == row.tolist() else int(fmi2Error)
+            return call() if numbers.tolist() == row.tolist() else int(fmi2Error)
 
-        return set_converted
+        def set_rounded() -> int:
+            numbers[:] = row
+            return call() if are_of(self._fmi_type, row).all() else int(fmi2Error)
 
-    def getter(self, function: Callable[..., int]) -> Callable[[], int]:
-        """A call that takes the values from an FMU, by its function of this block."""
-        call = self._call(function)
-        if self._fmi_type == "Real":
-            return call
+        return set_rounded if self._moved.c_type is ctypes.c_float else set_converted
 
-        row, values = self._row, self._values
+    def _getter(self, call: Callable[[], int]) -> Callable[[], int]:
+        row, numbers, values = self._row, self._numbers, self._values
 
         def get_one() -> int:
             status = call()
@@ -134,49 +183,55 @@ class PortBlock:
 
         def get_converted() -> int:
             status = call()
-            row[:] = self._integers
+            row[:] = numbers
             return status
 
         # Most components have one such output, and an array of one costs twice as much.
         return get_one if len(row) == 1 else get_converted
 
+    def _set_each(self, call: Callable[[], int]) -> int:
+        if not are_of(self._fmi_type, self._row).all():
+            return int(fmi2Error)
+        for i, number in enumerate(self._row.tolist()):
+            self._values[i] = self._value(number)
+        return call()
+
+    def _value(self, number: float) -> bytes | int:
+        if self._moved.c_type is fmi2String:
+            return self._strings.text(number).encode()
+        return self._strings.integer(number)
+
+    def _get_each(self, call: Callable[[], int]) -> int:
+        # What an FMU leaves as it is must not be what it gave before.
+        ctypes.memset(self._values, 0, ctypes.sizeof(self._values))
+        status = call()
+        if status in (fmi2OK, fmi2Warning):
+            is_text = self._moved.c_type is fmi2String
+            for i, value in enumerate(self._values):
+                self._row[i] = self._strings.stand_in(decode_text(value) if is_text else value)
+            if not are_of(self._fmi_type, self._row).all():
+                return int(fmi2Error)
+        return status
+
     def move(self, address: int | None) -> CMove:
         """The same for the compiled loop, by the address of the FMU's function of this block."""
-        integers = None if self._fmi_type == "Real" else addressof(self._values)
-        if self._fmi_type == "String":
+        if self._kind == _MOVED_BY_PYTHON:
             address = address_of(self._called_back)
-        references, row = addressof(self._references), self._row.ctypes.data
-        return CMove(address, references, self._n, row, integers)
-
-    def _call(self, function: Callable[..., int]) -> Callable[[], int]:
-        if self._fmi_type == "String":
-            move = self._set_texts if self.function.startswith("Set") else self._get_texts
-            call = partial(move, function)
-            # The compiled loop looks for numbers and has an FMU's function move them.
-            self._called_back = _MoveCallback(lambda *_: call())
-            return call
-        return partial(function, self._references, self._n, self._values)
-
-    def _set_texts(self, function: Callable[..., int]) -> int:
-        texts = [self._strings.text(number).encode() for number in self._values]
-        return function(self._references, self._n, (fmi2String * len(texts))(*texts))
-
-    def _get_texts(self, function: Callable[..., int]) -> int:
-        texts = (fmi2String * len(self._values))()
-        status = function(self._references, self._n, texts)
-        for i, text in enumerate(texts):
-            self._values[i] = self._strings.number(decode_text(text))
-        return status
+        return CMove(
+            address,
+            addressof(self._references),
+            len(self._references),
+            len(self._row),
+            self._row.ctypes.data,
+            addressof(self._values),
+            self._kind,
+            self._moved.is_counted,
+        )
 
 
 def address_of(function: Any) -> int | None:
     """The address of a function of ctypes, for the compiled loop."""
     return cast(function, c_void_p).value
-
-
-def are_integers(values: np.ndarray) -> bool:
-    """Whether FMI's Integers can hold all of some values."""
-    return bool((values.astype(np.intc) == values).all())
 
 
 def decode_text(string: bytes | None) -> str:

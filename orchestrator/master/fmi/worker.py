@@ -26,7 +26,6 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, MessageQueue
 from orchestrator.master.fmi.loaded import LoadedInstance, load_instance
 from orchestrator.master.fmi.surroundings import Surroundings
-from orchestrator.master.fmi.transfer import FMI_TYPES
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import member, step_members
 from orchestrator.system.component import Component, read_description
@@ -134,11 +133,7 @@ def _from_text(read: dict[str, Any]) -> Any:
 
 def sizes(component: Component) -> tuple[int, int]:
     """How many inputs and outputs a component has in a row."""
-    inputs, outputs = (
-        sum(variable.type in FMI_TYPES for variable in component.having(causality))
-        for causality in ("input", "output")
-    )
-    return inputs, outputs
+    return len(component.having("input")), len(component.having("output"))
 
 
 @np.errstate(all="ignore")

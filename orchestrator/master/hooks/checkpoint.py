@@ -25,9 +25,10 @@ from uuid import uuid4
 
 import numpy as np
 
-from orchestrator.machine.disk import sealed, sync_to_disk, unsealed, write_whole
+from orchestrator.machine.disk import sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import move_aside
+from orchestrator.machine.operating_system import sync_to_disk
 from orchestrator.master.fmi.instance import Log
 from orchestrator.master.hooks.hook import NEVER, Lasting, Run
 from orchestrator.master.observers.observer import Ending, Header, NotKept

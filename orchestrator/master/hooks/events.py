@@ -23,7 +23,7 @@ from orchestrator.system.names import PortName
 from orchestrator.system.values import Value, literal, same
 
 #: Comparisons, as a scenario writes them.
-COMPARISONS: Mapping[str, Callable[[float, float], bool]] = {
+COMPARISONS: Mapping[str, Callable[[Any, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,
     "<": operator.lt,
@@ -44,8 +44,7 @@ class Condition:
 
     def holds(self, row: Row) -> bool:
         """Whether it is true of a row."""
-        value = float(row.values[row.columns[self.signal]])
-        return COMPARISONS[self.comparison](value, self.value)
+        return COMPARISONS[self.comparison](row.value(self.signal), self.value)
 
     def __str__(self) -> str:
         """As a scenario writes it."""
@@ -178,7 +177,7 @@ class Alter:
     """
 
     effect: str
-    values: tuple[tuple[PortName, float], ...]
+    values: tuple[tuple[PortName, Value], ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
         """Do it."""
@@ -216,7 +215,7 @@ class Set:
     """Give values to tunable parameters, and to inputs that nothing feeds."""
 
     parameters: tuple[tuple[PortName, Value], ...]
-    inputs: tuple[tuple[PortName, float], ...]
+    inputs: tuple[tuple[PortName, Value], ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
         """Do it."""

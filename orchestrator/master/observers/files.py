@@ -129,14 +129,14 @@ class CsvFile:
     def begin(self, header: Header) -> None:
         """Write the names of the columns."""
         self._lines = CsvLines(self._path, ("time", *header.columns))
-        self._strings = header.text_places()
+        self._standing = header.places()
 
     def take(self, rows: np.ndarray) -> None:
         """Write some rows."""
         lines = rows.tolist()
-        for place, strings in self._strings:
+        for place, standing in self._standing:
             for line in lines:
-                line[place] = strings.text(line[place])
+                line[place] = standing.value(line[place])
         self._lines.write(lines)
 
     def end(self, ending: Ending) -> None:
@@ -145,7 +145,7 @@ class CsvFile:
 
 
 class ParquetFile:
-    """An observer that writes Apache Parquet, all columns as doubles except columns of texts.
+    """An observer that writes Apache Parquet: doubles, texts, and integers of 64 bits.
 
     Without what is written last, nothing of such a file can be read: there is always room for that,
     and for the rows that wait.
@@ -164,10 +164,14 @@ class ParquetFile:
     def begin(self, header: Header) -> None:
         """Make the file and its schema."""
         self._arrow: Any = import_module("pyarrow")
-        self._strings = header.text_places()
+        self._standing = header.places()
         kinds = [self._arrow.float64()] * (1 + len(header.columns))
-        for place, _ in self._strings:
-            kinds[place] = self._arrow.string()
+        for place, standing in self._standing:
+            kinds[place] = (
+                self._arrow.string()
+                if standing.c_type is None
+                else self._arrow.from_numpy_dtype(np.dtype(standing.c_type))
+            )
         self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
         self._output = _Output(self._path)
         self._file = BufferedWriter(self._output)
@@ -196,8 +200,9 @@ class ParquetFile:
 
     def _write(self, rows: np.ndarray) -> None:
         columns = [self._arrow.array(column) for column in rows.T]
-        for place, strings in self._strings:
-            columns[place] = self._arrow.array([strings.text(number) for number in rows[:, place]])
+        for place, standing in self._standing:
+            values = [standing.value(number) for number in rows[:, place]]
+            columns[place] = self._arrow.array(values, self._schema.types[place])
         self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
         self._n += 1
 

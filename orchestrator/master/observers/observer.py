@@ -20,7 +20,7 @@ from tqdm import tqdm
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
 from orchestrator.master.experiment import ROUNDING, Experiment
 from orchestrator.system.names import PortName
-from orchestrator.system.values import StringTable
+from orchestrator.system.values import Standing
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2
@@ -38,7 +38,7 @@ class Header:
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
         loop: which one makes the steps, `python` or `compiled`: the rows are the same.
-        strings: texts for which numbers stand in the rows, by the columns that have them.
+        standing: what numbers in the rows stand for, by the columns that have them.
         units: of the columns that have one, as the FMUs write them.
 
     """
@@ -47,13 +47,13 @@ class Header:
     experiment: Experiment
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     loop: str = field(default="python", compare=False)
-    strings: Mapping[str, StringTable] = field(default_factory=dict, compare=False)
+    standing: Mapping[str, Standing] = field(default_factory=dict, compare=False)
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
 
-    def text_places(self) -> list[tuple[int, StringTable]]:
-        """Where numbers of texts stand in a row, time first, and whose they are."""
+    def places(self) -> list[tuple[int, Standing]]:
+        """Where these are in a row, time first, and what their numbers stand for."""
         names = enumerate(self.columns, start=1)
-        return [(i, self.strings[name]) for i, name in names if name in self.strings]
+        return [(i, self.standing[name]) for i, name in names if name in self.standing]
 
 
 class Occurrence(NamedTuple):

@@ -83,7 +83,7 @@ class Table:
         return column == "time" or column in self._index
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """The values of one column; a String has texts.
+        """The values of one column: texts of a String, integers of 64 bits, else doubles.
 
         Raises:
             KeyError: there is no such column; the text has a suggestion.
@@ -94,9 +94,10 @@ class Table:
         if column not in self._index:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
         values = self.rows[:, self._index[column]]
-        if column not in self.header.strings:
+        standing = self.header.standing.get(column)
+        if standing is None:
             return values
-        return np.array([self.header.strings[column].text(number) for number in values])
+        return np.array([standing.value(number) for number in values], dtype=standing.c_type)
 
     @property
     def rows(self) -> np.ndarray:

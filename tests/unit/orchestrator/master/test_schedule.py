@@ -40,7 +40,7 @@ def test_a_status_worse_than_a_warning_ends_the_step(where):
     status[where] = fmi2Error
     failed = SimpleNamespace(failed=ValueError)
     member = Member([lambda: status[0]], lambda *_: status[1], [lambda: status[2]], failed)
-    with pytest.raises(ValueError, match=("inputs", "DoStep", "outputs")[where]) as error:
+    with pytest.raises(ValueError, match=("inputs", "doStep", "outputs")[where]) as error:
         step_members([member], 0.0, 1.0)
     assert error.value.args[0] == fmi2Error
     step_members([Member([], lambda *_: fmi2Warning, [], failed)], 0.0, 1.0)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from fmus.compilers import FLAGS
 from orchestrator.machine import children
 from orchestrator.machine.cache import write_cached
 from orchestrator.machine.errors import InputError
@@ -109,7 +110,7 @@ def test_a_library_without_the_function_is_no_library(cache, tmp_path):
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
     subprocess.run(["cc", "-shared", "-o", other, source], check=True)
-    write_cached("loop", stepper._key(), {"stepper.so": other.read_bytes()})
+    write_cached("loop", stepper.key_of(), {"stepper.so": other.read_bytes()})
     assert stepper.load_stepper() is None
     assert stepper.compile_stepper().advance
 
@@ -158,7 +159,7 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
 def test_compilers_have_nothing_to_say(tmp_path, command):
     if shutil.which(command) is None:
         pytest.skip(f"{command} is not installed")
-    arguments = [*stepper._FLAGS, *STRICT, stepper._SOURCE, "-o", tmp_path / "library"]
+    arguments = [*FLAGS, *STRICT, stepper.SOURCE, "-o", tmp_path / "library"]
     subprocess.run([command, *arguments], check=True)
 
 

@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.machine import cache
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import build_bundle, current_fmus, settings_of
+from orchestrator.runs.bundle import CATEGORY, build_bundle, current_fmus, key_of, settings_of
 
 
 @pytest.fixture
@@ -68,7 +69,65 @@ def test_a_build_that_fails_leaves_what_was_there(folder: Path, monkeypatch: pyt
 
 
 def test_runs_share_the_fmus_of_a_kind():
-    assert current_fmus() == current_fmus("python", "2")
+    assert current_fmus("native") == current_fmus("native", "2")
     assert {path.suffix for path in current_fmus().iterdir()} == {".fmu", ".json"}
     with pytest.raises(InputError, match="'c'"):
         current_fmus("c")
+
+
+@pytest.fixture
+def builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The kinds that are built; there is a compiler, and nothing is kept."""
+    built = []
+
+    def run_fmus(module: str, folder: Path, *options: str) -> None:
+        built.append(options[1])
+        (folder / "build.json").write_text(json.dumps({"settings": {"kind": options[1]}}))
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(bundle, "current_fmus", current_fmus.__wrapped__)
+    monkeypatch.setattr(bundle, "run_fmus", run_fmus)
+    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: lambda *_: None)
+    return built
+
+
+def auto() -> str:
+    return settings_of(bundle.current_fmus())["kind"]
+
+
+def test_auto_builds_native_with_a_compiler_and_takes_it_afterwards_without(builds, monkeypatch):
+    assert (auto(), builds) == ("native", ["native"])
+    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: None)
+    assert (auto(), builds) == ("native", ["native"])
+
+
+def test_auto_is_python_without_a_compiler(builds, monkeypatch):
+    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: None)
+    assert (auto(), builds) == ("python", ["python"])
+
+
+def test_auto_is_python_with_a_compiler_that_fails_and_says_so(builds, monkeypatch):
+    build = bundle.run_fmus
+
+    def fails(module: str, folder: Path, *options: str) -> None:
+        if "native" in options:
+            raise InputError("cc makes no AuvPlant")
+        build(module, folder, *options)
+
+    monkeypatch.setattr(bundle, "run_fmus", fails)
+    with pytest.warns(UserWarning, match="Python kind .* because cc makes no AuvPlant") as said:
+        assert auto() == "python"
+    assert len(said) == 1
+
+
+def test_fmus_that_came_with_the_installation_are_taken_if_they_fit_it(
+    builds, tmp_path, monkeypatch
+):
+    monkeypatch.setattr(cache, "_READY", tmp_path / "ready")
+    folder = tmp_path / "ready" / CATEGORY / key_of("native", "2")
+    folder.mkdir(parents=True)
+    (folder / "build.json").write_text('{"settings": {"kind": "native"}}')
+    assert (bundle.current_fmus(), builds) == (folder, [])
+    folder.rename(folder.with_name("0"))
+    assert bundle.current_fmus() != folder
+    assert builds == ["native"]

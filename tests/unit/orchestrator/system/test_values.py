@@ -6,6 +6,7 @@ import struct
 from math import nextafter
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,8 +14,8 @@ from hypothesis import strategies as st
 from orchestrator.machine.errors import InputError
 from orchestrator.system.values import (
     StringTable,
+    are_of,
     is_finite,
-    is_integer,
     is_of,
     literal,
     same,
@@ -75,9 +76,17 @@ def test_an_item_of_an_enumeration_may_be_named():
         (variable("Real", "0", "2.5"), -5e-324, "0"),
         (variable("Integer"), "1.0", "1.0"),
         (variable("Integer"), 2**31, "2147483647"),
-        (variable("Integer", "-9999999999", None), -(2**31) - 1, "-2.14748e+09"),
+        (variable("Integer", "-9999999999", None), -(2**31) - 1, "-2147483648"),
         pytest.param(variable("Integer"), 10**5000, "x", id="more digits than Python writes"),
         (variable("Integer"), True, "True"),
+        (variable("Int8"), 128, "127"),
+        (variable("UInt8"), -1, "0"),
+        (variable("UInt16"), 2**16, "65535"),
+        (variable("UInt32", "2", "9"), 10, "9"),
+        (variable("Int64"), 2**63, "9223372036854775807"),
+        (variable("Int64", "9007199254740993"), 2**53, "9007199254740993"),
+        (variable("UInt64"), 2**64, "18446744073709551615"),
+        (variable("Float32"), 3.5e38, "3.402823466385289e+38"),
         (variable("Boolean"), "yes", "yes"),
         (variable("Boolean"), 2, "2"),
         (variable("String"), "a\0b", "x"),
@@ -105,7 +114,8 @@ def test_a_value_of_another_type_is_none_of_the_variable():
     assert not is_of(variable("String"), "\udc80")
     assert not is_of(variable("Integer"), 2**31)
     ends = (-(2.0**31), 2.0**31 - 1)
-    assert [n for n in (ends[0] - 1, *ends, ends[1] + 1, 0.5) if is_integer(n)] == list(ends)
+    tried = np.array([ends[0] - 1, *ends, ends[1] + 1, 0.5])
+    assert tried[are_of("Integer", tried)].tolist() == list(ends)
     numbers = [1, 1.5, -(10**308), True, "1", None, float("nan"), float("inf"), 10**309]
     assert [is_finite(number) for number in numbers] == [True] * 3 + [False] * 6
 
@@ -116,6 +126,25 @@ def test_an_fmu_may_round_a_value_by_a_billionth(value, share):
     if is_finite(other) and abs(value) > 1e-300 and abs(abs(share) - 1e-9) > 1e-13:
         assert same(value, other) == (abs(share) < 1e-9)
     assert not same("1", 1) and not same(1, 2) and same(1, 1.0)
+
+
+@given(st.lists(st.integers(-(2**63), 2**64 - 1)))
+def test_an_integer_comes_back_from_the_row_whatever_its_size(values):
+    values += [2**53, 2**53 + 1, -(2**53) - 1, 2**63 - 1, -(2**63), 2**64 - 1]
+    table = StringTable()
+    numbers = [table.stand_in(value) for value in values]
+    assert [table.integer(number) for number in numbers] == values
+    for number, value in zip(numbers, values, strict=True):
+        assert number == value if abs(value) <= 2**53 else (number > 0) == (value > 0)
+    for number in (2.0**65 + 2.0**13 * (len(table) + 1), 2.0**65):
+        with pytest.raises(ValueError, match=r"number|invalid"):
+            table.integer(number)
+
+
+def test_a_float32_is_what_the_fmu_will_hold():
+    # 0.1 rounded to 24 bits: IEEE 754.
+    assert typed("x", variable("Float32", "0", "0.1"), "0.1") == 13421773 / 2**27
+    assert typed("x", variable("Float32"), "1e-50") == 0.0
 
 
 @given(st.lists(TEXTS), st.lists(TEXTS))

@@ -22,6 +22,7 @@ from support.archives import (
     connector,
     described,
     fmu,
+    fmu3,
     mapping,
     parameter_set,
     system,
@@ -59,16 +60,18 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             variable("y", "output", unit=unit),
             variable("k", "parameter", unit=unit),
         )
-    return found
+    return {**found, "3.fmu": fmu3(folder / "3.fmu")}
 
 
 @pytest.fixture
 def read(files: dict[str, Path], tmp_path: Path) -> Read:
     """Reads a description with the FMUs and some more files beside it."""
 
-    def reader(text: str, findings: Findings | None = None, /, **more: str) -> System:
+    def reader(
+        text: str, findings: Findings | None = None, /, version: str = "1.0", **more: str
+    ) -> System:
         named = {name.replace("__", "."): content for name, content in more.items()}
-        path = archive(tmp_path / "test.ssp", described(text), {**files, **named})
+        path = archive(tmp_path / "test.ssp", described(text, version), {**files, **named})
         return read_ssp(path, None, findings)
 
     return reader
@@ -403,7 +406,7 @@ def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
          "a.y b.u m K"),
         (system(component("a", "m.fmu", binding({"k": 'Real value="1" unit="K"'}))),
          "a.k K m"),
-        (system(component("a"), connection("a.y", "a.u", startIndices="1")), "arrays"),
+        (system(component("a"), connection("a.y", "a.u", startIndices="1")), "a y[1]"),
         *(
             (system(component("a"), connection(
                 f"a.{kind}.out", f"a.{kind}.in",
@@ -512,3 +515,95 @@ def test_nothing_is_said_of_what_is_right(read: Read):
     top = system(component("a", bindings=binding({"k": 'Real value="1"'})) + component("b"),
                  connection("a.y", "b.u"))  # fmt: skip
     assert notes(read, top) == []
+
+
+def _array(name: str, kind: str, *sizes: int) -> str:
+    """A connector of SSP 2.0 for an array."""
+    lengths = "".join(f'<ssc:Dimension size="{size}"/>' for size in sizes)
+    stated = connector(name, kind, of="Float64")
+    return stated.replace("</ssd:Connector>", f"{lengths}</ssd:Connector>")
+
+
+def test_arrays_are_connected_element_by_element_through_systems(read: Read):
+    inner = system(
+        component("c", "3.fmu"), connection("in", "c.u") + connection("c.y", "out"),
+        _array("in", "input", 3) + _array("out", "output", 3), name="inner",
+    )  # fmt: skip
+    text = system(
+        component("a", "3.fmu") + inner + component("b", "3.fmu") + component("d"),
+        connection("a.y", "inner.in") + connection("inner.out", "b.u")
+        + connection("inner.out", "b.x", startIndices="2")
+        + connection("a.z", "a.u", endIndices="3") + connection("a.z", "d.u")
+        + connection("d.y", "a.x"),
+    )  # fmt: skip
+    findings = Findings()
+    found = read(text, findings, version="2.0")
+    assert routes(found) == {
+        **{f"inner.c.u[{n}]": f"a.y[{n}]" for n in (1, 2, 3)},
+        **{f"b.u[{n}]": f"inner.c.y[{n}]" for n in (1, 2, 3)},
+        "b.x": "inner.c.y[2]", "a.u[3]": "a.z", "d.u": "a.z", "a.x": "d.y",
+    }  # fmt: skip
+    assert findings.notes == []
+
+
+def test_values_of_arrays_and_of_the_types_of_fmi_3(read: Read):
+    values = {
+        "B": 'Float64 value="1 2\n3 4"/><ssc:Dimension size="2"/><ssc:Dimension size="2"',
+        "c.s": 'String><ssv:Value value="x y"/><ssv:Value value=""/></ssv:String>'
+        '<ssc:Dimension size="2"',
+        "c.u": 'Float64 value="0.5 1.5 2.5"/><ssc:Dimension size="3"',
+        "c.i": 'Int64 value="9007199254740993"',
+        "c.n": 'UInt64 value="3"',
+        "c.k": 'Int32 value="-5"',
+    }
+    renamed = mapping(
+        'source="B" target="c.A"|<ssc:LinearTransformation factor="2"/>',
+        *(f'source="{name}" target="{name}"' for name in values if name != "B"),
+    )
+    bindings = binding(source="s.ssv", mapped=renamed)
+    findings = Findings()
+    text = system(component("c", "3.fmu"), bindings=bindings)
+    found = read(text, findings, version="2.0", s__ssv=parameter_set(values, "2.0"))
+    assert parameters(found) == {
+        "c.A[1,1]": 2.0, "c.A[1,2]": 4.0, "c.A[2,1]": 6.0, "c.A[2,2]": 8.0,
+        "c.s[1]": "x y", "c.s[2]": "", "c.u[1]": 0.5, "c.u[2]": 1.5, "c.u[3]": 2.5,
+        "c.i": 9007199254740993, "c.k": -5,
+    }  # fmt: skip
+    assert findings.notes == []
+
+
+_TWO = '/><ssc:Dimension size="2"'
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (system(component("a", "3.fmu"), connection("a.c", "a.b")), "a c Binary"),
+        (system(component("a", "3.fmu"), connection("a.z", "a.t")), "a t Clock"),
+        (system(component("a", "3.fmu"), connection("a.z", "a.u")), "a.z a.u dimensions"),
+        (system(component("a", "3.fmu"), connection("a.z", "a.v")), "Float64 Float32"),
+        (system(component("a", "3.fmu"), connection("a.y", "a.x", startIndices="4")), "y[4]"),
+        (system(component("a", "3.fmu"), connection("a.y", "s"), _array("s", "output", 2)),
+         "a.y s dimensions"),
+        (system(component("a", "3.fmu"), connectors=_array("s", "input", 0)), "top.s array"),
+        (system(component("a", "3.fmu"), connectors=_array("s", "input", 10**9, 10**9)), "top.s"),
+        (system(component("a", "3.fmu"), connectors=_array("s", "input", 3).replace(
+            'size="3"', 'sizeConnector="n"')), "top.s size stated"),
+        *(
+            (system(component("a", "3.fmu", binding({name: value}))), why)
+            for name, value, why in (
+                ("u", 'Float64 value="1"', "a.u 1 values 3"),
+                ("u", f'Float64 value="1 2"{_TWO}', "a.u 2 values 3"),
+                ("A", f'Float64 value="1 2"{_TWO}', "a.A 2 values 4"),
+                ("x", f'Float64 value="1 2"{_TWO}', "a.x 2 values 1"),
+                ("u", f'Float64 value="1 2 3"{_TWO}', "a u 3 values 2"),
+                ("u", 'Float64 value="1"/><ssc:Dimension', "u size"),
+                ("n", 'UInt64 value="4"', "a.n 4 sizes"),
+                ("b", 'Binary value="00"', "a.b Binary"),
+                ("k", 'Int64 value="2147483648"', "a.k 2147483647"),
+            )
+        ),
+    ],
+)  # fmt: skip
+def test_what_of_ssp_2_cannot_be_run_is_said_by_name(read: Read, text: str, why: str):
+    assert mentions(problem(read, text, version="2.0"), why)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
+from lxml import etree
 
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp import OMS
@@ -26,6 +28,7 @@ from support.archives import (
     connector,
     described,
     fmu,
+    fmu3,
     system,
     variable,
 )
@@ -177,3 +180,55 @@ def test_plain_names_are_distinct_and_kept_where_they_can_be():
     assert plain_file_names(["2_M.fmu", "M.fmu", "M.fmu", "ä b", "x"], "X") == [
         "2_M.fmu", "M.fmu", "3_M.fmu", "__b", "4_x",
     ]  # fmt: skip
+
+
+@pytest.fixture
+def mixed(tmp_path: Path) -> System:
+    """A system of FMI 2.0 and 3.0, with arrays connected as wholes and in parts."""
+    files = {
+        "3.fmu": fmu3(tmp_path / "3.fmu"),
+        "2.fmu": fmu(tmp_path / "2.fmu", variable("u", "input"), variable("y", "output")),
+    }
+    values = binding({
+        "A": 'Float64 value="1 2 3 4.5"/><ssc:Dimension size="2"/><ssc:Dimension size="2"',
+        "s": 'String><ssv:Value value="x  y"/><ssv:Value value=""/></ssv:String>'
+        '<ssc:Dimension size="2"',
+        "i": 'Int64 value="9007199254740993"',
+        "v": 'Float32 value="0.1"',
+    })  # fmt: skip
+    text = system(
+        component("a", "3.fmu", values) + component("b", "3.fmu") + component("c", "2.fmu"),
+        connection("a.y", "b.u") + connection("b.y", "a.u", startIndices="1", endIndices="3")
+        + connection("c.y", "a.u", endIndices="1") + connection("b.y", "c.u", startIndices="2"),
+    )  # fmt: skip
+    return read_ssp(archive(tmp_path / "mixed.ssp", described(text, "2.0"), files))
+
+
+def test_ssp_2_that_is_written_and_read_is_the_same(mixed: System, tmp_path: Path):
+    (tmp_path / "out").mkdir()
+    [path] = write_ssp(mixed, tmp_path / "out")
+    again = read_ssp(path, findings=Findings(strict=True))
+    assert set(again.connections) == set(mixed.connections)
+    assert again.parameters == mixed.parameters and len(again.parameters) == 8
+    with ZipFile(path) as content:
+        written = ElementTree.fromstring(content.read("SystemStructure.ssd"))
+    ends = [dict(element.attrib) for element in written.iterfind(".//{*}Connection")]
+    assert len(ends) == 4
+    whole = {"startElement": "a", "startConnector": "y", "endElement": "b", "endConnector": "u"}
+    assert ends[0] == whole
+
+
+@pytest.mark.skipif(find_spec("pyssp_standard") is None, reason="pyssp_standard is not installed")
+def test_ssp_2_that_is_written_is_valid(mixed: System, tmp_path: Path):
+    """Held against the schemas of SSP 2.0, which that package has."""
+    found = find_spec("pyssp_standard")
+    assert found is not None and found.origin is not None
+    schemas = Path(found.origin).with_name("resources") / "ssp2"
+    (tmp_path / "out").mkdir()
+    [path] = write_ssp(replace(mixed, step=0.1), tmp_path / "out")
+    with ZipFile(path) as content:
+        for name in content.namelist():
+            if name.endswith((".ssd", ".ssv")):
+                what = "Description" if name.endswith(".ssd") else "ParameterValues"
+                schema = etree.parse(schemas / f"SystemStructure{what}.xsd")
+                etree.XMLSchema(schema).assertValid(etree.fromstring(content.read(name)))

@@ -1,0 +1,333 @@
+"""What an FMU carries to be verified with: experiments and their results, in the draft FMI-LS-REF.
+
+A manifest names the files. Experiments are in the draft MA-HS-Experiments. Where the drafts leave
+something open, it is decided here: how close results must come, and what an input does between two
+rows.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import unquote, urlsplit
+from xml.etree.ElementTree import Element
+
+import numpy as np
+from fmpy.model_description import ModelVariable
+
+from fmus.discovery import RELATED, RELATED_MANIFEST
+from orchestrator.exchange.series import Series, comparison, read_series
+from orchestrator.exchange.verify import TOLERANCE, check_tolerance
+from orchestrator.formats.ssp.archive import read_document
+from orchestrator.formats.ssp.reader import bind_parameter_set
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.user_files import explain_errors
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.hooks.hook import Hook
+from orchestrator.master.hooks.timing import Playback
+from orchestrator.master.observers.table import Table
+from orchestrator.master.plan import make_plan
+from orchestrator.master.simulation import simulate_to_end
+from orchestrator.runs.loading import first_given, read_fmu
+from orchestrator.runs.scenario import with_input_table
+from orchestrator.system.names import PortName, listed
+from orchestrator.system.structure import System
+from orchestrator.system.values import finite
+
+#: The name of the standard, in a manifest.
+_STANDARD = "org.fmi-standard.fmi-ls-ref"
+
+#: The attributes with the times of an experiment.
+_TIMES = ("startTime", "stopTime", "stepSize")
+
+#: The only kind of experiment that is made.
+_TRANSIENT = "TransientSimulation"
+
+#: What an experiment consists of besides its kind.
+_PARTS = ("Parameters", "Stimuli", "References", "Annotations")
+
+#: The types of files that are read, by the elements that name them.
+_TYPES = {
+    "Parameters": "application/x-ssp-parameter-set",
+    "Stimuli": "text/csv",
+    "References": "text/csv",
+}
+
+
+class Verdict(NamedTuple):
+    """What came of an experiment.
+
+    Attributes:
+        name: of the experiment.
+        text: what was compared, or why not.
+        agrees: whether the results are those that the FMU carries; None: it carries none.
+        notes: what is not as it should be, and changes nothing.
+
+    """
+
+    name: str
+    text: str
+    agrees: bool | None
+    notes: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class _Trial:
+    """An experiment that an FMU carries, as its file has it.
+
+    Attributes:
+        name: of it.
+        element: its element.
+        folders: to which addresses in it may be relative.
+
+    """
+
+    name: str
+    element: Element
+    folders: Sequence[Path]
+
+
+class Carried:
+    """The experiments that an FMU carries."""
+
+    def __init__(self, fmu: Path) -> None:
+        """Read the manifest.
+
+        Raises:
+            InputError: there is no FMU, or nothing in it that it could be verified with.
+
+        """
+        self._fmu = fmu
+        self._findings = Findings()
+        system = read_fmu(fmu, self._findings)
+        [self._component] = system.components.values()
+        self._folder = self._component.folder
+        self._place = self._folder / RELATED
+        manifest = self._place / RELATED_MANIFEST
+        if not manifest.is_file():
+            raise InputError(
+                f"{fmu}: carries nothing to verify it with: it holds no {RELATED}/{manifest.name}"
+            )
+        self._manifest = self._read(manifest, "fmiReferences")
+        if (name := self._manifest.get("fmi-ls-name")) != _STANDARD:
+            self._findings.note(f"{manifest.name} is for {name!r}, not {_STANDARD!r}")
+
+    @property
+    def version(self) -> str:
+        """Of the standard, as the manifest says."""
+        return self._manifest.get("fmi-ls-version", "of no version")
+
+    @property
+    def notes(self) -> Sequence[str]:
+        """What is not as it should be, and changes nothing."""
+        return self._findings.notes
+
+    def _read(self, path: Path, root: str) -> Element:
+        """The root element of a file of the FMU.
+
+        Raises:
+            InputError: it is another one, or there is none.
+
+        """
+        name = path.relative_to(self._folder)
+        with explain_errors(self._fmu, f"{name} is not readable"):
+            element = read_document(path.read_bytes(), lambda _: None)
+            if element.tag != root:
+                raise ValueError(f"its root element is <{element.tag}>, not <{root}>")
+            return element
+
+    def verdicts(self, tolerance: float | None = None) -> Iterator[Verdict]:
+        """Make the experiments one by one, and compare their results.
+
+        Args:
+            tolerance: how far values may differ; None: what the experiment says, else
+                :data:`.verify.TOLERANCE`.
+
+        """
+        if tolerance is not None:
+            check_tolerance(tolerance)
+        results = []
+        found = False
+        for related in self._manifest.iter("Related"):
+            role, source = related.get("role", ""), related.get("source", "")
+            if role == "result":
+                results.append(source)
+            if role.partition("/")[0] != "experiment":
+                continue
+            found = True
+            try:
+                path = self._file(source, [self._place])
+                experiments = self._read(path, "Experiments").findall("Experiment")
+                if not experiments:
+                    raise InputError("holds no experiment")
+            except InputError as error:
+                yield Verdict(source, self._said(error), False)
+                continue
+            for number, element in enumerate(experiments, start=1):
+                name = element.get("name") or f"{source}, experiment {number}"
+                # Drafts differ in what addresses are relative to.
+                yield self._verdict(_Trial(name, element, (path.parent, self._place)), tolerance)
+        if found:
+            return
+        for source in results:
+            # Then the only experiment that there is is the one in the FMU's description.
+            element = Element("Experiment")
+            element.append(Element("References", source=source))
+            yield self._verdict(_Trial(source, element, [self._place]), tolerance)
+
+    def _verdict(self, trial: _Trial, tolerance: float | None) -> Verdict:
+        """Make an experiment, if there are results to compare with."""
+        if trial.element.find("References") is None:
+            return Verdict(trial.name, "not made: it names no results to compare with", None)
+        findings = Findings()
+        try:
+            text = self._compared(trial, tolerance, findings)
+            agrees = True
+        except InputError as error:
+            text, agrees = self._said(error), False
+        return Verdict(trial.name, text, agrees, findings.notes)
+
+    def _said(self, error: InputError) -> str:
+        """A message without the folders in which the FMU is for now."""
+        text = str(error)
+        for known in (f"{self._place}{os.sep}", f"{self._place}: ", f"{self._folder}{os.sep}"):
+            text = text.replace(known, "")
+        return text.removeprefix(f"{self._fmu}: ")
+
+    def _compared(self, trial: _Trial, tolerance: float | None, findings: Findings) -> str:
+        """Make an experiment, and say how its results agree.
+
+        Raises:
+            InputError: it cannot be made, or they do not.
+
+        """
+        settings = self._settings(trial.element)
+        whose = "--tolerance"
+        if tolerance is None:
+            stated = _number(trial.element, "tolerance")
+            whose = "our default" if stated is None else "the experiment's"
+            tolerance = TOLERANCE if stated is None else stated
+            check_tolerance(tolerance)
+        expected = self._series(trial, "References")
+        if expected is None or not len(expected.times):
+            raise InputError("its results have no rows")
+        system = self._system(trial, findings)
+        start, stop, step = (_number(settings, name) for name in _TIMES)
+        start = first_given(start, system.start_time) or 0.0
+        stop = first_given(stop, system.stop_time) or float(expected.times[-1])
+        step = first_given(step, system.step) or _interval(expected.times)
+        hooks: list[Hook] = []
+        if (stimuli := self._series(trial, "Stimuli")) is not None:
+            names = [PortName(self._component.name, name) for name in stimuli.columns]
+            rows = np.column_stack((stimuli.times, *stimuli.columns.values()))
+            system, input_table = with_input_table(system, names, rows)
+            hooks.append(Playback(input_table))
+            _note_unknown(stimuli, "the table of inputs", findings)
+        table = Table()
+        plan = make_plan(system, Experiment(stop, step, start_time=start))
+        simulate_to_end(plan, [table], hooks=hooks)
+        _note_unknown(expected, "the table of results", findings)
+        return f"{comparison(table, self._component, expected, tolerance)} ({whose})"
+
+    @staticmethod
+    def _settings(element: Element) -> Element:
+        """The element that has the times of an experiment: itself, or the kind that it is of.
+
+        Raises:
+            InputError: it is of another kind than a simulation over time.
+
+        """
+        for child in element:
+            if child.tag == _TRANSIENT:
+                return child
+            if child.tag not in _PARTS:
+                raise InputError(f"asks for {child.tag}; only simulations over time are made")
+        return element
+
+    def _system(self, trial: _Trial, findings: Findings) -> System:
+        """The FMU with the parameters of an experiment."""
+        system = read_fmu(self._fmu)
+        path = self._named(trial, "Parameters")
+        if path is None:
+            return system
+        bound = bind_parameter_set(self._fmu, self._component.name, path, findings)
+        return system.with_parameters(bound.parameters)
+
+    def _series(self, trial: _Trial, part: str) -> Series | None:
+        """A table that an experiment names; None: it names none."""
+        path = self._named(trial, part)
+        return None if path is None else read_series(path, self._variables)
+
+    @cached_property
+    def _variables(self) -> Mapping[str, ModelVariable]:
+        return {
+            variable.name: variable
+            for causality in ("input", "output")
+            for variable in self._component.having(causality)
+        }
+
+    def _named(self, trial: _Trial, part: str) -> Path | None:
+        """A file that an experiment names; None: it names none.
+
+        Raises:
+            InputError: the FMU does not hold it, or it is of a type that is not read.
+
+        """
+        element = trial.element.find(part)
+        if element is None:
+            return None
+        if (stated := element.get("type", _TYPES[part])) != _TYPES[part]:
+            raise InputError(f"{part} of type {stated!r}; only {_TYPES[part]} is read")
+        return self._file(element.get("source", ""), trial.folders)
+
+    def _file(self, source: str, folders: Sequence[Path]) -> Path:
+        """A file of the FMU, by its address.
+
+        Args:
+            source: a relative URI.
+            folders: that it may be relative to.
+
+        Raises:
+            InputError: there is none.
+
+        """
+        try:
+            parts = urlsplit(source)
+        except ValueError:
+            raise InputError(f"{source!r} is not a URI") from None
+        if parts.scheme or parts.netloc:
+            raise InputError(f"{source!r} is elsewhere; only files in the FMU are read")
+        for folder in folders:
+            path = Path(os.path.normpath(folder / unquote(parts.path)))
+            if path.is_relative_to(self._folder) and path.is_file():
+                return path
+        raise InputError(f"the FMU holds no {source!r}")
+
+
+def _number(element: Element, name: str) -> float | None:
+    """An attribute that is a number; None: it is not stated."""
+    text = element.get(name)
+    try:
+        return None if text is None else finite(text, name)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+def _interval(times: np.ndarray) -> float:
+    """The shortest interval between two rows, for an FMU that names no step [s]."""
+    intervals = np.diff(times)
+    intervals = intervals[intervals > 0.0]
+    if not len(intervals):
+        raise InputError("neither the experiment nor the FMU names a step")
+    return float(intervals.min())
+
+
+def _note_unknown(series: Series, what: str, findings: Findings) -> None:
+    if series.others:
+        findings.note(
+            f"{what} has columns of other names, which are left out: {listed(series.others)}"
+        )

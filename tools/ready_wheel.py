@@ -1,0 +1,82 @@
+"""Make the wheel that carries the FMUs in C, and the compiled loop, for all platforms.
+
+`python tools/ready_wheel.py [--out DIR]` needs `pip install -e '.[native,test]'`. Where this wheel
+is installed, runs need no compiler and build nothing. `pip install .` makes a wheel without them.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from fmus.compilers import compiler_for, library
+from fmus.kinds import FMI_VERSIONS, NATIVE, platforms
+from orchestrator.machine.errors import InputError
+from orchestrator.master import stepper
+from orchestrator.runs import bundle
+
+ROOT = Path(__file__).parents[1]
+
+
+def write_ready(folder: Path) -> None:
+    """Make what is ready for use, for all platforms, as `orchestrator.machine.cache` finds it.
+
+    Raises:
+        OSError: there is no compiler, or it fails.
+        InputError: the FMUs cannot be built.
+
+    """
+    for fmi in FMI_VERSIONS:
+        place = folder / bundle.CATEGORY / bundle.key_of(NATIVE, fmi)
+        bundle.run_fmus("build", place, "--kind", NATIVE, "--fmi", fmi, "--platforms", "all")
+    machines = platforms(FMI_VERSIONS[-1], "all")
+    compiler = compiler_for(machines)
+    source = stepper.SOURCE
+    for machine in machines:
+        content = library(
+            compiler, machine, source.stem, {source.name: source.read_bytes()}, source.name
+        )
+        place = folder / stepper.CATEGORY / stepper.key_of(machine.name)
+        place.mkdir(parents=True)
+        (place / f"{source.stem}{machine.ending}").write_bytes(content)
+
+
+def write_wheel(folder: Path) -> Path:
+    """Make the wheel.
+
+    Raises:
+        OSError, InputError: it cannot be made; the text says why.
+
+    """
+    with TemporaryDirectory() as temporary:
+        ready, wheels = Path(temporary, "ready"), Path(temporary, "wheels")
+        write_ready(ready)
+        command = [
+            sys.executable, "-m", "pip", "--quiet", "wheel", "--no-deps", "--no-build-isolation",
+            "--wheel-dir", str(wheels), str(ROOT),
+        ]  # fmt: skip
+        subprocess.run(command, check=True, env={**os.environ, "AUV_FMU_READY": str(ready)})
+        [wheel] = wheels.iterdir()
+        folder.mkdir(parents=True, exist_ok=True)
+        return Path(wheel.replace(folder / wheel.name))
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Make the wheel, and say where it is."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR")
+    try:
+        print(write_wheel(parser.parse_args(arguments).out))
+    except (OSError, InputError) as error:
+        print(f"no wheel: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
