@@ -21,6 +21,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
+from orchestrator.exchange.hosts.here import fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
@@ -28,7 +29,7 @@ from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import INITIAL, ORDERS, read_order
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.loading import left_behind, load, load_scenario
+from orchestrator.runs.loading import brings_its_own, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.system.structure import System
@@ -174,29 +175,27 @@ def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
+    system = load(options.scenario, options.kind, fmi=options.fmi)
     hosts = options.host or [
         name
         for name, host in HOSTS.items()
-        if options.fmi in host.fmi and (options.all or not host.pins)
+        if fmi_of(system) in host.fmi and (options.all or not host.pins)
     ]
-    reference = load(options.scenario, options.kind)
-    _, system = load_scenario(options.scenario, options.kind, options.fmi)
-    step = reference.step or DEFAULT_STEP
-    system = replace(system, name=reference.name, stop_time=reference.stop_time, step=step)
-    verdicts = compare(system, hosts, options.steps, step, reference=reference, told=say)
-    show(f"{'host':15} {'version':32} {'order':42} {'deviation':>9} {'us/step':>8}  worst port")
+    verdicts = compare(system, hosts, options.steps, system.step or DEFAULT_STEP, say)
+    version = f"FMI {fmi_of(system)}"
+    kind = version if brings_its_own(options.scenario) else f"{options.kind}, {version}"
+    columns = f"{'kind':15} {'order':42} {'deviation':>9} {'us/step':>8}  worst port"
+    show(f"{'host':14} {'version':28} {columns}")
     agree = True
     for verdict in verdicts:
         host = HOSTS[verdict.host]
-        order = f"{host.initial}: {host.order}"
-        if verdict.failure is not None:
-            show(f"{verdict.host:15} {verdict.package:32} {verdict.failure}")
-        else:
+        said = verdict.failure
+        if said is None:
+            order = f"{host.initial}: {host.order}"
+            microseconds = 1e6 / verdict.steps_per_second
             note = "" if verdict.agrees else f", above {BOUND:g}"
-            show(
-                f"{verdict.host:15} {verdict.package:32} {order:42} {verdict.deviation:9.1e} "
-                f"{1e6 / verdict.steps_per_second:8.1f}  {verdict.port}{note}"
-            )
+            said = f"{order:42} {verdict.deviation:9.1e} {microseconds:8.1f}  {verdict.port}{note}"
+        show(f"{verdict.host:14} {verdict.package:28} {kind:15} {said}")
         agree &= verdict.agrees
     return OK if agree else FAILED
 

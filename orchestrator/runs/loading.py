@@ -30,7 +30,12 @@ T = TypeVar("T")
 
 
 def load(
-    name: str | Path, kind: str = AUTO, *, variant: str | None = None, strict: bool = False
+    name: str | Path,
+    kind: str = AUTO,
+    *,
+    fmi: str = FMI_VERSIONS[0],
+    variant: str | None = None,
+    strict: bool = False,
 ) -> System:
     """The system of a scenario, or of a file of others, with its experiment.
 
@@ -40,6 +45,7 @@ def load(
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
             OspSystemStructure.xml; an SSP and the latter may also be a folder.
         kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where it is to be had.
+        fmi: their version of FMI, `2` or `3`.
         variant: which of the descriptions in an SSP; None: the default.
         strict: refuse what otherwise is a warning.
 
@@ -48,7 +54,7 @@ def load(
 
     """
     with notes_as_warnings(strict) as findings:
-        scenario, system = load_scenario(str(name), kind, variant=variant, findings=findings)
+        scenario, system = load_scenario(str(name), kind, fmi, variant, findings)
         left = left_behind(scenario)
         for note in [left] if left else doubts_of(system):
             findings.note(note)
@@ -147,6 +153,11 @@ def _reader(path: Path) -> Callable[..., System] | None:
         return _READERS.get(path.suffix)
     is_osp = (path / OSP_STRUCTURE).is_file() and not (path / STRUCTURE).is_file()
     return read_osp if is_osp else read_ssp
+
+
+def brings_its_own(name: str) -> bool:
+    """Whether a system comes with its FMUs, so that there is no choice of kind."""
+    return _reader(Path(name)) is not None
 
 
 def left_behind(scenario: Scenario) -> str | None:

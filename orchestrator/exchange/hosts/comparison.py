@@ -36,8 +36,8 @@ BOUND = 1e-9
 #: How long a host may take for a run before it is given up [s].
 _TIMEOUT = 600
 
-#: The first digits of the versions of FMI that hosts run.
-_FMI_2, _BOTH = ("2",), ("2", "3")
+#: The versions of FMI that hosts run.
+_FMI_2, _BOTH = ("2.0",), ("2.0", "3.0")
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Host:
     Attributes:
         package: that it comes from.
         run: the function that runs it, of :mod:`.here` or of :mod:`.drivers`.
-        fmi: first digits of the versions of FMI that it runs.
+        fmi: versions of FMI that it runs.
         order: in which it steps the components, as `auv-fmu verify` has it.
         initial: what it exchanges before the first step.
         pins: what is installed into an environment of its own, as pip has it; none: it is used as
@@ -73,7 +73,7 @@ class Host:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class HostVerdict:
     """What came of a host.
 
     Attributes:
@@ -145,10 +145,8 @@ def compare(
     hosts: Sequence[str],
     steps: int,
     step: float,
-    *,
-    reference: System | None = None,
     told: Callable[[str], None] = lambda text: None,
-) -> Iterator[Verdict]:
+) -> Iterator[HostVerdict]:
     """Run a system in other hosts, and in our own master in the order of each.
 
     Args:
@@ -156,38 +154,37 @@ def compare(
         hosts: keys of :data:`HOSTS`.
         steps: how many.
         step: communication step [s].
-        reference: the same system as our master can run it; None: as it is.
         told: hears what takes its time before a run.
 
     Raises:
         InputError: there are no such steps.
 
     """
-    ours, start = reference or system, system.start_time or 0.0
+    start = system.start_time or 0.0
     asked = Experiment(start + steps * step, step, JACOBI, start)
     names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
 
     @cache
     def expected(order: str, initial: str) -> tuple[Experiment, np.ndarray]:
-        way, table = next(ways(ours, read_order(order), initial)), Table()
+        way, table = next(ways(system, read_order(order), initial)), Table()
         experiment = replace(asked, order=way.order, coupling=way.coupling)
-        simulate_to_end(make_plan(ours, experiment), [table], way.exchange)
+        simulate_to_end(make_plan(system, experiment), [table], way.exchange)
         return experiment, table.group(*names)[1:]
 
-    def verdict(name: str) -> Verdict:
+    def verdict(name: str) -> HostVerdict:
         host = HOSTS[name]
         label = host.label()
         if label is None:
             failure = "not installed: pip install 'auv-fmu[hosts]'"
-            return Verdict(name, host.package, failure=failure)
+            return HostVerdict(name, host.package, failure=failure)
         try:
             experiment, table = expected(host.order, host.initial)
             rows, seconds, reading = _ran(host, label, system, experiment, told)
         except InputError as error:
-            return Verdict(name, label, failure=str(error))
+            return HostVerdict(name, label, failure=str(error))
         deviations = np.abs(rows - table).max(axis=0)
         worst = int(deviations.argmax())
-        return Verdict(
+        return HostVerdict(
             name,
             label,
             float(deviations[worst]),
@@ -209,7 +206,7 @@ def _ran(
 
     """
     fmi = here.fmi_of(system)
-    if fmi[0] not in host.fmi:
+    if fmi not in host.fmi:
         raise InputError(f"does not run FMI {fmi}")
     python = Path(sys.executable)
     if host.pins:
