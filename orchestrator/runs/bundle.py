@@ -32,7 +32,6 @@ from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import WRITABLE
 
 #: Where `auv-fmu build` writes each kind unless another folder is named.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
@@ -97,7 +96,7 @@ def build_bundle(
         options += ["--platforms", platforms] if platforms is not None else []
         run_fmus("build", unfinished, *options, hear=hear)
         archive = unfinished / ARCHIVE
-        archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
+        archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
         write_papers(unfinished, files, settings_of(unfinished))
         for path in unfinished.iterdir():

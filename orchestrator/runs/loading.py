@@ -21,7 +21,7 @@ from orchestrator.master.experiment import step_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import RUNNABLE, WRITABLE, read_component
+from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System, unfed_inputs
 from orchestrator.vehicle.cautions import differing_vehicle
@@ -110,8 +110,7 @@ def load_scenario(
         return Scenario(named.stem, title=path.name or named.name), system
     scenario = read_scenario(name)
     check_figure(scenario.figure)
-    versions = RUNNABLE if fmi == FMI_VERSIONS[0] else WRITABLE
-    return scenario, closed_loop(current_fmus(kind, fmi), scenario, versions)
+    return scenario, closed_loop(current_fmus(kind, fmi), scenario)
 
 
 def read_fmu(path: Path, findings: Findings | None = None) -> System:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.component import RUNNABLE, Component, read_component
+from orchestrator.system.component import Component, read_component
 from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.variables import BUS, COMPLETE, Terminal
@@ -23,15 +23,12 @@ def read_wiring() -> dict[str, Any]:
     return tomllib.loads(_WIRING.read_text(encoding="utf-8"))
 
 
-def closed_loop(
-    folder: Path, scenario: Scenario | None = None, versions: Sequence[str] = RUNNABLE
-) -> System:
+def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
     """The wiring of the closed loop over the FMUs in a folder.
 
     Args:
         folder: with the built FMUs.
         scenario: whose components, wires and parameters change it; None: the closed loop as is.
-        versions: of FMI that its FMUs may have.
 
     Raises:
         Refused: a component or group of ports that the scenario names does not exist.
@@ -44,7 +41,7 @@ def closed_loop(
     for name, fmu in chosen.items():
         with findings.collecting():
             path = Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu"
-            components[name] = read_component(name, path, versions)
+            components[name] = read_component(name, path)
     findings.refuse()
     connections: list[Connection] = []
     for target, source in wires.items():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -43,8 +43,8 @@ _LISTS = {"dependencies", "clocks"}
 #: Elements in which the same words may stand for something else.
 _OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 
-#: The versions of FMI that a system can be written with, and those that the master can step.
-WRITABLE = RUNNABLE = ("2.0", "3.0")
+#: The versions of FMI that FMUs may have.
+_VERSIONS = ("2.0", "3.0")
 
 
 class Described(NamedTuple):
@@ -83,13 +83,12 @@ def read_description(folder: Path) -> Described:
 
 
 @lru_cache(maxsize=256)
-def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
+def described(fmu: Path, folder: Path) -> Described:
     """The description of an FMU for co-simulation, read once.
 
     Args:
         fmu: the file.
         folder: into which it is unpacked.
-        versions: of FMI that it may have.
 
     Raises:
         InputError: it is not such an FMU.
@@ -103,8 +102,8 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         # The version comes first: all else differs between them.
         _, root = next(ElementTree.iterparse(file, ["start"]))
         version = root.get("fmiVersion")
-        if version not in versions:
-            wanted = " or ".join(versions)
+        if version not in _VERSIONS:
+            wanted = " or ".join(_VERSIONS)
             raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
         found = read_description(folder)
     except InputError:
@@ -345,7 +344,6 @@ class Component:
 def read_component(
     name: str,
     fmu: Path,
-    versions: Sequence[str] = RUNNABLE,
     findings: Findings | None = None,
 ) -> Component:
     """An FMU as a component.
@@ -353,7 +351,6 @@ def read_component(
     Args:
         name: of the instance.
         fmu: the file.
-        versions: of FMI that it may have.
         findings: take notes of harmless flaws in its description.
 
     Raises:
@@ -361,7 +358,7 @@ def read_component(
 
     """
     folder, digest = unpack(fmu)
-    found = described(fmu, folder, tuple(versions))
+    found = described(fmu, folder)
     if findings is not None and (remark := found.remark()):
         findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")
     return Component(name, fmu, found.description, digest)
