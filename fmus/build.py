@@ -24,11 +24,8 @@ from fmus.python.packaging import LOADERS, PythonKind, best_loader
 MANIFEST = "build.json"
 
 
-def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
+def build(destination: Path, kind: PythonKind | NativeKind) -> None:
     """Bring a folder of FMUs up to date.
-
-    Returns:
-        The files that had to be written.
 
     Raises:
         OSError: the folder cannot be written, or the FMUs cannot be built.
@@ -52,7 +49,6 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> list[Path]:
         digests |= {path.name: _digest(path) for path in stale}
         text = json.dumps({**made_from, "sha256": digests})
         manifest.write_text(text + "\n", encoding="utf-8")
-    return list(stale)
 
 
 def built_before(manifest: Path) -> dict[str, Any]:
@@ -64,6 +60,11 @@ def built_before(manifest: Path) -> dict[str, Any]:
     parts = ("settings", "sha256")
     ours = isinstance(content, dict) and all(isinstance(content.get(p), dict) for p in parts)
     return content if ours else {}
+
+
+def _tell(line: str) -> None:
+    """Say at once what was made, in one piece: others are made at the same time."""
+    print(f"{line}\n", end="", flush=True)
 
 
 def _digest(path: Path) -> str:
@@ -88,8 +89,7 @@ def main() -> int:
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
     options = parser.parse_args()
     try:
-        for path in build(options.out, _kind(options)):
-            print(path)
+        build(options.out, _kind(options))
     except (OSError, ValueError) as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)
         return 2
@@ -111,7 +111,7 @@ def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
     if options.loader is not None:
         raise ValueError("--loader is for --kind python: the other kind loads no Python")
     wanted = platforms(options.fmi, options.platforms)
-    return NativeKind(options.fmi, wanted, compiler_for(wanted))
+    return NativeKind(options.fmi, wanted, compiler_for(wanted), _tell)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from platformdirs import user_cache_path
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from orchestrator.commands.main import main
+from orchestrator.exchange.release import write_release
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
 
@@ -40,7 +41,8 @@ settings.register_profile("attack", settings.get_profile("search"), max_examples
 # Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
 # does all that they start.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-signal.signal(signal.SIGHUP, signal.SIG_DFL)
+if os.name == "posix":
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 #: What a reason says beside the name of what is missing.
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
@@ -97,7 +99,7 @@ def _own_cache(shared: Path) -> None:
     os.environ["XDG_CACHE_HOME"] = os.environ.get("TESTS_CACHE") or str(shared / "cache")
 
 
-def _copy(fmus: Path, module: str, folder: Path, *options: str) -> None:
+def _copy(fmus: Path, module: str, folder: Path, *options: str, **_: object) -> None:
     """Take the place of what would build them once more."""
     shutil.copytree(fmus, folder, dirs_exist_ok=True)
 
@@ -129,6 +131,18 @@ def native(shared: Path) -> Path:
 def dist3(shared: Path) -> Path:
     """A folder with the FMUs in C of FMI 3.0, to be read only."""
     return _built(shared, NATIVE, "3")
+
+
+@pytest.fixture(scope="session")
+def release(shared: Path) -> dict[str, Path]:
+    """What the archives of a release unpack to, by versions of FMI; to be read only."""
+    folder = shared / "release"
+    folder.mkdir(exist_ok=True)
+    with hold_lock(folder, wait=True):
+        if not any(folder.iterdir()):
+            for archive in write_release(folder / "archives", print):
+                shutil.unpack_archive(archive, folder)
+    return {fmi: next(folder.glob(f"auv-fmu-*-fmi{fmi}")) for fmi in FMI_VERSIONS}
 
 
 @pytest.fixture

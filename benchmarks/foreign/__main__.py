@@ -39,7 +39,11 @@ def main() -> None:
     found |= compared(chosen, options.folder, options.workers)
     kept.write_text(json.dumps(found, indent=1), encoding="utf-8")
     host = Path(__file__).with_name("host.py").read_text(encoding="utf-8")
-    known = [found[item.name] for item in items if item.name in found]
+    known = [
+        {**found[item.name], "fmi": item.fmi(options.folder)}
+        for item in items
+        if item.name in found
+    ]
     PAGE.write_text(page(known, len(host.splitlines())), encoding="utf-8")
 
 

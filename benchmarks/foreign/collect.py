@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 import subprocess
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from io import BytesIO
 from pathlib import Path, PurePosixPath
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 
 #: Where others publish FMUs and archives, by repositories of GitHub, and the commits that are
 #: looked at.
@@ -76,6 +77,21 @@ class Item:
     def is_fmu(self) -> bool:
         """Whether it is an FMU, not an archive."""
         return self.path.endswith(_FMU)
+
+    def fmi(self, folder: Path) -> str:
+        """The version of FMI that it states; empty: it states none, or is no FMU that can be read.
+
+        Args:
+            folder: into which it was collected.
+
+        """
+        try:
+            with ZipFile(folder / self.file) as archive:
+                text = archive.read("modelDescription.xml").decode(errors="replace")
+        except (OSError, KeyError, BadZipFile):
+            return ""
+        found = re.search(r"fmiVersion\s*=\s*[\"']([^\"']*)", text)
+        return found[1] if found else ""
 
 
 def collect(folder: Path) -> list[Item]:

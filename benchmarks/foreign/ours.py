@@ -21,7 +21,7 @@ from orchestrator.master.experiment import DELAY, JACOBI
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value
+from orchestrator.system.values import Value, type_of
 
 #: Name of the component that an FMU is alone.
 ALONE = "fmu"
@@ -49,7 +49,7 @@ def changed(component: Component) -> dict[str, float]:
     values = {
         variable.name: _other(variable, component.start(variable.name))
         for variable in component.having("parameter")
-        if variable.type == "Real"
+        if type_of(variable) == "Real"
     }
     return {name: value for name, value in values.items() if value is not None}
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
         (name, variable.name, variable.valueReference)
         for name, component in system.components.items()
         for variable in component.having("output")
-        if variable.type == "Real"
+        if type_of(variable) == "Real"
     ]
     _keep(result, [f"{name}.{port}" for name, port, _ in outputs], options.out)
     return {

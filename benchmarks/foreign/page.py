@@ -32,6 +32,7 @@ _REASONS = {
     "without a file that it names": r"holds no '",
     "without any FMU": r"holds no component",
     "with a library that does not load or instantiate here": r"cannot be (loaded|instantiated)",
+    "with sources that do not compile here": r"cannot be compiled|holds no sources",
     "not valid": "",
 }
 
@@ -49,8 +50,8 @@ _HEAD = """\
 and every SSP archive in them, runs each in a process of its own, and writes this page. Archives are
 run unchanged, in the default order, for {steps} steps or to the end that they name, whichever comes
 first; a folder with a `SystemStructure.ssd` is zipped as it is, and each further `.ssd` in it is an
-archive of its own. FMUs are run alone, for {steps} steps of the size that they name, else of 20 ms,
-with all inputs at their start values. What holds the same bytes is counted once.
+archive of its own. FMUs are run one by one, for {steps} steps of the size that they name, else of
+20 ms, with all inputs at their start values. What holds the same bytes is counted once.
 
 Systems that libcosim or ecos can run as well are held against them in Jacobi order, with rings
 delayed and the same steps: as they are, and in libcosim also as `auv-fmu export --format osp`
@@ -132,7 +133,7 @@ def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     there = [one for one in fmus if one["outcome"] != "absent"]
     running = [one for one in there if one["outcome"] == "runs"]
     numbers = [one["deviation"] for one in running if isinstance(one["deviation"], float)]
-    yield f"\n## FMUs alone\n\n{len(running)} of {len(there)} run.\n"
+    yield f"\n## FMUs one by one\n\n{len(running)} of {len(there)} run{_versions(there)}.\n"
     yield (
         f"{len(numbers)} have Real outputs that the plain host reads as well: {_equal(numbers)} "
         f"agree bit for bit, {_within(numbers)} to {FMU_BOUND:g}.\n"
@@ -141,6 +142,14 @@ def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         if isinstance(one["deviation"], float) and not one["deviation"] <= FMU_BOUND:
             yield f"- {_name(one)} deviates by {one['deviation']:.1e}: {_explained(one, _HOST)}.\n"
     yield from _not_running("FMU", there)
+
+
+def _versions(fmus: Sequence[Mapping[str, Any]]) -> str:
+    """How many run of each version of FMI of which any does."""
+    counts = Counter(one["fmi"] for one in fmus)
+    running = Counter(one["fmi"] for one in fmus if one["outcome"] == "runs")
+    said = (f"{running[fmi]} of {counts[fmi]} of FMI {fmi}" for fmi in sorted(running))
+    return ": " + ", ".join(said)
 
 
 def _equal(numbers: Iterable[float]) -> int:

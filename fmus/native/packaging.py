@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -74,7 +74,12 @@ def sources(package: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
 
 
 def fmu_entries(
-    component: str, package: str, fmi: str, platforms: Sequence[Platform], compiler: Compiler
+    component: str,
+    package: str,
+    fmi: str,
+    platforms: Sequence[Platform],
+    compiler: Compiler,
+    tell: Callable[[str], None],
 ) -> dict[str, bytes]:
     """The contents of an FMU.
 
@@ -86,6 +91,7 @@ def fmu_entries(
         fmi: version.
         platforms: that it has libraries for.
         compiler: that makes them.
+        tell: called with a line when a library is made.
 
     Raises:
         OSError: the compiler fails.
@@ -99,28 +105,29 @@ def fmu_entries(
 
     guid = guid_of(digest_of({**written, "modelDescription.xml": described("")}))
     written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
+    libraries = {}
+    for platform in platforms:
+        path = f"binaries/{platform.name}/{component}{platform.ending}"
+        libraries[path] = library(compiler, platform, component, written, MAIN[fmi])
+        tell(f"{component} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": described(guid),
         **_pictures(component, declared.PORTS, fmi),
         **documentation.fmu_documents(component, NATIVE, fmi),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
-        **{
-            f"binaries/{platform.name}/{component}{platform.ending}": library(
-                compiler, platform, component, written, MAIN[fmi]
-            )
-            for platform in platforms
-        },
+        **libraries,
     }
 
 
 @dataclass(frozen=True)
 class NativeKind:
-    """The native kind, for some platforms."""
+    """The native kind, for some platforms; a line tells of each library that is made."""
 
     fmi: str
     platforms: Sequence[Platform]
     compiler: Compiler
+    tell: Callable[[str], None]
     name = NATIVE
     #: How many are written at the same time: compilers are processes of their own.
     side_by_side = os.cpu_count()
@@ -142,5 +149,7 @@ class NativeKind:
             OSError: the compiler fails, or the file cannot be written.
 
         """
-        entries = fmu_entries(component, package, self.fmi, self.platforms, self.compiler)
+        entries = fmu_entries(
+            component, package, self.fmi, self.platforms, self.compiler, self.tell
+        )
         write_archive(path, entries)

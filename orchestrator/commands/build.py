@@ -16,7 +16,7 @@ from orchestrator.commands.options import (
     add_set,
     assignments,
 )
-from orchestrator.commands.streams import OK, show
+from orchestrator.commands.streams import OK, say, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
@@ -98,6 +98,7 @@ def _build(options: argparse.Namespace) -> int:
         fmi=options.fmi,
         platforms=options.platforms,
         force=options.force,
+        hear=say,
     )
     for path in written:
         show(path)

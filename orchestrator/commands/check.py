@@ -148,10 +148,15 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
     if component.left_alone:
-        yield f"a run {component.remainder}"
+        yield component.remainder
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text
+    try:
+        if terminals := component.terminals:
+            yield f"has the terminals {', '.join(terminals)}, which wires may connect"
+    except InputError as error:
+        yield str(error).removeprefix(f"{component.name}: ")
     if component.having("input") and all(
         unknown.dependencies is None for unknown in component.description.outputs
     ):

@@ -1,4 +1,4 @@
-"""`auv-fmu export`, `hosts` and `verify`: exchange systems and results with other tools."""
+"""`auv-fmu export`, `release`, `hosts` and `verify`: exchange systems and results with tools."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ from orchestrator.commands.streams import FAILED, OK, say, show
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
+from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
@@ -61,6 +62,13 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_out(parser, "exports/SCENARIO/")
     add_options(parser, Files, "force")
     parser.set_defaults(action=_export)
+
+
+def add_release(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu release`."""
+    add_out(parser, Path("release"))
+    add_options(parser, Files, "force")
+    parser.set_defaults(action=_release)
 
 
 def add_hosts(parser: argparse.ArgumentParser) -> None:
@@ -158,6 +166,11 @@ def _export(options: argparse.Namespace) -> int:
     return OK
 
 
+def _release(options: argparse.Namespace) -> int:
+    show(*write_release(options.out, say, force=options.force))
+    return OK
+
+
 def _hosts(options: argparse.Namespace) -> int:
     unknown = set(options.host) - HOSTS.keys()
     if unknown:
@@ -213,11 +226,11 @@ def _verify_carried(options: argparse.Namespace) -> int:
     for note in carried.notes:
         say(f"warning: {note}")
     judged = []
-    for verdict in carried.verdicts(options.tolerance):
-        show(f"{verdict.name}: {verdict.text}")
-        for note in verdict.notes:
-            say(f"warning: {verdict.name}: {note}")
-        judged += [] if verdict.agrees is None else [verdict.agrees]
+    for judgement in carried.judgements(options.tolerance):
+        show(f"{judgement.name}: {judgement.text}")
+        for note in judgement.notes:
+            say(f"warning: {judgement.name}: {note}")
+        judged += [] if judgement.agrees is None else [judgement.agrees]
     if not judged:
         raise InputError(f"{options.table}: carries no results to verify it with")
     counted = f"{sum(judged)} of {len(judged)} experiments with results agree"

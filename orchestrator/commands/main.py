@@ -38,6 +38,7 @@ COMMANDS = {
         "many_runs", "compare the printed table of section 4.2 with every reading of the paper"
     ),
     "export": ("exchange", "write a scenario for other tools"),
+    "release": ("exchange", "write the archives of a release: every FMU, for all platforms"),
     "hosts": ("exchange", "run a scenario in other co-simulation tools"),
     "verify": ("exchange", "compare a table from another tool with ours"),
 }  # fmt: skip

@@ -8,16 +8,13 @@ rows.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import unquote, urlsplit
 from xml.etree.ElementTree import Element
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from fmus.discovery import RELATED, RELATED_MANIFEST
 from orchestrator.exchange.series import Series, comparison, read_series
@@ -47,18 +44,19 @@ _TIMES = ("startTime", "stopTime", "stepSize")
 #: The only kind of experiment that is made.
 _TRANSIENT = "TransientSimulation"
 
-#: What an experiment consists of besides its kind.
-_PARTS = ("Parameters", "Stimuli", "References", "Annotations")
-
-#: The types of files that are read, by the elements that name them.
+#: The elements of an experiment that name files, and the types of files that are read.
+_PARAMETERS, _STIMULI, _REFERENCES = "Parameters", "Stimuli", "References"
 _TYPES = {
-    "Parameters": "application/x-ssp-parameter-set",
-    "Stimuli": "text/csv",
-    "References": "text/csv",
+    _PARAMETERS: "application/x-ssp-parameter-set",
+    _STIMULI: "text/csv",
+    _REFERENCES: "text/csv",
 }
 
+#: What else it may hold besides its kind.
+_ANNOTATIONS = "Annotations"
 
-class Verdict(NamedTuple):
+
+class Judgement(NamedTuple):
     """What came of an experiment.
 
     Attributes:
@@ -75,8 +73,7 @@ class Verdict(NamedTuple):
     notes: Sequence[str] = ()
 
 
-@dataclass(frozen=True)
-class _Trial:
+class _Trial(NamedTuple):
     """An experiment that an FMU carries, as its file has it.
 
     Attributes:
@@ -103,8 +100,8 @@ class Carried:
         """
         self._fmu = fmu
         self._findings = Findings()
-        system = read_fmu(fmu, self._findings)
-        [self._component] = system.components.values()
+        self._system = read_fmu(fmu, self._findings)
+        [self._component] = self._system.components.values()
         self._folder = self._component.folder
         self._place = self._folder / RELATED
         manifest = self._place / RELATED_MANIFEST
@@ -140,7 +137,7 @@ class Carried:
                 raise ValueError(f"its root element is <{element.tag}>, not <{root}>")
             return element
 
-    def verdicts(self, tolerance: float | None = None) -> Iterator[Verdict]:
+    def judgements(self, tolerance: float | None = None) -> Iterator[Judgement]:
         """Make the experiments one by one, and compare their results.
 
         Args:
@@ -165,35 +162,34 @@ class Carried:
                 if not experiments:
                     raise InputError("holds no experiment")
             except InputError as error:
-                yield Verdict(source, self._said(error), False)
+                yield Judgement(source, self._said(str(error)), False)
                 continue
             for number, element in enumerate(experiments, start=1):
                 name = element.get("name") or f"{source}, experiment {number}"
                 # Drafts differ in what addresses are relative to.
-                yield self._verdict(_Trial(name, element, (path.parent, self._place)), tolerance)
+                yield self._judged(_Trial(name, element, (path.parent, self._place)), tolerance)
         if found:
             return
         for source in results:
             # Then the only experiment that there is is the one in the FMU's description.
             element = Element("Experiment")
-            element.append(Element("References", source=source))
-            yield self._verdict(_Trial(source, element, [self._place]), tolerance)
+            element.append(Element(_REFERENCES, source=source))
+            yield self._judged(_Trial(source, element, [self._place]), tolerance)
 
-    def _verdict(self, trial: _Trial, tolerance: float | None) -> Verdict:
+    def _judged(self, trial: _Trial, tolerance: float | None) -> Judgement:
         """Make an experiment, if there are results to compare with."""
-        if trial.element.find("References") is None:
-            return Verdict(trial.name, "not made: it names no results to compare with", None)
+        if trial.element.find(_REFERENCES) is None:
+            return Judgement(trial.name, "not made: it names no results to compare with", None)
         findings = Findings()
         try:
             text = self._compared(trial, tolerance, findings)
             agrees = True
         except InputError as error:
-            text, agrees = self._said(error), False
-        return Verdict(trial.name, text, agrees, findings.notes)
+            text, agrees = self._said(str(error)), False
+        return Judgement(trial.name, text, agrees, [*map(self._said, findings.notes)])
 
-    def _said(self, error: InputError) -> str:
+    def _said(self, text: str) -> str:
         """A message without the folders in which the FMU is for now."""
-        text = str(error)
         for known in (f"{self._place}{os.sep}", f"{self._place}: ", f"{self._folder}{os.sep}"):
             text = text.replace(known, "")
         return text.removeprefix(f"{self._fmu}: ")
@@ -212,16 +208,19 @@ class Carried:
             whose = "our default" if stated is None else "the experiment's"
             tolerance = TOLERANCE if stated is None else stated
             check_tolerance(tolerance)
-        expected = self._series(trial, "References")
+        expected = self._series(trial, _REFERENCES)
         if expected is None or not len(expected.times):
             raise InputError("its results have no rows")
-        system = self._system(trial, findings)
+        system = self._parametrised(trial, findings)
         start, stop, step = (_number(settings, name) for name in _TIMES)
         start = first_given(start, system.start_time) or 0.0
         stop = first_given(stop, system.stop_time) or float(expected.times[-1])
         step = first_given(step, system.step) or _interval(expected.times)
         hooks: list[Hook] = []
-        if (stimuli := self._series(trial, "Stimuli")) is not None:
+        if (stimuli := self._series(trial, _STIMULI)) is not None:
+            for name, column in stimuli.columns.items():
+                if column.dtype.kind == "U":
+                    raise InputError(f"{name} is a String: a table of inputs holds only numbers")
             names = [PortName(self._component.name, name) for name in stimuli.columns]
             rows = np.column_stack((stimuli.times, *stimuli.columns.values()))
             system, input_table = with_input_table(system, names, rows)
@@ -244,31 +243,25 @@ class Carried:
         for child in element:
             if child.tag == _TRANSIENT:
                 return child
-            if child.tag not in _PARTS:
+            if child.tag not in (*_TYPES, _ANNOTATIONS):
                 raise InputError(f"asks for {child.tag}; only simulations over time are made")
         return element
 
-    def _system(self, trial: _Trial, findings: Findings) -> System:
+    def _parametrised(self, trial: _Trial, findings: Findings) -> System:
         """The FMU with the parameters of an experiment."""
-        system = read_fmu(self._fmu)
-        path = self._named(trial, "Parameters")
+        path = self._named(trial, _PARAMETERS)
         if path is None:
-            return system
+            return self._system
         bound = bind_parameter_set(self._fmu, self._component.name, path, findings)
-        return system.with_parameters(bound.parameters)
+        return self._system.with_parameters(bound.parameters)
 
     def _series(self, trial: _Trial, part: str) -> Series | None:
         """A table that an experiment names; None: it names none."""
         path = self._named(trial, part)
-        return None if path is None else read_series(path, self._variables)
-
-    @cached_property
-    def _variables(self) -> Mapping[str, ModelVariable]:
-        return {
-            variable.name: variable
-            for causality in ("input", "output")
-            for variable in self._component.having(causality)
-        }
+        if path is None:
+            return None
+        variables = self._component.having("input" if part == _STIMULI else "output")
+        return read_series(path, variables)
 
     def _named(self, trial: _Trial, part: str) -> Path | None:
         """A file that an experiment names; None: it names none.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,7 +16,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.master.observers.table import Table
 from orchestrator.system.component import Component
-from orchestrator.system.values import BOOLEANS, finite, items_of, type_of
+from orchestrator.system.values import BOOLEANS, finite, integer, items_of, type_of
+from orchestrator.system.variables import array_of
 
 
 class Series(NamedTuple):
@@ -33,34 +35,47 @@ class Series(NamedTuple):
     others: Sequence[str]
 
 
-def read_series(path: Path, variables: Mapping[str, ModelVariable]) -> Series:
-    """Read a table of variables over time.
+def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
+    """Read a table of variables over time; a column of an array holds all of it in each row.
 
     Raises:
         InputError: it has a mistake.
 
     """
+    known: dict[str, list[ModelVariable]] = {}
+    for variable in variables:
+        known.setdefault(variable.name, []).append(variable)
+        if variable.shape and type_of(variable) != "String":
+            known.setdefault(array_of(variable), []).append(variable)
     with records(path, "not a table of values over time", places_of_time) as (names, rows):
         clocks = places_of_time(names)
         if len(clocks) != 1:
             raise ValueError(f"{len(clocks) or 'no'} columns of its first line are named time")
-        longest = max(map(len, variables), default=0)
+        longest = max(map(len, known), default=0)
         ports = {
-            place: name
+            place: known[name]
             for place, text in enumerate(names)
-            if place not in clocks and (name := port_of(text, variables, longest)) is not None
+            if place not in clocks and (name := port_of(text, known, longest)) is not None
         }
-        if len({*ports.values()}) < len(ports):
+        found = [variable.name for group in ports.values() for variable in group]
+        if len({*found}) < len(found):
             raise ValueError("two columns are of one variable")
         times: list[float] = []
-        columns: dict[str, list[float | str]] = {name: [] for name in ports.values()}
+        columns: dict[str, list[float | str]] = {name: [] for name in found}
         for line, row in rows:
             times.append(finite(row[clocks[0]], f"line {line}, time:"))
             if len(times) > 1 and times[-1] < times[-2]:
                 raise ValueError(f"line {line}: times must not decrease")
-            for place, name in ports.items():
-                where = f"line {line}, {name}:"
-                columns[name].append(_value(row[place], variables[name], where))
+            for place, group in ports.items():
+                cells = [row[place]] if len(group) == 1 else row[place].split()
+                if len(cells) != len(group):
+                    raise ValueError(
+                        f"line {line}, {names[place]}: {len(cells)} values of an array of "
+                        f"{len(group)}"
+                    )
+                for variable, cell in zip(group, cells, strict=True):
+                    where = f"line {line}, {variable.name}:"
+                    columns[variable.name].append(_value(cell, variable, where))
     others = [text for place, text in enumerate(names) if place not in (*clocks, *ports)]
     arrays = {name: np.array(values) for name, values in columns.items()}
     return Series(np.array(times), arrays, others)
@@ -72,7 +87,12 @@ def _value(text: str, variable: ModelVariable, where: str) -> float | str:
         return text
     if fmi_type == "Boolean" and word in BOOLEANS:
         return float(BOOLEANS[word])
-    return finite(str(items_of(variable).get(text, text)), where)
+    number = str(items_of(variable).get(text, text))
+    if fmi_type != "Real":
+        # Of 64 bits, some are no doubles.
+        with suppress(ValueError):
+            return integer(number)
+    return finite(number, where)
 
 
 def comparison(table: Table, component: Component, expected: Series, tolerance: float) -> str:
@@ -86,8 +106,7 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
         InputError: they do not agree, or there is nothing to compare.
 
     """
-    outputs = [v.name for v in component.having("output") if v.name in expected.columns]
-    if not outputs:
+    if not expected.columns:
         raise InputError("none of the columns of its results is an output")
     times, ours = expected.times, table.time
     slack = ROUNDING * max(1.0, float(np.abs(ours).max()))
@@ -102,8 +121,8 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
     # Apart from rounding, most times are a row's.
     exact = np.where(np.abs(ours[rows] - times) <= slack, ours[rows], times)
     worst, first = 0.0, None
-    for name in outputs:
-        wanted, found = expected.columns[name][chosen], table[f"{component.name}.{name}"]
+    for name, column in expected.columns.items():
+        wanted, found = column[chosen], table[f"{component.name}.{name}"]
         if type_of(component.variables[name]) == "Real":
             found = np.interp(exact, ours, found)
             deviations = np.abs(found - wanted) / max(1.0, float(np.abs(wanted).max()))
@@ -120,10 +139,11 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
             f"to {tolerance:g}"
         )
     left = int((new & ~chosen).sum())
+    outputs = f"{len(expected.columns)} of {len(component.having('output'))} outputs"
+    others = f", {left} rows are of other times" * bool(left)
     return (
-        f"{len(outputs)} outputs agree in {len(times)} rows from t = {times[0]:g} to "
-        f"{times[-1]:g} s{f', {left} rows are of other times' * bool(left)}; they differ by at "
-        f"most {worst:.2g}, with a tolerance of {tolerance:g}"
+        f"{outputs} agree in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
+        f"they differ by at most {worst:.2g}, with a tolerance of {tolerance:g}"
     )
 
 

@@ -199,11 +199,14 @@ class _Samples:
     def begin(self, header: Header) -> None:
         """Find out where the columns are."""
         self._places = [1 + header.columns.index(name) for name in self._columns]
+        self._integers = [(i, standing) for i, standing in header.places() if standing.c_type]
         self._last = np.empty((0, 1 + len(header.columns)))
 
     def take(self, rows: np.ndarray) -> None:
         """Take the samples that lie between some rows."""
         rows = np.vstack((self._last, rows))
+        for place, standing in self._integers:
+            rows[:, place] = [float(standing.value(number)) for number in rows[:, place]]
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 

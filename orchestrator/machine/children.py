@@ -11,12 +11,14 @@ import os
 import runpy
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from subprocess import CompletedProcess, run
-from tempfile import TemporaryDirectory
+from subprocess import PIPE, CompletedProcess, Popen, run
+from tempfile import TemporaryDirectory, TemporaryFile
+from typing import Any
 
 from fmus.compilers import LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.disk import process_folder
@@ -63,21 +65,52 @@ def run_module(
         OSError: no process can be started.
 
     """
+    with _tie() as tied:
+        command = _command(module, arguments)
+        return run(command, capture_output=True, check=False, cwd=folder, timeout=timeout, **tied)
+
+
+def listen_to_module(
+    hear: Callable[[str], None], module: str, *arguments: str
+) -> CompletedProcess[str]:
+    """Run a module to its end, and hear each line of its output as it comes.
+
+    Raises:
+        OSError: no process can be started.
+
+    """
+    with (
+        _tie() as tied,
+        TemporaryFile("w+", errors="replace") as complaints,
+        Popen(_command(module, arguments), stdout=PIPE, stderr=complaints, **tied) as process,
+    ):
+        try:
+            assert process.stdout is not None
+            lines = []
+            for line in process.stdout:
+                lines.append(line)
+                hear(line.rstrip("\n"))
+            status = process.wait()
+        except BaseException:
+            process.kill()
+            raise
+        complaints.seek(0)
+        return CompletedProcess(process.args, status, "".join(lines), complaints.read())
+
+
+def _command(module: str, arguments: Sequence[str]) -> list[str]:
+    return [sys.executable, "-P", "-m", __name__, module, *arguments]
+
+
+@contextmanager
+def _tie() -> Iterator[dict[str, Any]]:
+    """Tie a child to this process, and its temporary files to its end."""
     # The child reads from a pipe of which only this process has the other end.
     end_of_child, end_of_ours = os.pipe()
     try:
         with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-            return run(
-                [sys.executable, "-P", "-m", __name__, module, *arguments],
-                stdin=end_of_child,
-                capture_output=True,
-                text=True,
-                errors="replace",
-                check=False,
-                cwd=folder,
-                timeout=timeout,
-                env=os.environ | {"TMPDIR": temporary},
-            )
+            environment = os.environ | {"TMPDIR": temporary}
+            yield {"stdin": end_of_child, "text": True, "errors": "replace", "env": environment}
     finally:
         os.close(end_of_child)
         os.close(end_of_ours)

@@ -75,11 +75,11 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     if experiment.coupling == LINEAR:
         _check_linear(system)
     found = decimations(system, experiment.step)
-    remarks = [
+    remarks = tuple(
         f"{name}: {component.remainder}"
         for name, component in system.components.items()
         if component.left_alone
-    ]
+    )
     rigid = [name for name, component in system.components.items() if not component.takes_any_step]
     period = lcm(*(found[name] for name in rigid))
     whole = experiment.full_steps // period * period
@@ -91,7 +91,7 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
         raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
     end = experiment.time(whole)
     remark = f"{why} the run ends with the last whole step, at t = {end:.12g} s"
-    return Plan(system, replace(experiment, stop_time=end), found, [*remarks, remark])
+    return Plan(system, replace(experiment, stop_time=end), found, (*remarks, remark))
 
 
 def _check_linear(system: System) -> None:

@@ -31,22 +31,23 @@ enum { LANES = 4 };
 
 typedef unsigned reference;
 
-/* What moves values of one type, to an FMU or from it. */
+/* FMI's function that moves values of one type, to an FMU or from it. */
 typedef union {
     int (*fmi2)(void *component, const reference[], size_t n, void *values);
     int (*fmi3)(void *component, const reference[], size_t n, void *values, size_t n_values);
-    int (*python)(void); /* it looks at the row itself */
 } mover;
 
 /* Values of one type that are neighbours in the row. */
 typedef struct {
     mover call;
+    int (*python)(void); /* the same for values that are not numbers of the row */
     const reference *references;
     size_t n_references, n;
     double *row;  /* their place in the row */
     void *values; /* as the FMU has them: doubles are the row itself */
     enum {
-        IN_PLACE, OF_FLOAT32, OF_INT8, OF_UINT8, OF_INT16, OF_UINT16, OF_INT32, OF_UINT32, BY_PYTHON
+        IN_PLACE, OF_FLOAT32, OF_INT8, OF_UINT8, OF_INT16, OF_UINT16, OF_INT32, OF_UINT32,
+        OF_INT64, OF_UINT64, BY_PYTHON
     } kind;
     int is_counted; /* whether the function is told how many values there are, as in FMI 3.0 */
 } move;
@@ -151,30 +152,37 @@ static int call(const move *it, void *component) {
     return it->call.fmi2(component, it->references, it->n_references, it->values);
 }
 
+/* All integers below it are doubles, and numbers of the row. */
+static const double EXACT = 9007199254740992.0;
+
 /* The check of the row names values that a type cannot hold. */
-#define SET(kind, type, fits)                                                                    \
+#define SET(kind, type, fits, otherwise)                                                         \
     case kind:                                                                                   \
         for (i = 0; i < it->n; i++) {                                                            \
             const double value = it->row[i];                                                     \
-            if (!(fits)) return FMI_ERROR;                                                           \
+            if (!(fits)) return otherwise;                                                       \
             ((type *)it->values)[i] = (type)value;                                               \
         }                                                                                        \
         break;
 #define SET_INTEGERS(kind, type, least, most)                                                    \
-    SET(kind, type, value >= least && value <= most && value == (double)(type)value)
+    SET(kind, type, value >= least && value <= most && value == (double)(type)value, FMI_ERROR)
+#define SET_WIDE(kind, type, least)                                                              \
+    SET(kind, type, value >= least && value < EXACT && value == (double)(type)value, it->python())
 
-static int set(const move *it, void *component) {
+static int set_converted(const move *it, void *component) {
     size_t i;
     switch (it->kind) {
         case IN_PLACE: break;
-        case BY_PYTHON: return it->call.python();
-        SET(OF_FLOAT32, float, value >= -FLT_MAX && value <= FLT_MAX)
+        case BY_PYTHON: return it->python();
+        SET(OF_FLOAT32, float, value >= -FLT_MAX && value <= FLT_MAX, FMI_ERROR)
         SET_INTEGERS(OF_INT8, int8_t, INT8_MIN, INT8_MAX)
         SET_INTEGERS(OF_UINT8, uint8_t, 0, UINT8_MAX)
         SET_INTEGERS(OF_INT16, int16_t, INT16_MIN, INT16_MAX)
         SET_INTEGERS(OF_UINT16, uint16_t, 0, UINT16_MAX)
         SET_INTEGERS(OF_INT32, int32_t, INT32_MIN, INT32_MAX)
         SET_INTEGERS(OF_UINT32, uint32_t, 0, UINT32_MAX)
+        SET_WIDE(OF_INT64, int64_t, -EXACT)
+        SET_WIDE(OF_UINT64, uint64_t, 0)
     }
     return call(it, component);
 }
@@ -184,9 +192,18 @@ static int set(const move *it, void *component) {
         for (i = 0; i < it->n; i++) it->row[i] = ((const type *)it->values)[i];                  \
         break;
 
-static int get(const move *it, void *component) {
+#define GET_WIDE(kind, type)                                                                     \
+    case kind:                                                                                   \
+        for (i = 0; i < it->n; i++) {                                                            \
+            const double value = (double)((const type *)it->values)[i];                          \
+            if (value <= -EXACT || value >= EXACT) return it->python();                          \
+            it->row[i] = value;                                                                  \
+        }                                                                                        \
+        break;
+
+static int get_converted(const move *it, void *component) {
     size_t i;
-    const int status = it->kind == BY_PYTHON ? it->call.python() : call(it, component);
+    const int status = it->kind == BY_PYTHON ? it->python() : call(it, component);
     switch (it->kind) {
         case IN_PLACE:
         case BY_PYTHON: break;
@@ -197,8 +214,19 @@ static int get(const move *it, void *component) {
         GET(OF_UINT16, uint16_t)
         GET(OF_INT32, int32_t)
         GET(OF_UINT32, uint32_t)
+        GET_WIDE(OF_INT64, int64_t)
+        GET_WIDE(OF_UINT64, uint64_t)
     }
     return status;
+}
+
+/* What most values are costs no look at the others. */
+static int set(const move *it, void *component) {
+    return it->kind == IN_PLACE ? call(it, component) : set_converted(it, component);
+}
+
+static int get(const move *it, void *component) {
+    return it->kind == IN_PLACE ? call(it, component) : get_converted(it, component);
 }
 
 /* Whether a status is worse than a warning, or none of FMI's. */

@@ -12,7 +12,7 @@ import keyword
 import re
 import shutil
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import version
@@ -21,11 +21,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from fmus.compilers import compiler_for
 from fmus.discovery import fingerprint
-from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
+from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON, platforms
 from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
-from orchestrator.machine.children import find_fast_compiler, run_module
+from orchestrator.machine.children import listen_to_module
 from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
@@ -37,8 +38,13 @@ from orchestrator.system.component import WRITABLE
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
 #: The archive of the closed loop, and what was built beside it, from what; with their papers.
-_ARCHIVE, MANIFEST = "auv.ssp", "build.json"
+ARCHIVE, MANIFEST = "auv.ssp", "build.json"
 _CHECKSUMS, _BILL = "SHA256SUMS", "bom.cdx.json"
+
+#: What libraries for other platforms are linked with: parts of zig's C library, and for Windows of
+#: mingw-w64's.
+ZIG = "ziglang"
+_LICENCES = {ZIG: ("MIT", "ZPL-2.1")}
 
 #: What the FMUs of runs are among what is kept.
 CATEGORY = "fmus"
@@ -60,6 +66,7 @@ def build_bundle(
     fmi: str = FMI_VERSIONS[0],
     platforms: str | None = None,
     force: bool = False,
+    hear: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
     """Bring a folder with FMUs and SSP up to date.
 
@@ -71,6 +78,7 @@ def build_bundle(
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
         platforms: of the native kind, with commas between them; None: this machine.
         force: move aside files of the user's that have names of these.
+        hear: called with a line when a library is made.
 
     Returns:
         The files that had to be written.
@@ -79,7 +87,7 @@ def build_bundle(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replace_files(folder, (_ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
+    with replace_files(folder, (ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
         # What is up to date is taken along, and not written anew.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
@@ -87,21 +95,42 @@ def build_bundle(
         options = ["--kind", kind, "--fmi", fmi]
         options += ["--loader", loader] if loader is not None else []
         options += ["--platforms", platforms] if platforms is not None else []
-        run_fmus("build", unfinished, *options)
-        archive = unfinished / _ARCHIVE
+        run_fmus("build", unfinished, *options, hear=hear)
+        archive = unfinished / ARCHIVE
         archive.write_bytes(ssp_bytes(closed_loop(unfinished, versions=WRITABLE)))
         files = [*sorted(unfinished.glob("*.fmu")), archive]
-        digests = {path.name: sha256_of(path) for path in files}
-        # As `sha256sum --check` reads them.
-        lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
-        (unfinished / _CHECKSUMS).write_bytes(lines.encode())
-        (unfinished / _BILL).write_bytes(_bill(digests, CONTAINED[kind]))
+        write_papers(unfinished, files, settings_of(unfinished))
         for path in unfinished.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
                 path.unlink()
         written = sorted(path.name for path in unfinished.iterdir())
     return [folder / name for name in written]
+
+
+def write_papers(
+    folder: Path, files: Sequence[Path], settings: Mapping[str, str]
+) -> Sequence[Path]:
+    """Write checksums and a bill of materials.
+
+    Args:
+        folder: that the files are in, and the papers go into.
+        files: that the papers are about.
+        settings: how the FMUs were built.
+
+    Returns:
+        The papers.
+
+    """
+    contained = [*CONTAINED[settings["kind"]]]
+    if settings.get("compiler", "").startswith(ZIG):
+        contained.append(ZIG)
+    digests = {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
+    # As `sha256sum --check` reads them.
+    lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
+    (folder / _CHECKSUMS).write_bytes(lines.encode())
+    (folder / _BILL).write_bytes(_bill(digests, contained))
+    return folder / _CHECKSUMS, folder / _BILL
 
 
 def _bill(digests: Mapping[str, str], contained: Sequence[str]) -> bytes:
@@ -145,7 +174,7 @@ def _package(name: str) -> dict[str, Any]:
         "bom-ref": reference,
         "name": name,
         "version": version(name),
-        "licenses": [{"license": {"id": "MIT"}}],
+        "licenses": [{"license": {"id": licence}} for licence in _LICENCES.get(name, ("MIT",))],
         "purl": reference,
     }
 
@@ -156,25 +185,33 @@ def settings_of(folder: Path) -> dict[str, str]:
     return dict(content["settings"])
 
 
-def run_fmus(module: str, folder: Path, *options: str) -> list[Path]:
+def run_fmus(
+    module: str, folder: Path, *options: str, hear: Callable[[str], None] = lambda line: None
+) -> list[str]:
     """Run a module of the package fmus that writes into a folder.
 
     In a separate process: modules that PythonFMU imports to build must not stay in this one.
 
+    Args:
+        module: its name there.
+        folder: that it writes into.
+        options: of its command line.
+        hear: called with each line of its output as it comes.
+
     Returns:
-        The files written.
+        These lines.
 
     Raises:
         InputError: it failed.
 
     """
     try:
-        process = run_module(f"fmus.{module}", "--out", str(folder), *options)
+        process = listen_to_module(hear, f"fmus.{module}", "--out", str(folder), *options)
     except OSError as error:
         raise InputError(f"the FMUs cannot be built: {reason(error)}") from error
     if process.returncode != 0:
         raise InputError(last_line(process.stderr))
-    return [Path(line) for line in process.stdout.splitlines()]
+    return process.stdout.splitlines()
 
 
 @cache
@@ -182,8 +219,8 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
     """The folder with the FMUs of the installed sources, built if it is not there.
 
     Args:
-        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they are there or this machine
-            has a C compiler, else Python.
+        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they are there or can be
+            built, else Python.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
 
     Raises:
@@ -212,13 +249,16 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
 def _best_fmus(fmi: str) -> Path:
     if found := _kept(key_of(NATIVE, fmi)):
         return found
-    if find_fast_compiler():
-        try:
-            return current_fmus(NATIVE, fmi)
-        except InputError as error:
-            # The command may be there, and what it needs not.
-            warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
-    return current_fmus(PYTHON, fmi)
+    try:
+        compiler_for(platforms(fmi))
+    except (OSError, ValueError):
+        return current_fmus(PYTHON, fmi)
+    try:
+        return current_fmus(NATIVE, fmi)
+    except InputError as error:
+        # The command may be there, and what it needs not.
+        warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
+        return current_fmus(PYTHON, fmi)
 
 
 def key_of(kind: str, fmi: str) -> str:
@@ -296,7 +336,7 @@ def build_own(
         raise InputError(f"{script}: no such Python file")
     options = [str(script), *(("--loader", loader) if loader else ())]
     with TemporaryDirectory(dir=process_folder()) as temporary:
-        [built] = run_fmus("python.own", Path(temporary), *options)
+        [built] = map(Path, run_fmus("python.own", Path(temporary), *options))
         place = script.parent if folder is None else folder
         with replace_files(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)

@@ -52,7 +52,7 @@ Kind = Annotated[
     str,
     CliOption(
         "kind of the bundle's FMUs: Python source, or its translation to C, with the same numbers; "
-        f"default: {AUTO}, native where it is available or there is a C compiler",
+        f"default: {AUTO}, native where it is there or can be built",
         choices=(AUTO, *KINDS),
     ),
 ]

@@ -146,7 +146,8 @@ class ScenarioFile(TomlTable):
     wires: dict[str, Name | Literal[False]] = entry(
         'Further wires, as `"component.group" = "component.group"`: every input of the group on '
         "the left takes the output of the same name in the group on the right. If both sides "
-        'name a port, only that one is wired, as `"g.u[1]" = "t.y"`. `false` removes a wire.',
+        'name a port, only that one is wired, as `"g.u[1]" = "t.y"`. If both sides name a '
+        "terminal, their members are joined. `false` removes a wire.",
         "none",
     )
     parameters: dict[str, Any] = entry(

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import RUNNABLE, Component, read_component
-from orchestrator.system.names import PortName, port_name
+from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import Connection, System
+from orchestrator.system.variables import BUS, COMPLETE, Terminal
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")
 
@@ -113,7 +114,7 @@ def _changed(
 
 
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
-    """The connections of one wire: of two ports, or every input of a group takes its namesake."""
+    """The connections of one wire: of ports, of terminals, or inputs of a group take namesakes."""
     to, group = port_name(target).component, port_name(target).port
     start, source_group = port_name(source).component, port_name(source).port
     for name in (to, start):
@@ -126,7 +127,15 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
     outputs = components[start].variables
     if group in components[to].variables and source_group in outputs:
         return [Connection(PortName(start, source_group), PortName(to, group))]
-    members = [name for name in inputs if name.startswith(f"{group}.")]
+    members = _members(inputs, group)
+    if not (members and _members(outputs, source_group)):
+        end = components[to].terminals.get(group)
+        begin = components[start].terminals.get(source_group)
+        if end and begin:
+            try:
+                return list(_joined(components[to], end, components[start], begin))
+            except InputError as error:
+                raise InputError(f"wire {source} -> {target}: {error}") from None
     if group in inputs and not members:
         raise InputError(
             f"wire {source} -> {target}: {target} is one input, and {start} has no port "
@@ -138,7 +147,7 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
             f'{did_you_mean(group, inputs)}; a scenario removes a wire with "{target}" = false '
             "under [wires]"
         )
-    if source_group in outputs and not any(name.startswith(f"{source_group}.") for name in outputs):
+    if source_group in outputs and not _members(outputs, source_group):
         raise InputError(
             f"wire {source} -> {target}: {source} is one port, and {target} a group of inputs; "
             f"wire one of them{did_you_mean(group, members)}"
@@ -147,3 +156,35 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
         Connection(PortName(start, source_group + name.removeprefix(group)), PortName(to, name))
         for name in members
     ]
+
+
+def _members(ports: Iterable[str], group: str) -> list[str]:
+    """The ports of a group."""
+    return [name for name in ports if name.startswith((f"{group}.", f"{group}["))]
+
+
+def _joined(
+    to: Component, end: Terminal, start: Component, begin: Terminal
+) -> Iterator[Connection]:
+    """The connections of two terminals, by the rules of both: each input takes an output."""
+    for one, other in ((end, begin), (begin, end)):
+        if one.rule not in (*COMPLETE, BUS):
+            raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
+        if one.flows:
+            raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
+        missing = [member for member in one.members if member not in other.members]
+        if one.rule in COMPLETE and missing:
+            raise InputError(f"a terminal lacks the member {listed(missing)}")
+    for member in (member for member in end.members if member in begin.members):
+        targets, sources = to.elements(end.members[member]), start.elements(begin.members[member])
+        if len(targets) != len(sources):
+            raise InputError(f"{member} has {len(sources)} elements here and {len(targets)} there")
+        for target, source in zip(targets, sources, strict=True):
+            there, here = PortName(start.name, source.name), PortName(to.name, target.name)
+            match source.causality, target.causality:
+                case "output", "input":
+                    yield Connection(there, here)
+                case "input", "output":
+                    yield Connection(here, there)
+                case first, second:
+                    raise InputError(f"{there} is of causality {first}, {here} of {second}")

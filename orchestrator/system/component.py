@@ -17,7 +17,13 @@ from fmpy.model_description import ModelDescription, ModelVariable, ValidationEr
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
 from orchestrator.machine.user_files import unpack, unpacked_folder
 from orchestrator.system.values import Value, finite, integer, real, type_of, typed
-from orchestrator.system.variables import Variables, array_of, complete, variables_of
+from orchestrator.system.variables import (
+    Terminal,
+    array_of,
+    complete,
+    terminals_of,
+    variables_of,
+)
 
 _CAUSALITIES = {
     "structuralParameter", "parameter", "calculatedParameter", "input", "output", "local",
@@ -103,6 +109,9 @@ def described(fmu: Path, folder: Path, versions: Sequence[str]) -> Described:
         found = read_description(folder)
     except InputError:
         raise
+    except KeyError as error:
+        why = f"it refers to {error}, which is not there"
+        raise InputError(f"{fmu}: not a readable FMU: {why}") from error
     except Exception as error:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
     implementation = found.description.coSimulation
@@ -176,24 +185,20 @@ class Component:
         """
         return unpacked_folder(self.fmu, self.digest)
 
-    @property
+    @cached_property
     def variables(self) -> Mapping[str, ModelVariable]:
         """The FMU's variables by name, except the ones that are left alone."""
-        return self._variables.known
+        return variables_of(self.description).known
 
     @property
     def left_alone(self) -> Mapping[str, str]:
         """Why others cannot be connected, set or recorded, by name."""
-        return self._variables.left_alone
+        return variables_of(self.description).left_alone
 
     @property
     def remainder(self) -> str:
         """Which variables are left alone, in words."""
-        return f"leaves {shortened(', '.join(self.left_alone))} alone: not supported"
-
-    @cached_property
-    def _variables(self) -> Variables:
-        return variables_of(self.description)
+        return f"{shortened(', '.join(self.left_alone))}: not supported, and left alone"
 
     @cached_property
     def arrays(self) -> dict[str, list[ModelVariable]]:
@@ -203,6 +208,19 @@ class Component:
             if variable.shape:
                 found.setdefault(array_of(variable), []).append(variable)
         return found
+
+    @cached_property
+    def terminals(self) -> dict[str, Terminal]:
+        """Its terminals by their names.
+
+        Raises:
+            InputError: the file that lists them cannot be read.
+
+        """
+        try:
+            return terminals_of(self.folder)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None
 
     @property
     def is_once_per_process(self) -> bool:
@@ -238,13 +256,22 @@ class Component:
             InputError: there is no such variable.
 
         """
-        for others in (self.left_alone, self._variables.other_names):
-            if name in others:
-                raise InputError(f"{self.name}.{name} {others[name]}")
         if name not in self.variables:
+            _, left_alone, other_names = variables_of(self.description)
+            if why := left_alone.get(name) or other_names.get(name):
+                raise InputError(f"{self.name}.{name} {why}")
             hint = did_you_mean(name, self.variables)
             raise InputError(f"{self.name} has no port or parameter {name!r}{hint}")
         return self.variables[name]
+
+    def elements(self, name: str) -> list[ModelVariable]:
+        """The elements of an array, or a scalar variable.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        return self.arrays.get(name) or [self.variable(name)]
 
     def having(self, causality: str) -> list[ModelVariable]:
         """The variables of one causality, in the order of the description."""

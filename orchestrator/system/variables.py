@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from copy import copy
+from functools import lru_cache
 from itertools import product
 from math import prod
+from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
+from orchestrator.machine.errors import InputError
 from orchestrator.system.values import TYPES
 
 #: An array has no more elements than this: each is a column.
@@ -36,18 +39,23 @@ class Variables(NamedTuple):
     other_names: Mapping[str, str]
 
 
+@lru_cache(maxsize=256)
 def variables_of(description: ModelDescription) -> Variables:
     """The variables of an FMU."""
     known: dict[str, ModelVariable] = {}
     left_alone: dict[str, str] = {}
     other_names: dict[str, str] = {}
+    names = {variable.name for variable in description.modelVariables}
     for variable in description.modelVariables:
         if reason := _reason(variable):
             left_alone[variable.name] = reason
+            continue
+        first = next(element_names(variable.name, variable.shape or ()))
+        if variable.shape and first in names:
+            left_alone[variable.name] = f"has the element {first}, as another variable"
         elif variable.alias is not None:
             other_names[variable.name] = f"is another name of {variable.alias.name}: use that one"
         elif variable.shape:
-            first = next(element_names(variable.name, variable.shape), "there is none")
             other_names[variable.name] = f"is an array: name an element, as {first}"
             known |= {element.name: element for element in _elements(variable)}
         else:
@@ -61,6 +69,8 @@ def _reason(variable: ModelVariable) -> str:
         return f"is of type {variable.type}, which is not supported"
     if variable.clocks:
         return "belongs to a Clock, and Clocks are not supported"
+    if any(length < 1 for length in variable.shape or ()):
+        return "is an array without elements"
     if prod(variable.shape or ()) > MOST_ELEMENTS:
         return f"is an array of more than {MOST_ELEMENTS:,} elements"
     return ""
@@ -126,6 +136,8 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
         assert stated is not None
         gives = stated.get("providesDirectionalDerivatives")
         description.coSimulation.providesDirectionalDerivative = gives in ("true", "1")
+        # A capability of FMI 2.0.
+        description.coSimulation.canInterpolateInputs = False
     elements = {element.get("name"): element for element in root.findall("ModelVariables/*")}
     for variable in description.modelVariables:
         element = elements.get(variable.name)
@@ -136,3 +148,61 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
         if variable.shape and variable.type == "String":
             texts = [start.get("value", "") for start in element.findall("Start")]
             variable.start = _BETWEEN.join(texts) if texts else None
+
+
+_MEMBER = "TerminalMemberVariable"
+
+#: Matching rules of terminals: those with which all members are connected, and the other one.
+COMPLETE, BUS = ("plug", "sequence"), "bus"
+
+
+class Terminal(NamedTuple):
+    """Variables that are connected as one thing.
+
+    Attributes:
+        rule: which of its members are connected: all of a plug, by their names; of a bus the ones
+            that the other terminal has; all of a sequence, by their places, which are its names.
+        members: names of variables by the names of the members.
+        flows: members that are no signals: sums and signs count as well where these are joined.
+
+    """
+
+    rule: str
+    members: Mapping[str, str]
+    flows: Sequence[str]
+
+
+def terminals_of(folder: Path) -> dict[str, Terminal]:
+    """The terminals of an unpacked FMU by their names; one within another has a dotted name.
+
+    Raises:
+        InputError: the file that lists them cannot be read.
+
+    """
+    file = folder / "terminalsAndIcons" / "terminalsAndIcons.xml"
+    if not file.is_file():
+        return {}
+    try:
+        root = ElementTree.parse(file).getroot()
+    except ElementTree.ParseError as error:
+        raise InputError(f"{file.name} is not well-formed XML: {error}") from None
+    return dict(_terminals(root.find("Terminals"), ""))
+
+
+def _terminals(parent: ElementTree.Element | None, outer: str) -> Iterator[tuple[str, Terminal]]:
+    for element in () if parent is None else parent.findall("Terminal"):
+        name, rule = outer + element.get("name", ""), element.get("matchingRule", "")
+        members = [
+            (member.get("memberName", ""), member.get("variableName", ""))
+            for member in element.findall(_MEMBER)
+        ]
+        if rule == "sequence":
+            members = [(str(place), variable) for place, (_, variable) in enumerate(members)]
+        flows = [
+            member.get("variableName") or member.get("inStreamVariableName") or ""
+            for member in element
+            if member.tag == "TerminalStreamMemberVariable"
+            or (member.tag == _MEMBER and member.get("variableKind") != "signal")
+        ]
+        yield name, Terminal(rule, dict(members), flows)
+        yield from _terminals(element, f"{name}.")

@@ -31,6 +31,7 @@ from hypothesis import strategies as st
 
 from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
+from orchestrator.exchange import release
 from orchestrator.figures import drawing
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.machine.ledger import LEDGER
@@ -70,6 +71,7 @@ COMMANDS = {
     "ssp": ["export", "fig3a", "--out", "{out}"],
     "osp": ["export", "fig3a", "--format", "osp", "--out", "{out}"],
     "build": ["build", "--out", "{out}"],
+    "release": ["release", "--out", "{out}"],
     "new": ["new", "controller", "Own", "{out}"],
     "script": ["build", "{here}/own.py", "--out", "{out}"],
     "report": ["report", "--out", "{out}"],
@@ -160,7 +162,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def quick(here: Path) -> Iterator[None]:
     """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
 
-    def copied(module: str, folder: Path, *options: str) -> list[Path]:
+    def copied(module: str, folder: Path, *options: str, **_: object) -> list[Path]:
         source = current_fmus() if module == "build" else here / "own"
         found = [*source.glob("*.fmu"), *source.glob(MANIFEST)]
         return [Path(shutil.copy(path, folder)) for path in found]
@@ -185,6 +187,7 @@ def quick(here: Path) -> Iterator[None]:
     with ExitStack() as stack:
         for what, name, instead in (
             (bundle, "run_fmus", copied),
+            (release, "_LINKED", {}),
             (drawing, "draw", drawn),
             (report, "draw_section", shown),
             (report, "workers", lambda: nullcontext(InThisProcess())),

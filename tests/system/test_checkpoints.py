@@ -18,7 +18,7 @@ from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import Ending
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.system.structure import System
-from support import others
+from support import others, typed
 from support.machine import contents, ended, eventually, forked, killed_at, start
 from support.texts import mentions
 from support.tiers import slow
@@ -315,3 +315,17 @@ def test_from_python(left):
     assert not Path("r/checkpoint").exists()
     with pytest.raises(ValueError, match="checkpoints need checkpoint="):
         simulate("fig4", checkpoint_every=1.0)
+
+
+@pytest.mark.parametrize("loop", ["python", "compiled"])
+def test_an_fmu_of_fmi_3_goes_on_with_an_integer_that_no_double_is(loop):
+    begin = 2**53 + 1
+    arguments = [str(typed.build(Path())), "--stop-time", "2", "--step", "0.125", "--loop", loop]
+    arguments += ["--set", f"typed.counts_from={begin}", "--no-figures"]
+    assert run(*arguments, out="whole") == 0
+    killed_after(2, *arguments, *CHECKPOINTS, out="killed")
+    assert run(*arguments, "--resume", out="killed") == 0
+    assert result("killed") == result("whole")
+    names, *lines = Path("killed/result.csv").read_text().splitlines()
+    place = names.split(",").index("typed.counter")
+    assert [int(line.split(",")[place]) for line in lines] == [begin + k for k in range(17)]

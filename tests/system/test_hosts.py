@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from fmus.compilers import machines_compiler
+from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
 from orchestrator.exchange.hosts import comparison, here
@@ -59,6 +60,16 @@ def test_host_gives_the_numbers_of_our_master_in_its_order(dist: Path, host: str
     if scenario != "fig4" and host in (*WITHOUT_PARAMETERS, *APART):
         pytest.skip("it applies no parameters")
     check(closed_loop(dist, read_scenario(scenario)), host, 500)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+@pytest.mark.parametrize("fmi", FMI_VERSIONS)
+@pytest.mark.parametrize("host", BESIDE)
+def test_host_gives_our_numbers_with_a_release(release: dict[str, Path], host: str, fmi: str):
+    if f"{fmi}.0" not in HOSTS[host].fmi:
+        pytest.skip(f"it runs no FMI {fmi}.0")
+    check(closed_loop(release[fmi]), host, 300)
 
 
 @pytest.mark.parametrize(

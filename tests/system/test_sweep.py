@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fmus.kinds import KINDS
 from orchestrator import sweep
 from orchestrator.commands.main import main
 from orchestrator.runs.loading import load_scenario
@@ -121,6 +122,15 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
         "auv-fmu: results/mine holds another study, which differs in vary, points",
     ]
     assert files(folder)["runs.parquet"] == before["runs.parquet"]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_study_goes_on_with_the_kind_that_it_was_begun_with(study, kind):
+    sweep("mine.toml", kind=kind, out="here", workers=1)
+    before = files(Path("here"))["runs.parquet"]
+    result = sweep("mine.toml", out="here", workers=1)
+    assert files(Path("here"))["runs.parquet"] == before
+    assert result.record["kind"] == kind
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,8 +26,11 @@ from orchestrator.system.units import Linear
 from support import others, typed
 from support.others import WAYS
 from support.runs import run_table
+from support.runs import system_of as closed_loop_of
+from support.settings import NAMES
 from support.small_fmus import connected
 from support.texts import mentions
+from support.tiers import slow
 
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
@@ -151,6 +155,20 @@ def test_a_step_that_it_does_not_make_is_a_failure(fmu, way, values, words):
     assert mentions(table.failure, words)
 
 
+@EVERY_WAY
+@pytest.mark.parametrize("old", [(), ("AuvPlant", "MotionPlanner"), *slow(("ObserverController",))])
+def test_our_loop_has_the_same_rows_in_both_versions(native, dist3, tmp_path, way, old):
+    for name in NAMES:
+        shutil.copy((native if name in old else dist3) / f"{name}.fmu", tmp_path)
+    ours, theirs = (
+        run_table(closed_loop_of(folder, "fig4"), Experiment(4.0, 0.02), **how)
+        for folder, how in ((native, {}), (tmp_path, way))
+    )
+    assert theirs.failure is None and len(theirs) == 201
+    assert theirs.columns == ours.columns and theirs.header.parameters == ours.header.parameters
+    assert theirs.rows.tobytes() == ours.rows.tobytes()
+
+
 def feeding(tmp_path: Path, fmu: Path, source: str, target: str) -> System:
     """Two FMUs of both versions, the later one first, and one wire between them."""
     fmus = {"new": fmu, "old": others.build(tmp_path)}
@@ -242,14 +260,17 @@ def test_events_set_one_element_and_keep_the_others(fmu, way):
     tables = [
         {"at": 0.5, "set": {"a.gain[2]": 10.0}},
         {"at": 1.0, "override": {"a.u_Int64": 2**62 + 1}, "for": 0.5},
+        {"at": 1.75, "reset": ["a"]},
         {"when": f"a.counter >= {2**53 + 12}", "set": {"a.v[3]": 0.0}},
     ]
-    system = typed.system_of(fmu, parameters={"a.counts_from": 2**53, "a.gain[1]": 4.0})
+    values = {"a.counts_from": 2**53, "a.gain[1]": 4.0, "b.u_Float64": 1.0}
+    system = typed.system_of(fmu, "ab", parameters=values)
     events = read_events("here", tables, system)
     table = run(system, hooks=[Events(events)], **way)
     # w = gain (M v), v = (0, 0, 0.5), until v is zero.
     assert table["a.w[1]"].tolist() == [6.0] * 13 + [0.0] * 4
     assert table["a.w[2]"].tolist() == [3.0] * 5 + [30.0] * 8 + [0.0] * 4
+    assert table["a.counter"].tolist() == [2**53 + k for k in (*range(15), 1, 2)]
     large = [k in range(9, 13) for k in range(17)]
     assert table["a.y_Int64"].tolist() == [(2**62 + 1) * is_large for is_large in large]
 

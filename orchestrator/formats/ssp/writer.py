@@ -79,7 +79,7 @@ def parameter_set_xml(
     root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")
     for port in dict.fromkeys(array_of(component.variable(port)) for port in values):
-        members = component.arrays.get(port) or [component.variable(port)]
+        members = component.elements(port)
         element = _add(parameters, "ssv:Parameter", name=port)
         texts = [_text(component, member, values) for member in members]
         value = _add(element, f"ssv:{members[0].type}")
@@ -172,7 +172,7 @@ def _whole(
     source, target = starts.variable(start.port), ends.variable(end.port)
     if not source.shape or source.shape != target.shape:
         return set()
-    members = zip(starts.arrays[array_of(source)], ends.arrays[array_of(target)], strict=True)
+    members = zip(starts.elements(array_of(source)), ends.elements(array_of(target)), strict=True)
     found = {
         replace(
             connection,

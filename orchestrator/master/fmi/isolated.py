@@ -115,7 +115,7 @@ class IsolatedInstance:
             "output": [],
         }
         self._typed_outputs: list[tuple[str, slice]] = []
-        # What numbers stand for in the process, which has its own, and how many it knows of.
+        # What numbers stand for in the process, which has its own, and how many of them both know.
         self._theirs, self._told = StringTable(), len(StringTable())
         inputs, outputs = sizes(component)
         self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
@@ -283,7 +283,7 @@ class IsolatedInstance:
         try:
             for i, ours, theirs in self._standing["output"]:
                 outputs[i] = ours.number(theirs.value(outputs[i]))
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise self._nonsense(error) from error
         self._outputs[:] = outputs
 

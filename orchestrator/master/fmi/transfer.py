@@ -21,7 +21,7 @@ from fmpy.fmi2 import (
     fmi2Warning,
 )
 
-from orchestrator.system.values import StringTable, are_of
+from orchestrator.system.values import TYPES, StringTable, are_of
 
 #: Types of the arguments of doStep in FMI 2.0, and a function of Python in its place for the
 #: compiled loop.
@@ -31,19 +31,21 @@ DoStepCallback = CFUNCTYPE(fmi2Status, *DO_STEP_TYPES)
 #: A function of Python in place of one that moves values.
 _MoveCallback = CFUNCTYPE(fmi2Status)
 
-#: The kinds of values that the compiled loop moves by itself, by their types in C; any others a
-#: function of Python moves: see stepper.c.
+#: What the compiled loop does with values, by their types in C: see stepper.c.
 _KINDS = {
     c_type: kind
     for kind, c_type in enumerate(
         (
             *(ctypes.c_double, ctypes.c_float, ctypes.c_int8, ctypes.c_uint8),
             *(ctypes.c_int16, ctypes.c_uint16, ctypes.c_int32, ctypes.c_uint32),
+            *(ctypes.c_int64, ctypes.c_uint64, fmi2String),
         )
     )
 }
 _KINDS[ctypes.c_bool] = _KINDS[ctypes.c_uint8]
-_MOVED_BY_PYTHON = 8
+
+#: Types whose values are not all numbers of the row: Python moves these.
+_LOOKED_UP = (ctypes.c_int64, ctypes.c_uint64, fmi2String)
 
 
 class Moved(NamedTuple):
@@ -66,6 +68,7 @@ class CMove(Structure):
 
     _fields_ = (
         ("call", c_void_p),
+        ("python", c_void_p),
         ("references", c_void_p),
         ("n_references", c_size_t),
         ("n", c_size_t),
@@ -135,12 +138,12 @@ class PortBlock:
         self._row = row
         n, n_references = len(row), len(references)
         self._references = (fmi2ValueReference * n_references)(*references)
-        self._kind = _KINDS.get(moved.c_type, _MOVED_BY_PYTHON)
+        self._called_back: Any = None
         if moved.c_type is fmi2Real:
             self._values = (moved.c_type * n).from_buffer(row)
         else:
             self._values = (moved.c_type * n)()
-        if self._kind != _MOVED_BY_PYTHON:
+        if moved.c_type not in _LOOKED_UP:
             # A byte of a Boolean may be neither 0 nor 1.
             of = np.uint8 if moved.c_type is ctypes.c_bool else np.dtype(moved.c_type)
             self._numbers = np.frombuffer(self._values, dtype=of)
@@ -153,7 +156,7 @@ class PortBlock:
         call = partial(function, *self._arguments)
         if self._moved.c_type is fmi2Real:
             return call
-        if self._kind == _MOVED_BY_PYTHON:
+        if self._moved.c_type in _LOOKED_UP:
             move = partial(self._set_each if self._is_input else self._get_each, call)
             self._called_back = _MoveCallback(move)
             return move
@@ -209,22 +212,21 @@ class PortBlock:
             is_text = self._moved.c_type is fmi2String
             for i, value in enumerate(self._values):
                 self._row[i] = self._strings.stand_in(decode_text(value) if is_text else value)
-            if not are_of(self._fmi_type, self._row).all():
-                return int(fmi2Error)
+                if not TYPES[self._fmi_type].stands and self._row[i] != value:
+                    return int(fmi2Error)
         return status
 
     def move(self, address: int | None) -> CMove:
         """The same for the compiled loop, by the address of the FMU's function of this block."""
-        if self._kind == _MOVED_BY_PYTHON:
-            address = address_of(self._called_back)
         return CMove(
             address,
+            address_of(self._called_back),
             addressof(self._references),
             len(self._references),
             len(self._row),
             self._row.ctypes.data,
             addressof(self._values),
-            self._kind,
+            _KINDS[self._moved.c_type],
             self._moved.is_counted,
         )
 

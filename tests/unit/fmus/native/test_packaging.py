@@ -23,7 +23,7 @@ def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def entries(name: str, fmi: str = "2", names: str = "all") -> dict[str, bytes]:
-    return fmu_entries(name, components()[name], fmi, platforms(fmi, names), ANY)
+    return fmu_entries(name, components()[name], fmi, platforms(fmi, names), ANY, print)
 
 
 def guid(contents: dict[str, bytes]) -> str:

@@ -1,4 +1,4 @@
-"""Nothing that lies in the current folder is read as modules are imported."""
+"""What a child says is heard at once, and nothing in the current folder is read by imports."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.commands.main import main
+from orchestrator.machine.children import listen_to_module
 from support.tiers import slow
 
 #: Files that change what matplotlib or numba do, or how they end.
@@ -88,3 +89,37 @@ def test_numba_takes_nothing_from_the_current_folder(workplace):
         stdout=subprocess.DEVNULL, check=True,
     )  # fmt: skip
     assert {path.name for path in workplace.iterdir()} == before | {"results"}
+
+
+def test_lines_of_a_module_are_heard_before_it_ends(workplace, monkeypatch):
+    """It goes on only when its first line was heard."""
+    (workplace / "speaker.py").write_text(
+        "import pathlib, sys, time\n"
+        "print('first', flush=True)\n"
+        "while not pathlib.Path('heard').exists():\n"
+        "    time.sleep(0.01)\n"
+        "print('last')\n"
+        "sys.exit('a complaint' + '.' * 100_000)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(workplace))
+    lines = []
+
+    def hear(line: str) -> None:
+        lines.append(line)
+        Path("heard").touch()
+
+    process = listen_to_module(hear, "speaker")
+    assert lines == process.stdout.splitlines() == ["first", "last"]
+    assert process.returncode == 1
+    assert process.stderr == "a complaint" + "." * 100_000 + "\n"
+
+
+def test_an_exception_ends_the_module_that_is_heard(workplace, monkeypatch):
+    (workplace / "speaker.py").write_text("while True:\n    print('again', flush=True)\n")
+    monkeypatch.setenv("PYTHONPATH", str(workplace))
+
+    def interrupted(line: str) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        listen_to_module(interrupted, "speaker")

@@ -125,7 +125,8 @@ class FourValues(SimpleNamespace):
 
     def __init__(self, out: float, free: float = 7.0) -> None:
         values = np.array([out, 0.0, 0.0, free])
-        super().__init__(values=values, columns={OUT: 0, FED: 1, ALSO: 2, FREE: 3})
+        columns = {OUT: 0, FED: 1, ALSO: 2, FREE: 3}
+        super().__init__(values=values, columns=columns, number=float)
 
     def places(self, connections):
         return np.array([[self.columns[c.target], self.columns[c.source]] for c in connections]).T

@@ -18,7 +18,7 @@ from orchestrator.runs.bundle import CATEGORY, build_bundle, current_fmus, key_o
 @pytest.fixture
 def folder(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A bundle, and a build that finds its FMUs up to date."""
-    monkeypatch.setattr(bundle, "run_fmus", lambda module, folder, *options: [])
+    monkeypatch.setattr(bundle, "run_fmus", lambda module, folder, *options, hear: [])
     return shutil.copytree(dist, tmp_path / "bundle")
 
 
@@ -58,7 +58,7 @@ def test_papers_are_about_the_files_beside_them(dist: Path):
 
 
 def test_a_build_that_fails_leaves_what_was_there(folder: Path, monkeypatch: pytest.MonkeyPatch):
-    def fails(*_: object) -> None:
+    def fails(*_: object, hear: object) -> None:
         raise InputError("no compiler")
 
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
@@ -87,8 +87,12 @@ def builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setattr(bundle, "current_fmus", current_fmus.__wrapped__)
     monkeypatch.setattr(bundle, "run_fmus", run_fmus)
-    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: lambda *_: None)
+    monkeypatch.setattr(bundle, "compiler_for", lambda _: None)
     return built
+
+
+def none(_: object) -> None:
+    raise OSError("there is no C compiler")
 
 
 def auto() -> str:
@@ -97,12 +101,12 @@ def auto() -> str:
 
 def test_auto_builds_native_with_a_compiler_and_takes_it_afterwards_without(builds, monkeypatch):
     assert (auto(), builds) == ("native", ["native"])
-    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: None)
+    monkeypatch.setattr(bundle, "compiler_for", none)
     assert (auto(), builds) == ("native", ["native"])
 
 
 def test_auto_is_python_without_a_compiler(builds, monkeypatch):
-    monkeypatch.setattr(bundle, "find_fast_compiler", lambda: None)
+    monkeypatch.setattr(bundle, "compiler_for", none)
     assert (auto(), builds) == ("python", ["python"])
 
 

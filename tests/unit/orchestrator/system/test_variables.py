@@ -26,6 +26,7 @@ _VARIABLES = """
 <Int32 name="of_c" valueReference="8" causality="output" clocks="7"/>
 <Float64 name="y" valueReference="9" causality="output"><Dimension start="2"/>
   <Alias name="z"/></Float64>
+<Int8 name="none" valueReference="10" causality="input" start="1"><Dimension start="0"/></Int8>
 """
 
 
@@ -60,6 +61,6 @@ def test_what_is_no_port_is_refused_by_name(component, name, words):
 
 
 def test_sizes_are_not_set_and_ranges_hold(component):
-    assert [*component.left_alone] == ["b", "c", "of_c"]
+    assert [*component.left_alone] == ["b", "c", "of_c", "none"]
     assert not component.is_settable("n") and component.is_settable("u[1]")
     assert (component.variable("k").min, component.variable("k").max) == ("5", "9")

@@ -68,9 +68,12 @@ class Trial:
     def __init__(self, events, sources, stubborn=False):
         self.sources, self.events, self.component = sources, Events(events), Component(stubborn)
         columns = {OUT: 0, FED: 1, FREE: 2}
+        values = np.array([sources[0], sources[0], 7.0])
         self.row = SimpleNamespace(
-            values=np.array([sources[0], sources[0], 7.0]),
+            values=values,
             columns=columns,
+            number=float,
+            value=lambda port: values[columns[port]],
             places=lambda ws: np.array([[columns[w.target], columns[w.source]] for w in ws]).T,
         )
         wires = (Connection(OUT, FED),)
@@ -159,7 +162,7 @@ def test_a_condition_must_become_true():
     [("<", operator.lt), ("<=", operator.le), (">", operator.gt), (">=", operator.ge)],
 )
 def test_comparisons_are_what_they_look_like(sign, holds):
-    row = SimpleNamespace(values=np.array([2.0]), columns={OUT: 0})
+    row = SimpleNamespace(value={OUT: 2.0}.get)
     for limit in (1.0, 2.0, 3.0):
         assert Condition(OUT, sign, limit).holds(row) == holds(2.0, limit)
 

@@ -1,0 +1,104 @@
+"""The release: an archive for each version of FMI, with all that a user of the FMUs needs.
+
+The same sources and the same compiler give the same bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
+from string import Template
+from tempfile import TemporaryDirectory
+
+from auv_fmu import __version__
+from fmus.discovery import REFERENCE, components, licences, package_folder, write_archive
+from fmus.kinds import FMI_VERSIONS, NATIVE, platforms
+from orchestrator.machine.disk import process_folder
+from orchestrator.runs.bundle import ARCHIVE, ZIG, build_bundle, settings_of, write_papers
+from orchestrator.runs.folder import replace_files
+
+#: The page of an archive.
+_PAGE, _TEMPLATE = "README.md", Path(__file__).with_name("release.md")
+
+#: Where the reference results of the system are: with the package that was built, or in the
+#: repository.
+_REFERENCES = Path(__file__).with_name(REFERENCE), Path(__file__).parents[2] / REFERENCE
+
+#: The version of SSP that goes with each of FMI.
+_SSP_VERSIONS = dict(zip(FMI_VERSIONS, ("1.0", "2.0"), strict=True))
+
+#: The licences of what ziglang links into libraries, where it has them.
+_LINKED = {"zig.txt": "LICENSE", "mingw-w64.txt": "lib/libc/mingw/COPYING"}
+
+
+def write_release(folder: Path, hear: Callable[[str], None], *, force: bool = False) -> list[Path]:
+    """Write the archives of a release.
+
+    Args:
+        folder: made if it does not exist.
+        hear: called with a line when a library is made.
+        force: move aside files of the user's that have names of these.
+
+    Returns:
+        The archives.
+
+    Raises:
+        InputError: the FMUs cannot be built for all platforms, or the folder cannot be written.
+
+    """
+    names = {fmi: f"auv-fmu-{__version__}-fmi{fmi}" for fmi in FMI_VERSIONS}
+    written = [f"{name}.zip" for name in names.values()]
+    with replace_files(folder, written, force=force) as unfinished:
+        for fmi, name in names.items():
+            with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+                contents = _contents(Path(temporary), fmi, hear)
+                entries = {f"{name}/{file}": content for file, content in contents}
+                write_archive(unfinished / f"{name}.zip", entries)
+    return [folder / name for name in written]
+
+
+def _contents(folder: Path, fmi: str, hear: Callable[[str], None]) -> Iterator[tuple[str, bytes]]:
+    """The files of an archive by their names, made in a folder."""
+    build_bundle(folder, kind=NATIVE, fmi=fmi, platforms="all", hear=hear)
+    others = {_PAGE: _page(fmi), **dict(_licences()), **dict(_references())}
+    for name, content in others.items():
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+    # In an order of their own: a folder's is another one elsewhere.
+    files = sorted((*folder.glob("*.fmu"), folder / ARCHIVE, *(folder / name for name in others)))
+    for path in (*files, *write_papers(folder, files, settings_of(folder))):
+        yield path.relative_to(folder).as_posix(), path.read_bytes()
+
+
+def _page(fmi: str) -> bytes:
+    """What there is, and which file is for which tool."""
+    described = {
+        name: import_module(f"{package}.ports").DESCRIPTION
+        for name, package in components().items()
+    }
+    fmus = "\n".join(f"| `{name}.fmu` | {text} |" for name, text in described.items())
+    names = ", ".join(platform.name for platform in platforms(fmi, "all"))
+    page = Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
+        version=__version__, fmi=f"{fmi}.0", ssp=_SSP_VERSIONS[fmi], fmus=fmus, platforms=names
+    )
+    return page.encode()
+
+
+def _licences() -> Iterator[tuple[str, bytes]]:
+    """Licences of the FMUs, and of what a compiler links into their libraries."""
+    yield "licenses/auv-fmu.txt", licences(NATIVE).encode()
+    for name, file in _LINKED.items():
+        yield f"licenses/{name}", (package_folder(ZIG) / file).read_bytes()
+
+
+def _references() -> Iterator[tuple[str, bytes]]:
+    """Reference results of each FMU, and of the system."""
+    folder = next(folder for folder in _REFERENCES if folder.is_dir())
+    paths = [*folder.glob("auv_*")]
+    for name, package in components().items():
+        # Beside them is what the FMU carries itself.
+        paths += (package_folder(package) / REFERENCE).glob(f"{name}_*")
+    for path in paths:
+        yield f"{REFERENCE}/{path.name}", path.read_bytes()
