@@ -67,10 +67,9 @@ def test_host_gives_the_numbers_of_our_master_in_its_order(dist: Path, host: str
 @pytest.mark.parametrize("fmi", FMI_VERSIONS)
 @pytest.mark.parametrize("host", BESIDE)
 def test_host_gives_our_numbers_with_a_release(release: dict[str, Path], host: str, fmi: str):
-    if fmi not in HOSTS[host].fmi:
+    if f"{fmi}.0" not in HOSTS[host].fmi:
         pytest.skip(f"it runs no FMI {fmi}.0")
-    system, reference = (closed_loop(release[n]) for n in (fmi, "2"))
-    check(system, host, 300, reference)
+    check(closed_loop(release[fmi]), host, 300)
 
 
 @pytest.mark.parametrize(
