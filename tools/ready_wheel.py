@@ -1,4 +1,4 @@
-"""Make the wheel that carries the FMUs in C, and the compiled loop, for all platforms.
+"""Make the wheel that carries the FMUs of both kinds, and the compiled loop, for all platforms.
 
 `python tools/ready_wheel.py [--out DIR]` needs `pip install -e '.[native,test]'`. Where this wheel
 is installed, runs need no compiler and build nothing. `pip install .` makes a wheel without them.
@@ -10,12 +10,14 @@ import argparse
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from shlex import quote
 from tempfile import TemporaryDirectory
 
-from fmus.compilers import compiler_for, library
-from fmus.kinds import FMI_VERSIONS, NATIVE, platforms
+from fmus.compilers import COMPILERS, compiler_for, library
+from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON, TARGETS, platforms
 from orchestrator.machine.errors import InputError
 from orchestrator.master import stepper
 from orchestrator.runs import bundle
@@ -34,6 +36,9 @@ def write_ready(folder: Path) -> None:
     for fmi in FMI_VERSIONS:
         place = folder / bundle.CATEGORY / bundle.key_of(NATIVE, fmi)
         bundle.run_fmus("build", place, "--kind", NATIVE, "--fmi", fmi, "--platforms", "all")
+    with loader_for_any_linux():
+        place = folder / bundle.CATEGORY / bundle.key_of(PYTHON, FMI_VERSIONS[0])
+        bundle.run_fmus("build", place, "--kind", PYTHON, "--loader", "native")
     machines = platforms(FMI_VERSIONS[-1], "all")
     compiler = compiler_for(machines)
     source = stepper.SOURCE
@@ -44,6 +49,25 @@ def write_ready(folder: Path) -> None:
         place = folder / stepper.CATEGORY / stepper.key_of(machine.name)
         place.mkdir(parents=True)
         (place / f"{source.stem}{machine.ending}").write_bytes(content)
+
+
+@contextmanager
+def loader_for_any_linux() -> Iterator[None]:
+    """Let the compiler of the Python kind's loader be ziglang's, which links to an old glibc."""
+    path = os.environ["PATH"]
+    with TemporaryDirectory() as folder:
+        compiler = Path(folder, COMPILERS[0])
+        target = TARGETS["x86_64-linux"]
+        compiler.write_text(
+            f'#!/bin/sh\nexec {quote(sys.executable)} -m ziglang cc -target {target} "$@"\n',
+            encoding="utf-8",
+        )
+        compiler.chmod(0o755)
+        os.environ["PATH"] = os.pathsep.join((folder, path))
+        try:
+            yield
+        finally:
+            os.environ["PATH"] = path
 
 
 def write_wheel(folder: Path) -> Path:

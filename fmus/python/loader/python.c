@@ -32,11 +32,17 @@ typedef struct {
     char why[WHY];
 } process_state;
 
-/* The name carries a number, which another layout raises. */
-EXPORT process_state auv_fmu_process_2 = {
-    .lock = PTHREAD_MUTEX_INITIALIZER,
-};
-__asm__(".type auv_fmu_process_2, %gnu_unique_object");
+/* The name carries a number, which another layout raises. Defined without C, because clang gives
+ * what C defines another binding. Zeros are a lock that is free, and UNTRIED. */
+enum { ROOM = 4096 };
+_Static_assert(sizeof(process_state) <= ROOM, "the state is larger than its room");
+extern __attribute__((visibility("default"))) process_state auv_fmu_process_2;
+__asm__(".pushsection .bss\n"
+        ".balign 64\n"
+        ".type auv_fmu_process_2, %gnu_unique_object\n"
+        ".size auv_fmu_process_2, 4096\n"
+        "auv_fmu_process_2: .zero 4096\n"
+        ".popsection");
 #define process auv_fmu_process_2
 
 python_functions py;

@@ -5,13 +5,13 @@ Some tools want versions of packages that do not go together, and some are large
 
 from __future__ import annotations
 
-import os
 import platform
 import subprocess
 import sys
 from collections.abc import Sequence
 from hashlib import sha256
 from pathlib import Path
+from sysconfig import get_path
 
 from tqdm import tqdm
 
@@ -63,7 +63,7 @@ def python_with(requirements: Sequence[str]) -> Path:
     """
     try:
         folder = folder_of(requirements)
-        python = folder / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+        python = Path(get_path("scripts", "venv", {"base": str(folder)}), "python")
         folder.mkdir(0o700, exist_ok=True)
         with hold_lock(folder, wait=True):
             if not is_whole(folder):

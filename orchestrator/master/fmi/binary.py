@@ -119,7 +119,7 @@ def check_place(folder: Path) -> None:
     """
     # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
     # loader, which has PythonFMU's library beside it, does that for it.
-    loader = any((folder / "binaries").glob("*/*_pythonfmu.*"))
+    loader = any(Path(folder, "binaries", fmpy.platform).glob("*_pythonfmu.*"))
     within_drive = folder.relative_to(folder.anchor).as_posix()
     if (
         runs_python(folder)
