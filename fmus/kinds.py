@@ -12,7 +12,7 @@ from typing import NamedTuple
 #: Python sources that PythonFMU runs, or libraries translated from them. The first is the default.
 KINDS = PYTHON, NATIVE = "python", "native"
 
-#: What a run asks for unless a kind is named: native where it is to be had, else Python.
+#: What a run asks for unless a kind is named: native where available, else Python.
 AUTO = "auto"
 
 #: Packages besides ours whose code is in the FMUs of each kind.

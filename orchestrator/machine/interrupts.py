@@ -12,7 +12,7 @@ from contextlib import contextmanager, suppress
 from typing import Any
 
 from orchestrator.machine.disk import is_still
-from orchestrator.machine.operating_system import let_full_pipe_pass
+from orchestrator.machine.operating_system import never_wait_for_pipe
 
 #: Ctrl-C, what a batch system sends, the end of the terminal, and Ctrl-Break of Windows.
 _STOPS = [
@@ -93,7 +93,7 @@ class Interrupts:
             return
         end_of_thread, end_of_signals = os.pipe()
         status = os.fstat(end_of_signals)
-        let_full_pipe_pass(end_of_signals)
+        never_wait_for_pipe(end_of_signals)
         before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
         leaving = threading.Lock()
         # A thread, because Python answers no signal while an FMU computes.

@@ -19,7 +19,7 @@ from pathlib import Path
 from stat import S_IWGRP, S_IWOTH
 from typing import Any
 
-#: What file systems answer that know no fsync.
+#: Answers of file systems without fsync.
 _CANNOT = (errno.EINVAL, errno.ENOTSUP)
 
 #: That others than its owner can write a file or folder.
@@ -31,7 +31,7 @@ _GLANCE = 0.1
 #: What Windows answers if there is a mutex of a name already.
 _ALREADY_EXISTS, _ACCESS_DENIED = 183, 5
 
-#: So many processes can Windows wait for at once, less two for whoever starts them.
+#: Windows waits for at most 63 handles at once; two are for the process that starts the others.
 _MOST_PROCESSES = 61
 
 _PR_SET_PDEATHSIG = 1
@@ -101,16 +101,16 @@ def take_lock(path: Path, wait: bool = False) -> Callable[[], None]:
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-    except OSError as error:
+    except BaseException as error:
         os.close(descriptor)
-        if isinstance(error, BlockingIOError):
-            raise
-        raise NotImplementedError(f"{path}: {error.strerror}") from error
+        if isinstance(error, OSError) and not isinstance(error, BlockingIOError):
+            raise NotImplementedError(f"{path}: {error.strerror}") from error
+        raise
     return partial(os.close, descriptor)
 
 
 def _take_name(name: str, wait: bool) -> Callable[[], None]:
-    """Take a name of which Windows lets a process have one: it goes with the last handle."""
+    """Take a named mutex, which goes with its last handle."""
     kernel = _kernel()
     kernel.CreateMutexW.restype = ctypes.c_void_p
     while True:
@@ -136,26 +136,26 @@ def rename_to_new(path: Path, new: Path) -> None:
         OSError: it cannot be renamed.
 
     """
-    if sys.platform != "win32":
-        if path.is_dir() and not path.is_symlink():
-            new.mkdir()
-        else:
-            new.touch(exist_ok=False)
-        # In the place of what was made just now, and of nothing else.
-        path.replace(new)
+    if sys.platform == "win32":
+        path.rename(new)
         return
-    path.rename(new)
+    if path.is_dir() and not path.is_symlink():
+        new.mkdir()
+    else:
+        new.touch(exist_ok=False)
+    # In the place of what was made just now, and of nothing else.
+    path.replace(new)
 
 
 def is_mine(status: os.stat_result, or_roots: bool = False) -> bool:
-    """Whether a file is this user's; on Windows all is whose it is by where it lies."""
+    """Whether a file is this user's; on Windows its folder decides that."""
     if sys.platform == "win32":
         return True
     return status.st_uid in ((os.geteuid(), 0) if or_roots else (os.geteuid(),))
 
 
 def others_write(status: os.stat_result) -> bool:
-    """Whether other users can write a file or folder; Windows keeps them out of a user's own."""
+    """Whether other users can write a file or folder; on Windows they cannot write a user's own."""
     return sys.platform != "win32" and bool(status.st_mode & _OTHERS_WRITE)
 
 
@@ -167,7 +167,7 @@ def most_processes() -> int:
     return _MOST_PROCESSES if sys.platform == "win32" else sys.maxsize
 
 
-def let_full_pipe_pass(descriptor: int) -> None:
+def never_wait_for_pipe(descriptor: int) -> None:
     """Have what a signal writes into a pipe never wait; on Windows a thread of its own writes."""
     if sys.platform != "win32":
         os.set_blocking(descriptor, False)

@@ -128,8 +128,10 @@ class Ring:
         self._real = np.array([_is_real(system, c) for c in connections], dtype=bool)
         self._reals = np.ix_(self._real, self._real)
         grain = np.array([_grain(system, connection) for connection in connections])
+        # What is no Real is another value, or it is the same.
         self._rest, self._rounding = (
-            (np.maximum(relative, grain), absolute) for relative, absolute in (_REST, _ROUNDING)
+            (self._real * np.maximum(relative, grain), self._real * absolute)
+            for relative, absolute in (_REST, _ROUNDING)
         )
         self._parts: list[_Part] = []
         for name in names:
@@ -320,7 +322,9 @@ class Ring:
         return left
 
 
-def _differ(held: np.ndarray, arriving: np.ndarray, by: tuple[np.ndarray, float]) -> np.ndarray:
+def _differ(
+    held: np.ndarray, arriving: np.ndarray, by: tuple[np.ndarray, np.ndarray]
+) -> np.ndarray:
     # Not numpy's isclose, which takes longer than the FMUs. What is not finite is named where the
     # row is looked at.
     relative, absolute = by

@@ -153,8 +153,10 @@ class Row:
 
     def moving(self, before: np.ndarray) -> list[PortName]:
         """The ports whose values are not what they were, apart from rounding."""
-        near = np.isclose(self.values, before, rtol=_ROUNDING, atol=_ROUNDING)
-        return [port for port, column in self.columns.items() if not near[column]]
+        same = np.isclose(self.values, before, rtol=_ROUNDING, atol=_ROUNDING)
+        standing = [self.columns[port] for port in self.standing]
+        same[standing] = self.values[standing] == before[standing]
+        return [port for port, column in self.columns.items() if not same[column]]
 
     def places(self, connections: Sequence[Connection]) -> tuple[np.ndarray, np.ndarray]:
         """Where the targets and the sources of some connections are."""

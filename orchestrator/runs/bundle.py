@@ -256,8 +256,9 @@ def _best_fmus(fmi: str) -> Path:
         return current_fmus(NATIVE, fmi)
     except InputError as error:
         # The command may be there, and what it needs not.
+        found = current_fmus(PYTHON, fmi)
         warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
-        return current_fmus(PYTHON, fmi)
+        return found
 
 
 def key_of(kind: str, fmi: str) -> str:

@@ -44,7 +44,7 @@ def load(
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
             OspSystemStructure.xml; an SSP and the latter may also be a folder.
-        kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where it is to be had.
+        kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
         fmi: their version of FMI, `2` or `3`.
         variant: which of the descriptions in an SSP; None: the default.
         strict: refuse what otherwise is a warning.

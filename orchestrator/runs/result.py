@@ -224,7 +224,7 @@ def simulate(
             names of all components, one stepped after the other; None: the scenario's own, else
             `gauss-seidel`.
         kind: of the bundle's FMUs, `python`, `native`: translated to C, with the same numbers, or
-            `auto`, native where it is to be had.
+            `auto`, native where available.
         progress: show a bar on runs that take longer than some seconds.
         isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
             a failure of the run.

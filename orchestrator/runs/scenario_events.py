@@ -211,9 +211,13 @@ def _value(system: System, port: PortName, route: Connection | None, value: Any)
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
     found = typed(str(port), variable, _text(value))
-    if route is None or route.transformation is None:
-        return found
-    return _arrived(port, route, value, route.transformation(float(found)))
+    match route:
+        case Connection(transformation=Linear() as change):
+            return _arrived(port, route, value, change(float(found)))
+        case Connection(transformation=Mapped(pairs)):
+            assert not isinstance(found, str)
+            return dict(pairs).get(found, found)
+    return found
 
 
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:

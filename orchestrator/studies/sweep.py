@@ -120,7 +120,7 @@ def sweep(
         study: name of a ready study, path of a .toml file, or what such a file holds.
         engine: that makes the runs, `fmu` or `batch`; None: the study's own.
         kind: of the bundle's FMUs, `python`, `native`, or `auto`: the one that the study was begun
-            with, else native where it is to be had.
+            with, else native where available.
         loop: that makes their steps: `python`, `compiled` or `auto`.
         scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
             this machine.

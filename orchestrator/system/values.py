@@ -246,14 +246,16 @@ def is_of(variable: ModelVariable, value: object) -> bool:
 
 
 def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
-    """Which numbers of a row a variable of a type can hold, apart from any that are not finite."""
+    """Which numbers of a row a variable of a type can hold; doubles and texts take all."""
     of = TYPES[fmi_type]
     if of.family == "Boolean":
         # FMI 2.0 has integers for them.
         of = TYPES["Integer"]
     if of.c_type in (None, ctypes.c_double):
         return np.ones(np.shape(numbers), dtype=bool)
-    fit = (of.least <= numbers) & (numbers <= of.most)
+    # As a double, the end of 64 bits is the first number beyond it.
+    fit = of.least <= numbers
+    fit &= numbers < float(of.most) if of.is_wide else numbers <= of.most
     if of.family != "Real":
         fit &= numbers == np.trunc(numbers)
     if of.is_wide:

@@ -176,7 +176,7 @@ def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatc
     asked = []
 
     def write_report(*arguments: object, **options: object) -> tuple[Path, Path]:
-        assert options == {"kind": "python", "ready": (), "variants": False, "force": False}
+        assert options == {"kind": "auto", "ready": (), "variants": False, "force": False}
         asked.append(arguments)
         return Path("a"), Path("b")
 

@@ -140,8 +140,8 @@ def binary_of(component: Component, folder: Path) -> Path:
     identifier = component.description.coSimulation.modelIdentifier
     name = f"{identifier}{fmpy.sharedLibraryExtension}"
     platforms = _platform(component), fmpy.platform_tuple
-    old, named = (Path(folder, "binaries", platform, name) for platform in platforms)
-    return named if named.is_file() else old
+    own, named = (Path(folder, "binaries", platform, name) for platform in platforms)
+    return named if named.is_file() else own
 
 
 def _platform(component: Component) -> str:

@@ -286,7 +286,9 @@ class LoadedInstance:
                 if (time := self._fmu.ended_at()) is not None:
                     text = f"{self.name} has ended the simulation, at {time:.12g} s"
                     return Ended(text, self.name, time)
-        if function == DO_STEP and (time := self._fmu.returned_at()) is not None:
+        if (function, status) == (DO_STEP, fmi2Discard) and (
+            time := self._fmu.returned_at()
+        ) is not None:
             return ComponentFailed(
                 f"{self.name}: has returned from its step early, at {time:.12g} s, which it was "
                 "not allowed to"

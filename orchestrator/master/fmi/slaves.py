@@ -1,4 +1,4 @@
-"""The functions of an FMU in this process, and in what they differ between versions of FMI."""
+"""The functions of an FMU in this process, and how they differ between versions of FMI."""
 
 from __future__ import annotations
 

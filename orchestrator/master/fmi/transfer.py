@@ -171,8 +171,10 @@ class PortBlock:
             return call() if numbers.tolist() == row.tolist() else int(fmi2Error)
 
         def set_rounded() -> int:
+            if not are_of(self._fmi_type, row).all():
+                return int(fmi2Error)
             numbers[:] = row
-            return call() if are_of(self._fmi_type, row).all() else int(fmi2Error)
+            return call()
 
         return set_rounded if self._moved.c_type is ctypes.c_float else set_converted
 

@@ -160,3 +160,9 @@ def test_texts_keep_their_numbers_in_another_process(before, after):
     for number in (-1, len(table)):
         with pytest.raises(ValueError, match=str(number)):
             table.text(number)
+
+
+@pytest.mark.parametrize(("fmi_type", "beyond"), [("Int64", 2.0**63), ("UInt64", 2.0**64)])
+def test_no_double_beyond_64_bits_is_taken_for_the_end_of_the_range(fmi_type: str, beyond: float):
+    within = nextafter(beyond, 0.0)
+    assert are_of(fmi_type, np.array([0.0, within, beyond])).tolist() == [True, True, False]
