@@ -1,4 +1,4 @@
-"""Make the wheel that carries the FMUs of both kinds, and the compiled loop, for all platforms.
+"""Make the wheel that carries the native FMUs and the loop in C for all platforms, and Python's.
 
 `python tools/ready_wheel.py [--out DIR]` needs `pip install -e '.[native,test]'`. Where this wheel
 is installed, runs need no compiler and build nothing. `pip install .` makes a wheel without them.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -74,7 +75,7 @@ def write_wheel(folder: Path) -> Path:
     """Make the wheel.
 
     Raises:
-        OSError, InputError: it cannot be made; the text says why.
+        OSError, InputError, CalledProcessError: it cannot be made; the text says why.
 
     """
     with TemporaryDirectory() as temporary:
@@ -87,7 +88,7 @@ def write_wheel(folder: Path) -> Path:
         subprocess.run(command, check=True, env={**os.environ, "AUV_FMU_READY": str(ready)})
         [wheel] = wheels.iterdir()
         folder.mkdir(parents=True, exist_ok=True)
-        return Path(wheel.replace(folder / wheel.name))
+        return Path(shutil.move(wheel, folder / wheel.name))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -96,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR")
     try:
         print(write_wheel(parser.parse_args(arguments).out))
-    except (OSError, InputError) as error:
+    except (OSError, InputError, subprocess.CalledProcessError) as error:
         print(f"no wheel: {error}", file=sys.stderr)
         return 2
     return 0

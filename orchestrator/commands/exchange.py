@@ -97,8 +97,8 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         "table",
         type=Path,
         metavar="RESULT.csv|FILE.fmu",
-        help="table with a column `time`; or an FMU, any one's, whose experiments are made and "
-        "compared with the results that it carries, as FMI-LS-REF has them",
+        help="table with a column `time`; or an FMU from any tool: its experiments "
+        "(FMI-LS-REF) are run and compared with the results that it carries",
     )
     _add_scenario(parser)
     parser.add_argument(
@@ -176,7 +176,7 @@ def _hosts(options: argparse.Namespace) -> int:
     if unknown:
         raise InputError(f"no host {', '.join(sorted(unknown))}; there are {', '.join(HOSTS)}")
     system = load(options.scenario, options.kind, fmi=options.fmi)
-    hosts = options.host or [
+    hosts = (not options.all and options.host) or [
         name
         for name, host in HOSTS.items()
         if fmi_of(system) in host.fmi and (options.all or not host.pins)

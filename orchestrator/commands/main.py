@@ -40,7 +40,7 @@ COMMANDS = {
     "export": ("exchange", "write a scenario for other tools"),
     "release": ("exchange", "write the archives of a release: every FMU, for all platforms"),
     "hosts": ("exchange", "run a scenario in other co-simulation tools"),
-    "verify": ("exchange", "compare a table from another tool with ours"),
+    "verify": ("exchange", "check a table from another tool, or an FMU by the results it carries"),
 }  # fmt: skip
 
 

@@ -230,7 +230,7 @@ class Carried:
         plan = make_plan(system, Experiment(stop, step, start_time=start))
         simulate_to_end(plan, [table], hooks=hooks)
         _note_unknown(expected, "the table of results", findings)
-        return f"{comparison(table, self._component, expected, tolerance)} ({whose})"
+        return f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"
 
     @staticmethod
     def _settings(element: Element) -> Element:

@@ -95,7 +95,9 @@ def _value(text: str, variable: ModelVariable, where: str) -> float | str:
     return finite(number, where)
 
 
-def comparison(table: Table, component: Component, expected: Series, tolerance: float) -> str:
+def comparison(
+    table: Table, component: Component, expected: Series, tolerance: float, stop_time: float
+) -> str:
     """Compare results with those that are expected, and say how they agree.
 
     A Real may differ by the tolerance, times the larger of one and its largest magnitude. Between
@@ -103,7 +105,8 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
     the next row. Of several rows of one time the first counts.
 
     Raises:
-        InputError: they do not agree, or there is nothing to compare.
+        InputError: they do not agree, there is nothing to compare, or the run ended before the stop
+            time and before the expected results do.
 
     """
     if not expected.columns:
@@ -116,6 +119,8 @@ def comparison(table: Table, component: Component, expected: Series, tolerance: 
         raise InputError(
             f"its results have no row from t = {ours[0]:g} to {ours[-1]:g} s, where it is made"
         )
+    if (new & (times > ours[-1] + slack) & (times <= stop_time + slack)).any():
+        raise InputError(f"ended at t = {ours[-1]:g} s, before its results do")
     times = times[chosen]
     rows = np.searchsorted(ours, times + slack, side="right") - 1
     # Apart from rounding, most times are a row's.

@@ -246,6 +246,9 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
 
 
 def _best_fmus(fmi: str) -> Path:
+    if fmi != FMI_VERSIONS[0]:
+        # The Python kind has only the first.
+        return current_fmus(NATIVE, fmi)
     if found := _kept(key_of(NATIVE, fmi)):
         return found
     try:

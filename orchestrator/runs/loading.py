@@ -90,7 +90,7 @@ def load_scenario(
             OspSystemStructure.xml; an SSP and the latter may also be a folder.
         kind: of the bundle's FMUs: `python`, `native` or `auto`; FMUs that a file names are as
             they are.
-        fmi: their version of FMI. The master can step FMUs of the first only.
+        fmi: their version of FMI, `2` or `3`; the Python kind has only the first.
         variant: which of the descriptions in an SSP; None: the default.
         findings: takes what is wrong with it; None: harmless flaws are ignored.
 

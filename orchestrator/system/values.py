@@ -35,7 +35,7 @@ class Type(NamedTuple):
 
     @property
     def is_wide(self) -> bool:
-        """Whether it has integers that no double is."""
+        """Whether it has integers that a double cannot hold."""
         return self.family == "Integer" and self.most > EXACT
 
     @property
@@ -76,7 +76,7 @@ TYPES = {
 #: Up to here every integer is a double.
 EXACT = 2**53
 
-#: Numbers from the first on, so far apart, stand for integers that no double is: all are doubles,
+#: Numbers from the first on, so far apart, stand for integers that a double cannot hold: all are doubles,
 #: and none of FMI's integers is so large.
 _BEYOND, _APART = 2.0**65, 2.0**13
 
@@ -274,7 +274,7 @@ class StringTable:
     """Texts by their numbers, which they keep: the first is empty, and the next one takes the next.
 
     What FMUs say is not forgotten, so that a run in which one has a new text in every step takes
-    memory for all of them. Integers that no double is are kept like texts.
+    memory for all of them. Integers that a double cannot hold are kept like texts.
     """
 
     def __init__(self) -> None:
@@ -304,7 +304,7 @@ class StringTable:
         return self._texts[int(number)]
 
     def stand_in(self, value: Value) -> float:
-        """The number for a value in a row: itself, except for a text or where no double is it."""
+        """The number for a value in a row: itself, except for a text, or where a double cannot hold it."""
         if isinstance(value, str):
             return self.number(value)
         number = float(value)

@@ -84,7 +84,7 @@ def shape_of(content: Element) -> list[int]:
     except ValueError:
         raise ValueError("is an array of a size that is not stated") from None
     if any(length < 1 for length in shape) or prod(shape) > MOST_ELEMENTS:
-        raise ValueError(f"must have from 1 to {MOST_ELEMENTS:,} elements")
+        raise ValueError(f"is an array, which must have from 1 to {MOST_ELEMENTS:,} elements")
     return shape
 
 
