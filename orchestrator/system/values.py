@@ -76,8 +76,8 @@ TYPES = {
 #: Up to here every integer is a double.
 EXACT = 2**53
 
-#: Numbers from the first on, so far apart, stand for integers that a double cannot hold: all of them
-#: are doubles, and none of FMI's integers is so large.
+#: Numbers from the first on, so far apart, stand for integers that a double cannot hold: they
+#: are doubles themselves, and none of FMI's integers is so large.
 _BEYOND, _APART = 2.0**65, 2.0**13
 
 #: An FMU may keep a value in another unit, and round it by such a share.
