@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -138,7 +138,8 @@ def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkey
 def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
     """One that cannot be installed does not end the others."""
 
-    def python(pins: Sequence[str]) -> Path:
+    def python(pins: Sequence[str], told: Callable[[], object]) -> Path:
+        told()
         if pins == ["fmpy==1"]:
             raise InputError("no such version")
         return Path(sys.executable)

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.exchange.hosts import drivers, here
-from orchestrator.exchange.hosts.environments import folder_of, is_whole, python_with
+from orchestrator.exchange.hosts.environments import python_with
 from orchestrator.exchange.verify import ways
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
@@ -210,9 +210,8 @@ def _ran(
         raise InputError(f"does not run FMI {fmi}")
     python = Path(sys.executable)
     if host.pins:
-        if not is_whole(folder_of(host.pins)):
-            told(f"{label} is being installed into an environment of its own")
-        python = python_with(host.pins)
+        installing = f"{label} is being installed into an environment of its own"
+        python = python_with(host.pins, lambda: told(installing))
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as name:
         folder = Path(name)
         try:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import platform
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from hashlib import sha256
 from pathlib import Path
 from sysconfig import get_path
@@ -51,11 +51,12 @@ def is_whole(folder: Path) -> bool:
     return (folder / _WHOLE).is_file()
 
 
-def python_with(requirements: Sequence[str]) -> Path:
+def python_with(requirements: Sequence[str], told: Callable[[], object] = bool) -> Path:
     """The Python of the environment that has some packages, which is made if it is not there.
 
     Args:
         requirements: as pip has them.
+        told: called before it is made.
 
     Raises:
         InputError: it cannot be made.
@@ -67,6 +68,7 @@ def python_with(requirements: Sequence[str]) -> Path:
         folder.mkdir(0o700, exist_ok=True)
         with hold_lock(folder, wait=True):
             if not is_whole(folder):
+                told()
                 _run([sys.executable, "-I", "-m", "venv", "--clear", str(folder)])
                 _run([str(python), "-I", *_PIP, *requirements])
                 (folder / _WHOLE).touch()
