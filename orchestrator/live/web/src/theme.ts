@@ -12,9 +12,15 @@ export interface Palette {
   grid: Colour;
 }
 
+/** Values read since the theme last changed: charts ask often. */
+const known = new Map<string, string>();
+
 /** The value of a custom property, such as `--text`. */
 export function property(name: string): string {
-  return getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const found =
+    known.get(name) ?? getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  known.set(name, found);
+  return found;
 }
 
 function colour(name: string): Colour {
@@ -40,6 +46,7 @@ export function themeButton(button: HTMLButtonElement, changed: () => void): voi
   const say = () => {
     button.textContent = isDark() ? "Light" : "Dark";
     button.setAttribute("aria-label", isDark() ? "Light colours" : "Dark colours");
+    known.clear();
     changed();
   };
   button.addEventListener("click", () => {
