@@ -76,6 +76,13 @@ export class Field {
     element.classList.toggle("changed", value !== this.parameter.value);
   }
 
+  /** Marks it where a message names its parameter. */
+  refuse(message: string): boolean {
+    const isNamed = names(message, this.parameter.name);
+    this.invalid = isNamed ? message : "";
+    return isNamed;
+  }
+
   /** Why the value cannot be used; empty: it can. */
   set invalid(why: string) {
     this.element.setAttribute("aria-invalid", String(why !== ""));
@@ -118,7 +125,7 @@ export class SliderRow {
     this.#slider = document.createElement("input");
     this.#slider.type = "range";
     this.#slider.max = String(POSITIONS);
-    this.#slider.step = String(row.scale.whole ? POSITIONS / (row.scale.high - row.scale.low) : 10);
+    this.#slider.step = String(stepOf(row));
     this.#slider.setAttribute("aria-label", spoken);
     this.#slider.title = explained(parameter);
     this.#slider.dataset.names = row.names.join(" ");
@@ -141,8 +148,8 @@ export class SliderRow {
     this.root.append(head, this.#slider, ...(parameters.length > 1 ? [fields] : []), this.#error);
   }
 
-  show(valueOf: (name: string) => Value): void {
-    const values = this.fields.map(({ parameter }) => valueOf(parameter.name));
+  show(current: (parameter: Parameter) => Value): void {
+    const values = this.fields.map(({ parameter }) => current(parameter));
     this.fields.forEach((field, k) => {
       field.value = values[k];
     });
@@ -158,12 +165,10 @@ export class SliderRow {
   }
 
   /** Marks it where a message names one of its parameters. */
-  refuse(message: string): boolean {
-    const named = this.fields.filter(({ parameter }) => names(message, parameter.name));
-    for (const field of this.fields) field.invalid = named.includes(field) ? message : "";
-    this.#error.hidden = named.length === 0;
-    this.#error.textContent = named.length ? message : "";
-    return named.length > 0;
+  refuse(message: string): void {
+    const isNamed = this.fields.map((field) => field.refuse(message)).includes(true);
+    this.#error.hidden = !isNamed;
+    this.#error.textContent = isNamed ? message : "";
   }
 }
 

@@ -17,7 +17,8 @@ function printed(unit: string): string {
 function number(value: number | undefined): string {
   if (value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  const text = size >= 1e6 || (size > 0 && size < 1e-4) ? value.toExponential(3) : value.toPrecision(4);
+  const text =
+    size >= 1e6 || (size > 0 && size < 1e-4) ? value.toExponential(3) : value.toPrecision(4);
   // As the terminal prints them: four digits, and no zeros at the end.
   return String(Number(text)).replace("-", "−");
 }

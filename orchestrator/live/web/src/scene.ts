@@ -39,7 +39,7 @@ export interface Shown {
 const HALF = 0.3;
 
 /** Length of the drawn vehicle as a share of the largest extent of the paths, and times ell. */
-const SHARE = 0.14;
+const SHARE = 0.18;
 const LENGTH = 2;
 
 /** Numbers along an axis that are closer together than this are left out [px]. */
@@ -242,7 +242,7 @@ export class Scene {
     const [right, up, back] = eyeAxes(view);
     const aspect = width / height;
     // Room for the numbers around the box.
-    const distance = (1.13 * distanceFor(unit, view, HALF, aspect)) / zoom;
+    const distance = (1.06 * distanceFor(unit, view, HALF, aspect)) / zoom;
     this.#camera.position.set(back[0] * distance, back[1] * distance, back[2] * distance);
     this.#camera.lookAt([0, 0, 0]);
     const onScreen = (place: Vector): [number, number] => {
@@ -254,7 +254,8 @@ export class Scene {
         (0.5 - (0.5 * along(up)) / reach) * height,
       ];
     };
-    const { lines, labels } = grid(this.#box, axesOf(this.#shown.zUp), back, (a, b) =>
+    const pixel = (2 * distance * Math.tan(HALF)) / height / this.#scale;
+    const { lines, labels } = grid(this.#box, axesOf(this.#shown.zUp), back, pixel, (a, b) =>
       onScreen(a)[0] <= onScreen(b)[0] ? a : b,
     );
     this.#grid.place(lines.map((value, i) => (value - this.#middle[i % 3]) * this.#scale));
