@@ -16,7 +16,9 @@ async function bundle(entry, outfile, more) {
     logLevel: "warning",
     ...more,
   });
-  const found = Object.keys(metafile.inputs).map((path) => path.match(/node_modules\/((@[^/]+\/)?[^/]+)/)?.[1]);
+  const found = Object.keys(metafile.inputs).map(
+    (path) => path.match(/node_modules\/((@[^/]+\/)?[^/]+)/)?.[1],
+  );
   return found.filter((name) => name !== undefined);
 }
 
