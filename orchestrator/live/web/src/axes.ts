@@ -1,6 +1,6 @@
 // The box around a scene: grid lines on its far walls, and numbers along its near edges.
 
-import { type Box, ticks, type Vector } from "./space";
+import { type Box, extents, ticks, type Vector } from "./space";
 
 /** A number, or the title of an axis, at a place in the scene. */
 export interface Label {
@@ -55,7 +55,7 @@ export function grid(
   pixel: number,
   leftmost: (a: Vector, b: Vector) => Vector,
 ): Grid {
-  const largest = Math.max(...box.high.map((high, k) => high - box.low[k]));
+  const [largest] = extents(box);
   const near = back.map((b, k) => (b > 0 ? box.high[k] : box.low[k])) as Vector;
   const far = back.map((b, k) => (b > 0 ? box.low[k] : box.high[k])) as Vector;
   far[1] = box.low[1];

@@ -53,7 +53,7 @@ class Chart {
     this.root = document.createElement("figure");
     this.root.className = "chart";
     const caption = document.createElement("figcaption");
-    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">${panel.unit}</span></span>`;
+    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">[${panel.unit}]</span></span>`;
     const readout = document.createElement("span");
     readout.className = "readout";
     readout.setAttribute("aria-hidden", "true");

@@ -34,6 +34,8 @@ export function explained(parameter: Parameter): string {
 export class Field {
   readonly element: HTMLInputElement | HTMLSelectElement;
   readonly parameter: Parameter;
+  #shown: Value | undefined;
+  #wrong = "";
 
   constructor(parameter: Parameter, label: string, changed: Changed) {
     this.parameter = parameter;
@@ -56,6 +58,7 @@ export class Field {
     this.element.addEventListener("change", () => {
       const value = this.#entered();
       this.invalid = value === undefined ? `${name}: not a number` : "";
+      this.#shown = undefined;
       if (value !== undefined) changed({ [name]: value });
     });
   }
@@ -68,6 +71,9 @@ export class Field {
 
   set value(value: Value) {
     const { element } = this;
+    // Nearly all of them stay as they are while a slider moves.
+    if (value === this.#shown && !this.#wrong) return;
+    this.#shown = value;
     if (element instanceof HTMLInputElement && element.type === "checkbox") {
       element.checked = value === true;
     } else if (document.activeElement !== element || this.#entered() !== value) {
@@ -85,6 +91,8 @@ export class Field {
 
   /** Why the value cannot be used; empty: it can. */
   set invalid(why: string) {
+    if (why === this.#wrong) return;
+    this.#wrong = why;
     this.element.setAttribute("aria-invalid", String(why !== ""));
     this.element.title = why || explained(this.parameter);
   }

@@ -5,7 +5,7 @@ import { commandLine } from "./command";
 import { Controls } from "./controls";
 import { controlPoint, csv, metrics, Refusal } from "./engine";
 import { EventsForm } from "./events_form";
-import { fillIndices } from "./indices_table";
+import { IndicesTable } from "./indices_table";
 import { buildSwitches, fillLegend } from "./legend";
 import { fromHash, toHash } from "./link";
 import { interleaved, lines, type Shown, sections } from "./panels";
@@ -39,6 +39,7 @@ export class Page {
   readonly #charts: Charts;
   readonly #controls: Controls;
   readonly #events: EventsForm;
+  readonly #indices: IndicesTable;
   readonly #player: Player;
   readonly #scene: Scene | undefined;
   #settings: Settings;
@@ -78,6 +79,7 @@ export class Page {
       },
       (time) => this.#showTime(time),
     );
+    this.#indices = new IndicesTable(element("indices"), data.indices);
     this.#wire();
     themeButton(element("theme"), () => {
       this.#scene?.paint(palette());
@@ -272,9 +274,7 @@ export class Page {
       zUp: this.#preset.zUp,
     });
     fillLegend(element("legend"), this.#loops, hasReference);
-    fillIndices(
-      element("indices"),
-      this.#data.indices,
+    this.#indices.show(
       shown.flatMap((one, place) =>
         one ? [{ label: one.loop.label, place, metrics: metrics(one.result) }] : [],
       ),
