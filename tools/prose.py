@@ -222,7 +222,7 @@ def library_findings(text: str) -> Iterator[tuple[int, int, str]]:
 
 def quotation(text: str, begin: int, end: int) -> str:
     """A part of a text with up to four words before it and after it."""
-    before = re.search(r"(?:\S+\s+){0,4}\S*$", text[:begin])
+    before = re.search(r"(?:\S+\s+){0,4}\S*\Z", text[:begin])
     after = re.match(r"\S*(?:\s+\S+){0,4}", text[end:])
     assert before and after
     return " ".join(f"{before.group()}{text[begin:end]}{after.group()}".split())
