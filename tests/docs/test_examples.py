@@ -150,8 +150,9 @@ def test_modules_of_the_batch_engine_on_the_page_are_there():
     assert all(f":mod:`.{name}`" in str(orchestrator.studies.batch.__doc__) for name in listed)
 
 
-def test_page_of_studies_names_all_columns_options_and_ready_studies():
-    text = STUDIES.read_text(encoding="utf-8")
+def test_pages_of_studies_name_all_columns_options_and_ready_studies():
+    pages = (STUDIES, DOCS / "reference" / "study-files.md")
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
     for name in index_columns():
         assert f"`{name.split('.')[0].split('[')[0]}" in text, name
     for name in (*signature(sweep).parameters.keys() - {"study", "progress"}, *ready_studies()):
