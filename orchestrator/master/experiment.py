@@ -7,14 +7,16 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, gcd, isfinite, lcm, ulp
 from numbers import Real
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 
 #: Orders in which components are stepped; the first is the default.
-ORDERS = GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
+OrderName: TypeAlias = Literal["gauss-seidel", "jacobi"]
+ORDERS: tuple[OrderName, ...] = get_args(OrderName)
+GAUSS_SEIDEL, JACOBI = ORDERS
 
 #: One of these, or the names of all components, one stepped after the other.
 Order: TypeAlias = str | Sequence[str]
@@ -26,7 +28,9 @@ INITIAL = FULL, NONE, ZERO = "full", "none", "zero"
 
 #: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
 #: inputs that change linearly from one communication point to the next.
-COUPLINGS = SOLVE, DELAY, LINEAR = "solve", "delay", "linear"
+CouplingName: TypeAlias = Literal["solve", "delay", "linear"]
+COUPLINGS: tuple[CouplingName, ...] = get_args(CouplingName)
+SOLVE, DELAY, LINEAR = COUPLINGS
 
 #: A rest shorter than this share of the run, and of a step, is a rounding error.
 ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3

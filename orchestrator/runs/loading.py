@@ -10,7 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE
+from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
 from orchestrator.figures.run_figures import check_figure
 from orchestrator.formats.osp_and_container import OSP_STRUCTURE, read_osp
 from orchestrator.formats.ssp import STRUCTURE
@@ -31,9 +31,9 @@ T = TypeVar("T")
 
 def load(
     name: str | Path,
-    kind: str = AUTO,
+    kind: KindName = AUTO,
     *,
-    fmi: str = FMI_VERSIONS[0],
+    fmi: FmiVersion = FMI_VERSIONS[0],
     variant: str | None = None,
     strict: bool = False,
 ) -> System:

@@ -11,12 +11,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fmus.kinds import AUTO
+from fmus.kinds import AUTO, KindName
 from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.master.experiment import Order, format_order
+from orchestrator.master.experiment import CouplingName, OrderName, format_order
 from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import TABLE_FORMATS
+from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
 from orchestrator.master.observers.observer import Observer, Occurrence, Progress
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import lock_folder, make_folder, replace_files
@@ -152,7 +152,7 @@ class Result(Table):
     def save(
         self,
         folder: str | Path,
-        format: str = "csv",  # noqa: A002
+        format: TableFormat = "csv",  # noqa: A002
         *,
         force: bool = False,
     ) -> Path:
@@ -192,18 +192,18 @@ def simulate(
     *,
     stop_time: float | None = None,
     step: float | None = None,
-    order: Order | None = None,
-    kind: str = AUTO,
+    order: OrderName | list[str] | tuple[str, ...] | None = None,
+    kind: KindName = AUTO,
     progress: bool = False,
     isolate: bool = False,
     step_timeout: float | None = None,
-    loop: str = LOOPS[0],
+    loop: LoopName = LOOPS[0],
     variant: str | None = None,
     strict: bool = False,
     steps: Mapping[str, float] | None = None,
     events: Sequence[Mapping[str, Any]] | None = None,
     inputs: str | Path | None = None,
-    coupling: str | None = None,
+    coupling: CouplingName | None = None,
     checkpoint: str | Path | None = None,
     checkpoint_every: float | None = None,
     resume: bool = False,

@@ -7,14 +7,16 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import names_in, read_text
 from orchestrator.system.names import file_name
 
 #: What makes the runs; the first is the default.
-ENGINES = FMU, BATCH = "fmu", "batch"
+EngineName: TypeAlias = Literal["fmu", "batch"]
+ENGINES: tuple[EngineName, ...] = get_args(EngineName)
+FMU, BATCH = ENGINES
 
 #: How values that are not listed are spread between two ends.
 SPACINGS = LINEAR_SPACING, LOG_SPACING = "linear", "log"
