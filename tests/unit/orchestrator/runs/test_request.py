@@ -107,9 +107,9 @@ def test_every_keyword_arrives(monkeypatch):
         raise StopIteration
 
     monkeypatch.setattr(
-        "orchestrator.runs.result.load_scenario", lambda *_, **options: (None, None)
+        "orchestrator.runs.simulate.load_scenario", lambda *_, **options: (None, None)
     )
-    monkeypatch.setattr("orchestrator.runs.result.prepare", note)
+    monkeypatch.setattr("orchestrator.runs.simulate.prepare", note)
     monkeypatch.setattr("orchestrator.studies.sweep.complete_study", note)
     names = keywords(simulate).keys() - OF_SIMULATE - CHECKPOINTS
     given = {name: {name: name} for name in names}
