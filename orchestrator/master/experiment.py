@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, gcd, isfinite, lcm, ulp
 from numbers import Real
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from typing import Literal, NamedTuple, TypeAlias, cast, get_args
 
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
@@ -19,7 +19,7 @@ ORDERS: tuple[OrderName, ...] = get_args(OrderName)
 GAUSS_SEIDEL, JACOBI = ORDERS
 
 #: One of these, or the names of all components, one stepped after the other.
-Order: TypeAlias = str | Sequence[str]
+Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
 
 #: What components have at their inputs in the first step: outputs that were exchanged in
 #: initialisation mode, outputs that were exchanged after it, or start values and zeros. The first
@@ -44,7 +44,10 @@ _MOST_PARTS = 1000
 
 def read_order(text: str) -> Order:
     """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
-    return tuple(name.strip() for name in text.split(",")) if "," in text else text
+    if "," in text:
+        return tuple(name.strip() for name in text.split(","))
+    # Any other name is refused by the experiment.
+    return cast(OrderName, text)
 
 
 def format_order(order: Order) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from fmus.kinds import AUTO, KindName
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.experiment import CouplingName, OrderName
+from orchestrator.master.experiment import CouplingName, Order
 from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.master.loop import LOOPS, LoopName
 from orchestrator.master.observers.observer import Observer, Progress
@@ -70,7 +70,7 @@ def simulate(
     *,
     stop_time: float | None = None,
     step: float | None = None,
-    order: OrderName | list[str] | tuple[str, ...] | None = None,
+    order: Order | None = None,
     kind: KindName = AUTO,
     progress: bool = False,
     isolate: bool = False,

@@ -11,6 +11,7 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import names_in, read_text
+from orchestrator.master.experiment import OrderName
 from orchestrator.system.names import file_name
 
 #: What makes the runs; the first is the default.
@@ -109,7 +110,7 @@ class Study:
     engine: str = FMU
     stop_time: StopTime | None = None
     step: float | None = None
-    order: str | None = None
+    order: OrderName | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     sample: Sample | None = None

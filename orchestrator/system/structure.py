@@ -281,7 +281,7 @@ def paired(
 
     """
     if len(values) != len(ports):
-        raise InputError(f"{name}: {len(values)} values for {len(ports)} signals")
+        raise InputError(f"{name}: takes {len(ports)} values, not {len(values)}")
     return zip(ports, values, strict=True)
 
 
