@@ -98,8 +98,12 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
-    """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
-    names = [run.label for run in runs]
+    """What tells runs apart: labels, scenarios, a few parameters, or else the ends of paths."""
+    records = [read_record(table_in(path)) for path in paths]
+    labels = [str(record.get("label") or "") for record in records]
+    names = [
+        str(record.get("scenario") or run.label) for record, run in zip(records, runs, strict=True)
+    ]
     given = [run.result.header.parameters for run in runs]
     differing = [
         name
@@ -112,7 +116,7 @@ def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
     ]
     parts = [path.resolve().parts for path in paths]
     ends = [["/".join(part[-n:]) for part in parts] for n in range(1, max(map(len, parts)))]
-    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends]
+    candidates = [*([labels] * all(labels)), names, *([changes] * (len(differing) <= _FEW)), *ends]
     return next((labels for labels in candidates if len(set(labels)) == len(labels)), ends[0])
 
 
@@ -141,7 +145,11 @@ def _view(options: argparse.Namespace) -> int:
         raise InputError(f"{out}: write a .html")
     _warn(file)
     run = read_result(file)
-    title = str(read_record(file).get("title") or run.label)
+    record = read_record(file)
+    title = str(record.get("title") or run.label)
+    # A title may name all runs that a scenario compares; the page shows one.
+    if label := record.get("label"):
+        title += f" (shown: {label})"
     shown = list(_of_vehicles(run, out, title))
     try:
         pages = {file.name: view_page(heading, one) for one, file, heading in shown}
