@@ -1,6 +1,6 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-The build puts them as HTML into each FMU; `tools/pages.py` writes them into docs/components.
+The build puts them as HTML into each FMU; `tools/pages.py` writes them into components.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ raises `fault` as well. A refused get has no consequence, and fmi2GetReal also g
 Integers and Booleans.
 
 The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
-`docs/status.md` of the project."""
+`docs/reference/fmi-answers.md` of the project."""
 
 #: The place in a list of things that have members.
 _PLACE = re.compile(r"\[\d+\]\.")

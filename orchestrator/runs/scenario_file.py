@@ -1,4 +1,4 @@
-"""What a scenario file may hold; docs/scenarios.md and its JSON schema are made from this."""
+"""What a scenario file may hold; scenario-files.md and its JSON schema are made from this."""
 
 from __future__ import annotations
 

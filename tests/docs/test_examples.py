@@ -29,7 +29,14 @@ pytestmark = pytest.mark.usefixtures("workplace")
 
 ACCURACY, BATCH, EVENTS, PYTHON, SCENARIOS, STUDIES = (
     DOCS / f"{name}.md"
-    for name in ("accuracy", "batch", "events", "python", "scenarios", "studies")
+    for name in (
+        "explanation/accuracy",
+        "explanation/batch",
+        "how-to/events",
+        "how-to/python",
+        "reference/scenario-files",
+        "how-to/studies",
+    )
 )
 
 
@@ -85,7 +92,7 @@ def test_examples_in_python_print_what_the_page_says(workplace, capsys):
         if language == "text":
             assert printed == text
             continue
-        exec(compile(text, "docs/python.md", "exec"), names)
+        exec(compile(text, "docs/how-to/python.md", "exec"), names)
         printed = capsys.readouterr().out
     assert Path("commands.png").is_file()
     files = contents(workplace / "results/mine").keys()
