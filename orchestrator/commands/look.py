@@ -90,6 +90,7 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
+    runs = _named(runs, paths)
     tables = (run.result for run in runs)
     figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
     with _written([options.out], options.force) as folder:
@@ -98,12 +99,8 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
-    """What tells runs apart: labels, scenarios, a few parameters, or else the ends of paths."""
-    records = [read_record(table_in(path)) for path in paths]
-    labels = [str(record.get("label") or "") for record in records]
-    names = [
-        str(record.get("scenario") or run.label) for record, run in zip(records, runs, strict=True)
-    ]
+    """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
+    names = [run.label for run in runs]
     given = [run.result.header.parameters for run in runs]
     differing = [
         name
@@ -116,7 +113,7 @@ def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
     ]
     parts = [path.resolve().parts for path in paths]
     ends = [["/".join(part[-n:]) for part in parts] for n in range(1, max(map(len, parts)))]
-    candidates = [*([labels] * all(labels)), names, *([changes] * (len(differing) <= _FEW)), *ends]
+    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends]
     return next((labels for labels in candidates if len(set(labels)) == len(labels)), ends[0])
 
 
@@ -129,6 +126,18 @@ def _warn(table: Path) -> None:
     """Say of a result that is not what the run wrote."""
     for file in changed_files(table):
         say(f"warning: {file} was changed since the run wrote it")
+
+
+def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
+    """Runs by their labels, or by their scenarios if labels are missing or the same."""
+    records = [read_record(table_in(path)) for path in paths]
+    labels = {record.get("label") for record in records} - {"", None}
+    if len(labels) == len(runs):
+        return list(runs)
+    return [
+        run._replace(label=str(record.get("scenario") or run.label))
+        for run, record in zip(runs, records, strict=True)
+    ]
 
 
 def _is_there(text: str) -> bool:
