@@ -12,6 +12,7 @@ from orchestrator.commands.options import (
     add_options,
     add_set,
     add_system,
+    describe,
     read_system,
     request,
     status,
@@ -41,26 +42,42 @@ _PLOTS = (".png", ".svg", ".pdf")
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu plot`."""
+    describe(
+        parser,
+        "Draw signals of stored results over time. Several results are drawn over each other.",
+        "plot results/fig5 results/fig5/fig5-pd 'plant.y.*' --out y.png",
+    )
     parser.add_argument(
         "what",
         nargs="+",
         metavar="RESULT|PATTERN",
-        help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
-        "default patterns: errors, commands and estimates",
+        help="result folders or tables, and patterns of signals such as plant.y.*; default "
+        "patterns: errors, commands and estimates",
     )
-    _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    _add_file(parser, "picture to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu view`."""
-    parser.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
-    _add_file(parser, f"a .html; default: {VIEW} beside the table")
+    describe(
+        parser,
+        "Write one self-contained page that plays a stored result: the path in 3D, and signals "
+        "over time.",
+        "view results/fig4",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT", help="result folder or table")
+    _add_file(parser, f"page to write: .html; default: {VIEW} next to the table")
     parser.set_defaults(action=_view)
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
+    describe(
+        parser,
+        "Run a scenario and write a film of the vehicle with its errors and commands.",
+        "animate fig4 --out fig4.gif",
+    )
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
@@ -69,9 +86,9 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=FRAMES_PER_SECOND,
         metavar="N",
-        help=f"frames per second; default: {FRAMES_PER_SECOND}",
+        help=f"number of frames per second; default: {FRAMES_PER_SECOND}",
     )
-    _add_file(parser, "a .gif or .mp4; default: results/SCENARIO.gif")
+    _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
     parser.set_defaults(action=_animate)
 
 
