@@ -11,6 +11,7 @@ from orchestrator.commands.options import (
     add_options,
     add_set,
     add_system,
+    describe,
     read_system,
     request,
     status,
@@ -36,26 +37,42 @@ _PLOTS = (".png", ".svg", ".pdf")
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu plot`."""
+    describe(
+        parser,
+        "Draw signals of stored results over time. Several results are drawn over each other.",
+        "plot results/fig5 results/fig5/fig5-pd 'plant.y.*' --out y.png",
+    )
     parser.add_argument(
         "what",
         nargs="+",
         metavar="RESULT|PATTERN",
-        help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
-        "default patterns: errors, commands and estimates",
+        help="result folders or tables, and patterns of signals such as plant.y.*; default "
+        "patterns: errors, commands and estimates",
     )
-    _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    _add_file(parser, "picture to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu view`."""
-    parser.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
-    _add_file(parser, f"a .html; default: {VIEW} beside the table")
+    describe(
+        parser,
+        "Write one self-contained page that plays a stored result: the path in 3D, and signals "
+        "over time.",
+        "view results/fig4",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT", help="result folder or table")
+    _add_file(parser, f"page to write: .html; default: {VIEW} next to the table")
     parser.set_defaults(action=_view)
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
+    describe(
+        parser,
+        "Run a scenario and write a film of the vehicle with its errors and commands.",
+        "animate fig4 --out fig4.gif",
+    )
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
@@ -64,9 +81,9 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=FRAMES_PER_SECOND,
         metavar="N",
-        help=f"frames per second; default: {FRAMES_PER_SECOND}",
+        help=f"number of frames per second; default: {FRAMES_PER_SECOND}",
     )
-    _add_file(parser, "a .gif or .mp4; default: results/SCENARIO.gif")
+    _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
     parser.set_defaults(action=_animate)
 
 
@@ -85,6 +102,7 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
+    runs = _named(runs, paths)
     tables = (run.result for run in runs)
     figure = plot(list(zip(told_apart(runs, paths), tables, strict=True)), patterns)
     with _written([options.out], options.force) as folder:
@@ -96,6 +114,18 @@ def _warn(table: Path) -> None:
     """Say of a result that is not what the run wrote."""
     for file in changed_files(table):
         say(f"warning: {file} was changed since the run wrote it")
+
+
+def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
+    """Runs by their labels, or by their scenarios if labels are missing or the same."""
+    records = [read_record(table_in(path)) for path in paths]
+    labels = {record.get("label") for record in records} - {"", None}
+    if len(labels) == len(runs):
+        return list(runs)
+    return [
+        run._replace(label=str(record.get("scenario") or run.label))
+        for run, record in zip(runs, records, strict=True)
+    ]
 
 
 def _is_there(text: str) -> bool:
@@ -112,7 +142,11 @@ def _view(options: argparse.Namespace) -> int:
         raise InputError(f"{out}: write a .html")
     _warn(file)
     run = read_result(file)
-    title = str(read_record(file).get("title") or run.label)
+    record = read_record(file)
+    title = str(record.get("title") or run.label)
+    # A title may name all runs that a scenario compares; the page shows one.
+    if label := record.get("label"):
+        title += f" (shown: {label})"
     shown = list(_of_vehicles(run, out, title))
     try:
         pages = {file.name: view_page(heading, one) for one, file, heading in shown}

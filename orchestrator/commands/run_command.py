@@ -16,6 +16,7 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     add_system,
+    describe,
     from_options,
     read_system,
     request,
@@ -32,6 +33,12 @@ from orchestrator.runs.run import run_into
 
 def add_run(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu run`."""
+    describe(
+        parser,
+        "Run a scenario, a scenario file, an SSP or an FMU, and write its table, metrics and "
+        "figures. FMUs that are missing are built first.",
+        "run fig4 --stop-time 20 --set plant.noise.std=0",
+    )
     add_system(parser)
     add_options(parser, Request)
     add_set(parser)

@@ -18,6 +18,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, Panel, Rows
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import FIGURE_FORMATS, FIGURE_WIDTH, SETTINGS, Drawn, heading
@@ -116,6 +117,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
             width = columns // len(row)
             for j, panel in enumerate(row):
                 panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
+        list_events(figure, runs)
     return figure, [note for panel in panels for note in _left_out(panel, runs)]
 
 

@@ -68,8 +68,8 @@ class Means:
     engine: Annotated[
         EngineName | None,
         CliOption(
-            "what makes the runs: the FMUs, or the compiled equations, with the same numbers; "
-            "default: the study's own",
+            "engine that makes the runs: fmu (the FMUs) or batch (the compiled equations); both "
+            "give the same numbers; default: from the study",
             choices=ENGINES,
         ),
     ] = None
@@ -85,7 +85,9 @@ class Means:
     ] = None
     workers: Annotated[
         int | None,
-        CliOption("number of processes on this machine; default: its cores", type=int, metavar="N"),
+        CliOption(
+            "number of processes on this machine; default: one per core", type=int, metavar="N"
+        ),
     ] = None
     force: Force = False
 
