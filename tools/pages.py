@@ -2,11 +2,12 @@
 
 `python tools/pages.py` writes each file anew that is not as it would be written; a test holds them
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
-`<!-- / -->`, which this replaces. `docs/components` and `docs/schemas` are written whole.
+`<!-- / -->`, which this replaces. `docs/reference/components` and `docs/schemas` are written whole.
 
-The other tools compute what takes minutes, and print it: `accuracy.py` the tables of
-docs/accuracy.md, `study_numbers.py` and `best_gains.py` the numbers below the figures of
-docs/ready-studies.md. `study_pictures.py` draws those figures, `reference.py` writes `reference`.
+The other tools compute what takes minutes: `accuracy.py` prints the tables of
+docs/explanation/accuracy.md, `study_numbers.py` and `best_gains.py` the numbers below the figures
+of docs/explanation/ready-studies.md. `study_pictures.py` draws those figures, `benchmarks_page.py`
+fills in docs/reference/benchmarks.md, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
@@ -43,6 +44,7 @@ from orchestrator.vehicle.indices import INDICES, Index
 from orchestrator.vehicle.proof import stated
 
 DOCS = Path(__file__).parents[1] / "docs"
+COMPONENTS = DOCS / "reference" / "components"
 
 #: The pictures of the ready studies, below the folder of the pages, small.
 PICTURES = Path("images", "studies")
@@ -53,16 +55,17 @@ _PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)
 def files() -> dict[Path, str]:
     """The text of every file that this writes, as it is to be."""
     filled = {
-        "paper.md": paper(),
-        "ready-studies.md": {
+        "explanation/paper.md": paper(),
+        "explanation/ready-studies.md": {
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },
-        "scenarios.md": scenarios(),
-        "studies.md": studies(),
+        "reference/scenario-files.md": scenarios(),
+        "how-to/studies.md": {"ready": ready()},
+        "reference/study-files.md": studies(),
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
-        **{DOCS / "components" / f"{name}.md": component_page(name) for name in components()},
+        **{COMPONENTS / f"{name}.md": component_page(name) for name in components()},
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
     }
@@ -89,7 +92,7 @@ def filled_in(page: Path, values: Mapping[str, str]) -> str:
 
 
 def scenarios() -> dict[str, str]:
-    """Tables of docs/scenarios.md."""
+    """Tables of docs/reference/scenario-files.md."""
     wiring = read_wiring()
     drawn: dict[str, list[str]] = {kind: [] for kind in FIGURES}
     for name in names():
@@ -110,11 +113,15 @@ def scenarios() -> dict[str, str]:
     }
 
 
+def ready() -> str:
+    """The table of docs/how-to/studies.md."""
+    studies = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    return _table("`auv-fmu sweep`", "what it asks", rows=studies)
+
+
 def studies() -> dict[str, str]:
-    """Tables of docs/studies.md."""
-    ready = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    """Tables of docs/reference/study-files.md."""
     return {
-        "ready": _table("`auv-fmu sweep`", "what it asks", rows=ready),
         "entries": _entries(StudyFile),
         "figures": _entries(FigureTable),
         "indices": _table("index", "meaning", rows=map(_index, INDICES)),
@@ -130,7 +137,7 @@ def _index(index: Index) -> tuple[str, str]:
 
 def _section(study: Study) -> str:
     pictures = (
-        f"![{study.title}: {figure}]({(PICTURES / f'{study.name}-{figure}.png').as_posix()})"
+        f"![{study.title}: {figure}]({('..' / PICTURES / f'{study.name}-{figure}.png').as_posix()})"
         for figure in study.figures
         if figure != LABELS
     )
@@ -182,7 +189,7 @@ def of_the_paper() -> Theorem:
 
 
 def paper() -> dict[str, str]:
-    """Numbers of docs/paper.md."""
+    """Numbers of docs/explanation/paper.md."""
     vehicle, found = Vehicle(), of_the_paper()
     first, second, third = found.conditions
     k, there = coupling(vehicle, ELL), found.bounds.lambda_d2

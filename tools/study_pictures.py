@@ -1,4 +1,4 @@
-"""The pictures of docs/ready-studies.md: `python tools/study_pictures.py results/noise ...`.
+"""The pictures of ready-studies.md: `python tools/study_pictures.py results/noise ...`.
 
 Draws the figures of the ready studies that were made in these folders once more, smaller and in all
 their colours: a palette would take colours out of their scales.

@@ -1,7 +1,7 @@
 """What others have made, in our master: `python benchmarks/foreign FOLDER`.
 
 Collects public FMUs and SSP archives into FOLDER, runs each of them, holds what runs against
-libcosim, ecos and a plain host of its own, and writes docs/foreign.md. FMUs are programs of
+libcosim, ecos and a plain host of its own, and writes tested-fmus.md. FMUs are programs of
 others, and run here with the rights of who starts this. `pip install libcosimpy ecospy tbb`
 installs what systems are compared with.
 """
@@ -19,7 +19,7 @@ from compare import compared
 from page import page
 
 #: The page that is written.
-PAGE = Path(__file__).parents[2] / "docs" / "foreign.md"
+PAGE = Path(__file__).parents[2] / "docs" / "reference" / "tested-fmus.md"
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""docs/foreign.md from what came of every file."""
+"""docs/reference/tested-fmus.md from what came of every file."""
 
 from __future__ import annotations
 

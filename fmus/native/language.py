@@ -1,6 +1,6 @@
 """The language of equations: the part of Python that every kind of FMU can run.
 
-`docs/language.md` describes it for readers; this module finds code outside it.
+`docs/explanation/language.md` describes it for readers; this module finds code outside it.
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 Each public function of a behaviour is one of the :class:`Hooks`. It takes the hook's
 arguments that it needs, under their names and in any order; functions that only the behaviour
-itself calls begin with an underscore. All of it is in the language of equations (docs/language.md),
+itself calls begin with an underscore. All of it is in the language of equations (language.md),
 because the C kind runs its translation.
 """
 

@@ -24,12 +24,12 @@ _TEMPLATE = Path(__file__).with_name("report.html")
 _MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 #: Where the pages are: with the package that was built, or in the repository.
-_FOLDERS = Path(__file__).with_name("pages"), Path(__file__).parents[2] / "docs"
+_FOLDERS = Path(__file__).with_name("pages"), Path(__file__).parents[2] / "docs" / "explanation"
 
 #: Where links between pages lead in the report, which has no others.
 _ANCHORS = {"paper.md": "#what-is-wrong-in-the-paper", "readings.md": "#readings"}
 
-_LINK = re.compile(r"\[([^\]]+)\]\(([\w/-]+\.md)(?:#[\w-]+)?\)")
+_LINK = re.compile(r"\[([^\]]+)\]\(([\w./-]+\.md)(?:#[\w-]+)?\)")
 _FILLED = re.compile(r"<!-- (?:filled: \w+|/) -->")
 _READING = re.compile(r"^#+ Reading (\d+)$", re.MULTILINE)
 

@@ -45,7 +45,7 @@ The conditions are sufficient, and Remark 4 calls them conservative: a run may w
 where they are violated. The zetas of (26) and (29) are known from below only, by states of a level
 vehicle. C_2 has a pole at the vertical, so that no finite zetas hold at all attitudes: open means
 that a condition may hold for pitches that keep off it. The report has the proofs, under "What is
-wrong in the paper"; so has docs/paper.md."""
+wrong in the paper"; so has docs/explanation/paper.md."""
 
 _PAPER = """\
 These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""

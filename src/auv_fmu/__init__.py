@@ -26,7 +26,7 @@ module                      what it states
 ==========================  ==========================================================
 
 The functions take and return Python floats and tuples and import nothing but the standard
-library, because they run inside FMUs in hosts that may have no numpy. `docs/architecture.md`
+library, because they run inside FMUs in hosts that may have no numpy. `architecture.md`
 says why that form was chosen, with the measurements. Only `proof.control_point_model`,
 which never runs inside an FMU, uses numpy.
 

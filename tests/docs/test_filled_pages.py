@@ -40,7 +40,7 @@ def validator(kind: str) -> Draft202012Validator:
 def ready(kind: str) -> list[str]:
     """The files that come with the program, and those of the page."""
     folder = {"scenario": scenario.SCENARIOS_FOLDER, "study": study.STUDIES_FOLDER}[kind]
-    page = DOCS / {"scenario": "scenarios.md", "study": "studies.md"}[kind]
+    page = DOCS / {"scenario": "reference/scenario-files.md", "study": "how-to/studies.md"}[kind]
     files = [file.read_text(encoding="utf-8") for file in folder.glob("*.toml")]
     return [*files, *(block.text for block in blocks(page, "toml"))]
 

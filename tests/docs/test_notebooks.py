@@ -13,7 +13,7 @@ nbclient = pytest.importorskip("nbclient", reason="needs the extra `docs`")
 pytest.importorskip("ipykernel", reason="needs the extra `docs`")
 pytest.importorskip("pandas", reason="needs the extra `docs`")
 
-NOTEBOOKS = sorted((DOCS / "notebooks").glob("*.ipynb"))
+NOTEBOOKS = sorted((DOCS / "tutorials").glob("*.ipynb"))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

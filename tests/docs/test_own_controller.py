@@ -26,11 +26,13 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("guide")
     with pytest.MonkeyPatch.context() as here:
         here.chdir(folder)
-        for language, text in blocks(DOCS / "own-controller.md", "sh", "diff", "python"):
+        for language, text in blocks(
+            DOCS / "tutorials" / "your-own-controller.md", "sh", "diff", "python"
+        ):
             if language == "diff":
                 patch(folder, text)
             elif language == "python":
-                exec(compile(text, "docs/own-controller.md", "exec"), {})
+                exec(compile(text, "docs/tutorials/your-own-controller.md", "exec"), {})
             for line in text.splitlines() if language == "sh" else ():
                 refused, _, arguments = line.rpartition("auv-fmu ")
                 assert bool(main(shlex.split(arguments))) == (refused == "! "), line

@@ -22,7 +22,7 @@ from orchestrator.vehicle.proof import gain_check, stated, theorem_of
 from support.markdown import DOCS, sections
 from support.texts import tells
 
-PAGE, PROMISES = DOCS / "paper.md", DOCS / "promises.md"
+PAGE, PROMISES = DOCS / "explanation" / "paper.md", DOCS / "reference" / "promises.md"
 TITLE = "What is wrong in the paper"
 QUIET = PAPER._replace(plant=plant.Parameters(noise=plant.Localisation(std=0.0)))
 

@@ -1,4 +1,4 @@
-"""docs/ready-studies.md: as the studies' files say, with a picture for each figure and no other."""
+"""ready-studies.md: as the studies' files say, with a picture for each figure and no other."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from orchestrator.vehicle.indices import index_columns
 from pages import PICTURES
 from support.markdown import DOCS
 
-PAGE = DOCS / "ready-studies.md"
+PAGE = DOCS / "explanation" / "ready-studies.md"
 
 
 def test_every_picture_is_on_the_page_in_all_its_colours_and_small():
-    named = set(re.findall(r"\((images/[^)]+)\)", PAGE.read_text(encoding="utf-8")))
+    named = set(re.findall(r"\(../(images/[^)]+)\)", PAGE.read_text(encoding="utf-8")))
     files = [*(DOCS / PICTURES).iterdir()]
     assert named == {file.relative_to(DOCS).as_posix() for file in files}
     assert all(file.stat().st_size < 300_000 for file in files)

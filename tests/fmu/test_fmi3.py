@@ -181,7 +181,7 @@ def test_functions_have_a_prefix_where_it_is_asked_for(unpacked: Path, tmp_path:
     assert all(hasattr(prefixed, f"AuvPlant_{name}") for name in FUNCTIONS)
 
 
-# docs/status.md
+# docs/reference/fmi-answers.md
 
 
 def call(host: Host, function: str, *arguments: Any) -> Status:

@@ -1,6 +1,6 @@
 """What no slave can be told: wrong pointers, dead handles, text that is none, FMUs without a slave.
 
-None of it may end the host. Each test is one class of mistakes beside those of docs/status.md, on
+None of it may end the host. Each test is one class of mistakes beside those of fmi-answers.md, on
 one small FMU of each kind: the guard is the loader's or the runtime's, and the same for all FMUs.
 """
 
@@ -260,7 +260,7 @@ ARRAYS = {"Real": (c_double * 2)(), "Integer": (c_int * 2)(), "Boolean": (c_int 
           "String": STRINGS}  # fmt: skip
 TOO_MANY = c_size_t(2**31)
 
-#: Function, and arguments that cannot be forwarded, beside those of docs/status.md.
+#: Function, and arguments that cannot be forwarded, beside those of docs/reference/fmi-answers.md.
 WRONG = [
     *(
         (f"{verb}{kind}", (ONE, n, values))

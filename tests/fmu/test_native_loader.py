@@ -170,7 +170,7 @@ def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path,
 @needs_libpython
 @pytest.mark.xfail(reason="PythonFMU's own start of Python takes no lock that others could take")
 def test_threads_with_fmus_that_have_no_loader(tmp_path: Path):
-    """What docs/hosts/c-program.md warns of."""
+    """What docs/how-to/hosts/c-program.md warns of."""
     bundle.build_bundle(tmp_path, "plain")
     program = host(tmp_path, "threads")
     arguments = unpacked(tmp_path, tmp_path / "plain")[:4]

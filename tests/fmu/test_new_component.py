@@ -31,7 +31,7 @@ TESTS = (
     "tests/fmu/test_built_fmu.py",
     "tests/unit/fmus/native/test_translator.py",
 )
-READ = ("tests/support", "tests/fuzz", "docs/status.md", "pyproject.toml", *TESTS)
+READ = ("tests/support", "tests/fuzz", "docs/reference/fmi-answers.md", "pyproject.toml", *TESTS)
 
 _CONFTEST = """\
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""docs/status.md, cell by cell, for each FMU as a C program would call it."""
+"""docs/reference/fmi-answers.md, cell by cell, for each FMU as a C program would call it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The FMI 2.0 state machine of one instance, as docs/status.md says it, and nothing beyond."""
+"""The FMI 2.0 state machine of one instance, as fmi-answers.md says it, and nothing beyond."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
     PYTHONPATH=tests python -m fuzz.sequences --fmus fmus/dist --runs 10000
 
-Sequences come out of seeds and are held against the model that is made from docs/status.md, and
+Sequences come out of seeds and are held against the model that is made from fmi-answers.md, and
 against a second instance that gets the good calls alone; with `--twin`, against FMUs of the other
 kind. FMUs are native code, so everything runs in processes of its own; what makes one crash, hang
 or answer otherwise is shrunk by playing shorter sequences again, and printed as calls.

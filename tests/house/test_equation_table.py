@@ -1,4 +1,4 @@
-"""docs/equations.md: complete, and true to the code."""
+"""docs/reference/equations.md: complete, and true to the code."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import auv_fmu
 from fmus.discovery import components
 
 TESTS = Path(__file__).parents[1]
-PAGE = (TESTS.parent / "docs" / "equations.md").read_text(encoding="utf-8")
+PAGE = (TESTS.parent / "docs" / "reference" / "equations.md").read_text(encoding="utf-8")
 
 
 def table(heading: str) -> list[list[str]]:

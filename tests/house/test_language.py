@@ -1,4 +1,4 @@
-"""The equations keep to the language that every kind of FMU can run: docs/language.md."""
+"""The equations keep to the language that every kind of FMU can run: language.md."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_what_stands_outside_is_there():
 
 
 def test_page_names_the_functions_and_what_stands_outside():
-    page = (ROOT / "docs/language.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs/explanation/language.md").read_text(encoding="utf-8")
     assert set(re.findall(r"`math\.(\w+)`", page)) == MATHEMATICS | {"hypot"}
     assert all(f"`{name}`" in page for name in OUTSIDE)
 

@@ -23,7 +23,7 @@ def functions(file: str) -> set[str]:
 
 def promises() -> list[str]:
     """The rows of the tables of promises."""
-    text = (ROOT / "docs" / "promises.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "reference" / "promises.md").read_text(encoding="utf-8")
     rows = [line for line in text.splitlines() if line.startswith("| ")]
     return [row for row in rows if row != "| promise | held by |"]
 
@@ -58,7 +58,7 @@ def has_test(module: str) -> bool:
 
 def excused() -> Iterator[tuple[str, set[str]]]:
     """What the page on tests names as modules without one: patterns, and what they match."""
-    page = (ROOT / "docs" / "testing.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "contributing" / "testing.md").read_text(encoding="utf-8")
     _, _, section = page.partition("\n## Modules without a test of their own\n")
     rows = re.findall(r"^\| (`.+?) \|", section.partition("\n## ")[0], re.MULTILINE)
     for pattern in re.findall("`(.+?)`", " ".join(rows)):

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-GLOSSARY = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+GLOSSARY = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8")
 TERMS = re.findall(r"^\| (.+?) \| (.+?) \| `([\w./-]+)`(?: `(\w+)`)? \|$", GLOSSARY, re.MULTILINE)
 RETIRED = re.findall(r"^\| `(\w+)` \| .+ \|$", GLOSSARY, re.MULTILINE)
 

@@ -1,4 +1,4 @@
-"""The calls of docs/status.md: with which arguments each is made, and how it is made.
+"""The calls of fmi-answers.md: with which arguments each is made, and how it is made.
 
 A call is data: it can be printed, pickled, and made again on any instance of the same FMU. States
 are named by slots, so that it does not matter where they lie in memory.

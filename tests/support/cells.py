@@ -1,4 +1,4 @@
-"""One cell of docs/status.md held against an FMU: the call, what it changes, what comes after."""
+"""One cell of fmi-answers.md held against an FMU: the call, what it changes, what comes after."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """An FMU of FMI 3.0 behind the functions of FMI 2.0.
 
-Most of what docs/status.md says holds under the names of both versions; so what is tried on an FMU
+Most of what fmi-answers.md says holds under the names of both versions; so what is tried on an FMU
 of FMI 2.0 is tried on one of FMI 3.0 by the same tests.
 """
 

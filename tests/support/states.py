@@ -300,7 +300,7 @@ def mutant(content: bytes, random: Random, lenders: Sequence[Json] = ()) -> Muta
     return Mutant(changed, what if fits else f"{what}; the checksum as it was")
 
 
-# What the cases of docs/status.md need
+# What the cases of docs/reference/fmi-answers.md need
 
 
 def _impossible(content: bytes, random: Random) -> bytes:

@@ -1,4 +1,4 @@
-"""docs/status.md, read: what an FMU answers to each call in each state."""
+"""docs/reference/fmi-answers.md, read: what an FMU answers to each call in each state."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 from fmus.kinds import NATIVE, PYTHON
 from support.markdown import DOCS, Section, sections
 
-PAGE = DOCS / "status.md"
+PAGE = DOCS / "reference" / "fmi-answers.md"
 
 #: Columns of the tables of calls.
 MODES = ("instantiated", "initialising", "stepping", "terminated")

@@ -1,4 +1,4 @@
-"""The cells of docs/status.md, tried in a process that may crash."""
+"""The cells of docs/reference/fmi-answers.md, tried in a process that may crash."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def test_both_follow_the_reference_of_the_scenario(workplace, text):
 
 
 def test_both_follow_the_same_reference_in_the_example_of_the_guide(workplace):
-    example = next(block.text for block in blocks(DOCS / "events.md", "toml"))
+    example = next(block.text for block in blocks(DOCS / "how-to" / "events.md", "toml"))
     ours, theirs = runs_of(example.replace("stop_time = 40.0\n", ""), 12.0)
     assert ours["planner.y_d.z"][0] == -2.0
     assert np.array_equal(ours.group(*STANDARD.y_d), theirs.group(*STANDARD.y_d))

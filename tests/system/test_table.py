@@ -19,7 +19,7 @@ from support.runs import InThisProcess
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
 
-PAGE = Path(__file__).parents[2] / "docs" / "table.md"
+PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "table.md"
 
 #: The first two options of these, and ours of all others.
 TRIED = ("eps_t of the proposed controller", "order")

@@ -7,7 +7,7 @@
  *     if (GOES_ON(this, NULL)) terminate(&this);
  *     return end(&this);
  *
- * docs/status.md says how each call is answered.
+ * docs/reference/fmi-answers.md says how each call is answered.
  */
 #ifndef COMPONENT_H
 #define COMPONENT_H
