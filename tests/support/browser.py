@@ -1,4 +1,4 @@
-"""Chromium without a window, asked over two pipes: the protocol of its developer tools."""
+"""Chromium without a window, asked through a pipe: pages are opened, and expressions evaluated."""
 
 from __future__ import annotations
 
@@ -6,7 +6,6 @@ import fcntl
 import json
 import os
 import subprocess
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,166 +14,106 @@ from typing import Any
 
 BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")
 
-#: How long an answer, or something that is waited for, may take [s].
-_PATIENCE = 90.0
+#: Nothing of it asks the network for anything.
+_OPTIONS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--remote-debugging-pipe",
+)  # fmt: skip
 
-#: Free numbers of files are looked for from here on: the browser wants 3 and 4.
-_FREE = 10
-
-_KEYS = {"ArrowRight": 39, "ArrowLeft": 37, "Tab": 9, "Enter": 13, " ": 32, "End": 35}
-
-_BAD = ("error", "warning", "assert")
-
-_SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+#: Where Chromium reads and writes what is said by its protocol.
+_READS, _WRITES = 3, 4
 
 
 class Browser:
-    """A browser, and what it has said."""
+    """A running browser, and one page in it.
 
-    def __init__(self, process: subprocess.Popen[bytes], to: int, back: int) -> None:
-        """Take a started browser with the two ends of its pipes."""
-        self._process, self._to, self._back = process, to, back
-        self._number, self._rest = 0, b""
-        self.events: list[dict[str, Any]] = []
+    Attributes:
+        said: errors of the page, and what it has written on its console.
+        requests: addresses of what it has fetched.
 
-    def ask(self, method: str, session: str = "", **parameters: Any) -> dict[str, Any]:
-        """The answer to a command."""
-        self._number += 1
-        message: dict[str, Any] = {"id": self._number, "method": method, "params": parameters}
-        if session:
-            message["sessionId"] = session
-        os.write(self._to, json.dumps(message).encode() + b"\0")
+    """
+
+    def __init__(self, commands: int, answers: int) -> None:
+        self._commands, self._answers = commands, answers
+        self._rest, self._n = b"", 0
+        self._session: str | None = None
+        self.said: list[str] = []
+        self.requests: list[str] = []
+        made = self.call("Target.createTarget", url="about:blank")
+        found = self.call("Target.attachToTarget", targetId=made["targetId"], flatten=True)
+        self._session = found["sessionId"]
+        for domain in ("Page", "Runtime", "Network"):
+            self.call(f"{domain}.enable")
+
+    def call(self, method: str, **parameters: Any) -> Any:
+        """Call a method of the protocol, and give its result."""
+        self._n += 1
+        message = {"id": self._n, "method": method, "params": parameters}
+        if self._session:
+            message["sessionId"] = self._session
+        content = json.dumps(message).encode() + b"\0"
+        while content:
+            content = content[os.write(self._commands, content) :]
         while True:
-            found = self._next()
-            if found.get("id") == self._number:
-                if "error" in found:
-                    raise AssertionError(f"{method}: {found['error']['message']}")
-                answer: dict[str, Any] = found["result"]
-                return answer
-            self.events.append(found)
+            answer = self._heard()
+            if answer.get("id") == self._n:
+                assert "error" not in answer, answer["error"]
+                return answer["result"]
 
-    def _next(self) -> dict[str, Any]:
-        while b"\0" not in self._rest:
-            read = os.read(self._back, 1 << 20)
-            if not read:
-                raise AssertionError("the browser has ended")
-            self._rest += read
-        first, _, self._rest = self._rest.partition(b"\0")
-        found: dict[str, Any] = json.loads(first)
-        return found
+    def open(self, page: Path) -> None:
+        """Open a file, and wait until all of it is there."""
+        self.requests.clear()
+        self.call("Page.navigate", url=page.as_uri())
+        while self._heard().get("method") != "Page.loadEventFired":
+            pass
 
-    def open(self, address: str, width: int = 1280, height: int = 900) -> Tab:
-        """A new tab that shows a page."""
-        target = self.ask("Target.createTarget", url="about:blank")["targetId"]
-        session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
-        tab = Tab(self, session)
-        for domain in ("Page", "Runtime", "Log", "Network"):
-            tab.ask(f"{domain}.enable")
-        tab.resize(width, height)
-        tab.ask("Page.navigate", url=address)
-        tab.wait("document.readyState === 'complete'")
-        return tab
-
-
-class Tab:
-    """A page in a browser."""
-
-    def __init__(self, browser: Browser, session: str) -> None:
-        """Take a session of a browser."""
-        self._browser, self._session = browser, session
-
-    def ask(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """The answer to a command for this page."""
-        return self._browser.ask(method, self._session, **parameters)
-
-    def run(self, script: str) -> Any:
-        """The value of an expression in the page; promises are waited for."""
-        found = self.ask(
-            "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True
+    def evaluate(self, expression: str) -> Any:
+        """The value of an expression, or what its promise comes to."""
+        result = self.call(
+            "Runtime.evaluate", expression=expression, awaitPromise=True, returnByValue=True
         )
-        if "exceptionDetails" in found:
-            raise AssertionError(found["exceptionDetails"]["exception"]["description"])
-        return found["result"].get("value")
+        assert "exceptionDetails" not in result, result["exceptionDetails"]
+        return result["result"].get("value")
 
-    def wait(self, script: str) -> None:
-        """Wait until an expression is true."""
-        end = time.monotonic() + _PATIENCE
-        while not self.run(script):
-            if time.monotonic() > end:
-                raise AssertionError(f"never true: {script}")
-            time.sleep(0.05)
-
-    def press(self, key: str) -> None:
-        """Press and release a key."""
-        code = {"key": key, "code": "Space" if key == " " else key}
-        number = {"windowsVirtualKeyCode": _KEYS[key]}
-        text = {"text": key} if key == " " else {}
-        self.ask("Input.dispatchKeyEvent", type="keyDown", **code, **number, **text)
-        self.ask("Input.dispatchKeyEvent", type="keyUp", **code, **number)
-
-    def type(self, text: str) -> None:
-        """Replace what is in the field that has the focus."""
-        self.run("document.activeElement.select()")
-        self.ask("Input.insertText", text=text)
-        self.press("Enter")
-
-    def resize(self, width: int, height: int) -> None:
-        """Give the page another size, in pixels of its style sheet."""
-        self.ask(
-            "Emulation.setDeviceMetricsOverride",
-            width=width, height=height, deviceScaleFactor=1, mobile=width < 500,
-        )  # fmt: skip
-
-    def prefer(self, scheme: str) -> None:
-        """Let the system ask for `light` or `dark`."""
-        feature = {"name": "prefers-color-scheme", "value": scheme}
-        self.ask("Emulation.setEmulatedMedia", features=[feature])
-
-    def complaints(self) -> list[str]:
-        """Errors of the page, and addresses that it has asked for over the network."""
-        self.run("0")
-        return list(self._complaints())
-
-    def _complaints(self) -> Iterator[str]:
-        for event in self._browser.events:
-            if event.get("sessionId") != self._session:
-                continue
-            method, parameters = event["method"], event["params"]
-            if method == "Runtime.exceptionThrown":
-                yield str(parameters["exceptionDetails"])
-            elif method == "Runtime.consoleAPICalled" and parameters["type"] in (
-                "error",
-                "warning",
-            ):
-                yield str(parameters["args"])
-            elif method == "Log.entryAdded" and parameters["entry"]["level"] == "error":
-                yield str(parameters["entry"])
-            elif method == "Network.requestWillBeSent":
-                address = parameters["request"]["url"]
-                if not address.startswith(("file:", "blob:", "data:")):
-                    yield address
+    def _heard(self) -> dict[str, Any]:
+        while b"\0" not in self._rest:
+            content = os.read(self._answers, 1 << 20)
+            assert content, "the browser has ended"
+            self._rest += content
+        text, _, self._rest = self._rest.partition(b"\0")
+        message: dict[str, Any] = json.loads(text)
+        match message.get("method"):
+            case "Runtime.exceptionThrown" | "Runtime.consoleAPICalled" as method:
+                self.said.append(f"{method}: {message['params']}")
+            case "Network.requestWillBeSent":
+                self.requests.append(message["params"]["request"]["url"])
+        return message
 
 
 @contextmanager
-def browsing(profile: Path, options: tuple[str, ...] = _SOFTWARE_GL) -> Iterator[Browser]:
-    """A browser with an empty profile."""
-    theirs_in, to = os.pipe()
-    back, theirs_out = os.pipe()
-    ends = [fcntl.fcntl(one, fcntl.F_DUPFD, _FREE) for one in (theirs_in, theirs_out)]
+def browser(profile: Path, *options: str) -> Iterator[Browser]:
+    """A browser with a profile and options of its own, ended at the end."""
+    reads, commands = os.pipe()
+    answers, writes = os.pipe()
+
+    def take_places() -> None:
+        # Neither may be where the other is to go.
+        above = [fcntl.fcntl(end, fcntl.F_DUPFD, _WRITES + 1) for end in (reads, writes)]
+        for end, place in zip(above, (_READS, _WRITES), strict=True):
+            os.dup2(end, place)
+
     process = subprocess.Popen(
-        [
-            "bash", "-c", f'exec "$@" 3<&{ends[0]} 4>&{ends[1]}', "-", str(BROWSER),
-            "--headless", "--no-sandbox", "--no-first-run", "--remote-debugging-pipe",
-            f"--user-data-dir={profile}", *options,
-        ],
-        pass_fds=ends, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+        [str(BROWSER), *_OPTIONS, *options, f"--user-data-dir={profile}"],
+        stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, close_fds=False,
+        preexec_fn=take_places,  # noqa: PLW1509
     )  # fmt: skip
-    for one in (theirs_in, theirs_out, *ends):
-        os.close(one)
     try:
-        yield Browser(process, to, back)
+        os.close(reads)
+        os.close(writes)
+        yield Browser(commands, answers)
     finally:
-        process.kill()
-        process.wait()
-        os.close(to)
-        os.close(back)
+        process.terminate()
+        process.wait(timeout=20)
+        os.close(commands)
+        os.close(answers)

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from support.browser import BROWSER, Browser, Tab, browsing
+from support.browser import BROWSER, Browser, browser
 
 #: Rows of the page and of the native FMUs: different machines add with different roundings.
 TOLERANCE = 1e-9
@@ -33,6 +34,63 @@ SLIDER = "document.querySelector('input[data-names=\"controller.eps_t\"]')"
 TABLE = "document.getElementById('indices').innerText"
 CSV = "auvfmu.csv()"
 
+#: WebGL without a graphics card.
+SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+#: How long something that is waited for may take [s].
+PATIENCE = 90.0
+
+KEYS = {"ArrowRight": 39, "Enter": 13, " ": 32}
+
+
+class Live:
+    """The page, and what a user does with it."""
+
+    def __init__(self, shown: Browser) -> None:
+        self._shown = shown
+        self.run = shown.evaluate
+        self.call = shown.call
+
+    def wait(self, script: str) -> None:
+        """Wait until an expression is true."""
+        end = time.monotonic() + PATIENCE
+        while not self.run(script):
+            assert time.monotonic() < end, f"never true: {script}"
+            time.sleep(0.05)
+
+    def start(self) -> None:
+        """Wait for the first run."""
+        self.wait("document.readyState === 'complete' && 'auvfmu' in globalThis")
+
+    def press(self, key: str) -> None:
+        """Press and release a key."""
+        code = {"key": key, "code": "Space" if key == " " else key}
+        code |= {"windowsVirtualKeyCode": KEYS[key]}
+        text = {"text": key} if key == " " else {}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **code, **text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **code)
+
+    def type(self, field: str, text: str) -> None:
+        """Replace what is in a field."""
+        self.run(f"{field}.focus(), {field}.select()")
+        self.call("Input.insertText", text=text)
+        self.press("Enter")
+
+    def resize(self, width: int, height: int) -> None:
+        """Give the page another size, in pixels of its style sheet."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1}
+        self.call("Emulation.setDeviceMetricsOverride", **size, mobile=width < 500)
+
+    def prefer(self, scheme: str) -> None:
+        """Let the system ask for `light` or `dark`."""
+        feature = {"name": "prefers-color-scheme", "value": scheme}
+        self.call("Emulation.setEmulatedMedia", features=[feature])
+
+    def complaints(self) -> list[str]:
+        """Errors of the page, and what it has asked the network for."""
+        fetched = [one for one in self._shown.requests if not one.startswith(("file:", "blob:"))]
+        return [*self._shown.said, *fetched]
+
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -43,25 +101,22 @@ def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One browser for all tests."""
-    with browsing(tmp_path_factory.mktemp("profile")) as started:
+    with browser(tmp_path_factory.mktemp("profile"), *SOFTWARE_GL) as started:
         yield started
 
 
 @pytest.fixture
-def opened(page, browser) -> Iterator[Tab]:
+def opened(page, chromium) -> Iterator[Live]:
     """A fresh page, with nothing to complain of at the end."""
-    tab = opened_at(browser, page.as_uri())
-    yield tab
-    assert tab.complaints() == []
-
-
-def opened_at(browser: Browser, address: str) -> Tab:
-    """A page whose first run has been made."""
-    tab = browser.open(address)
-    tab.wait("'auvfmu' in globalThis")
-    return tab
+    chromium.open(page)
+    live = Live(chromium)
+    live.resize(1280, 900)
+    live.prefer("light")
+    live.start()
+    yield live
+    assert live.complaints() == []
 
 
 def rows(text: str) -> tuple[list[str], np.ndarray]:
@@ -83,7 +138,6 @@ def test_arrow_keys_move_a_slider_and_the_numbers(opened):
     for _ in range(5):
         opened.press("ArrowRight")
     opened.wait(f"{TABLE} !== {table!r}")
-    # One run for all of them: a fifth of the decade from 1 to 10 would be a press further.
     opened.wait("/controller\\.eps_t=/.test(location.hash)")
     value = float(re.search(r"eps_t=([0-9.]+)", opened.run("location.hash"))[1])
     # Four decades in a hundred presses.
@@ -93,16 +147,21 @@ def test_arrow_keys_move_a_slider_and_the_numbers(opened):
     assert np.abs(changed - unchanged)[:, header.index("plant.tau.u")].max() > 0.1
 
 
-def test_link_opens_the_same_run(opened, browser):
+EVENT = "document.querySelector('#event-list input')"
+
+
+def test_link_opens_the_same_run(opened):
     opened.run('auvfmu.set({preset: "fault-sensor", "controller.eps_t": 4, stop_time: 60})')
-    opened.run("document.getElementById('event-list').closest('details').open = true")
-    opened.run("document.querySelector('#event-list input').focus()")
-    opened.type("20")
+    opened.run(f"{EVENT}.closest('details').open = true")
+    opened.type(EVENT, "20")
     opened.wait("/events\\.1\\.at=20/.test(location.hash)")
-    other = opened_at(browser, opened.run("location.href"))
-    assert other.run(CSV) == opened.run(CSV)
-    assert other.run("document.getElementById('stop-time').value") == "60"
-    assert other.complaints() == []
+    before = opened.run(CSV)
+    opened.call("Page.reload")
+    opened.wait("performance.getEntriesByType('navigation')[0].type === 'reload'")
+    opened.start()
+    assert opened.run(CSV) == before
+    assert opened.run("document.getElementById('stop-time').value") == "60"
+    assert opened.run(f"{EVENT}.value") == "20"
 
 
 @pytest.mark.parametrize("hidden", ["PD", "proposed"])
@@ -110,12 +169,10 @@ def test_command_makes_the_same_rows(opened, tmp_path, hidden):
     """What is copied, typed into a shell, with either controller."""
     values = '"controller.eps_t": 4, "plant.noise.std": 0.002, "plant.noise.seed": 7'
     opened.run(f'auvfmu.set({{preset: "fault-thruster", {values}, stop_time: 30}})')
-    opened.run("document.getElementById('event-list').closest('details').open = true")
-    opened.run("document.querySelector('#event-list input').focus()")
-    opened.type("15")
-    opened.wait("/events\\.1\\.at=15/.test(location.hash)")
+    opened.run(f"{EVENT}.closest('details').open = true")
+    opened.type(EVENT, "15")
     opened.run(f"document.querySelector('#loops input[value={hidden}]').click()")
-    opened.wait("/hide=/.test(location.hash)")
+    opened.wait(f"/at=15&hide={hidden}/.test(location.hash)")
     opened.run(
         "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; };"
         "URL.createObjectURL = (blob) => { globalThis.saved = blob; return 'blob:'; };"
@@ -138,14 +195,12 @@ def test_command_makes_the_same_rows(opened, tmp_path, hidden):
 def test_value_that_is_refused_is_marked_and_nothing_else_changes(opened):
     table = opened.run(TABLE)
     field = "document.querySelector('#groups input[data-name=\"controller.K1[1]\"]')"
-    opened.run(f"{field}.focus()")
-    opened.type("-3")
+    opened.type(field, "-3")
     opened.wait(f"{field}.getAttribute('aria-invalid') === 'true'")
     said = opened.run(f"{field}.closest('.row').innerText")
     assert "K1[1] = -3" in said
     assert opened.run(TABLE) == table
-    opened.run(f"{field}.focus()")
-    opened.type("10")
+    opened.type(field, "10")
     opened.wait(f"{field}.getAttribute('aria-invalid') === 'false'")
     assert "-3" not in opened.run(f"{field}.closest('.row').innerText")
     assert opened.run(TABLE) == table
@@ -183,8 +238,10 @@ def test_dark_follows_the_system_until_the_button_is_pressed(opened):
 
 
 def test_without_webgl_only_the_path_in_space_is_missing(page, tmp_path):
-    with browsing(tmp_path, ("--disable-gpu", "--disable-3d-apis")) as browser:
-        tab = opened_at(browser, page.as_uri())
-        assert "WebGL" in tab.run("document.querySelector('.scene').innerText")
-        assert tab.run(CSV).count("\n") == 5002
-        assert tab.run(f"{TABLE}.length") > 100
+    with browser(tmp_path, "--disable-3d-apis") as without:
+        without.open(page)
+        live = Live(without)
+        live.start()
+        assert "WebGL" in live.run("document.querySelector('.scene').innerText")
+        assert live.run(CSV).count("\n") == 5002
+        assert live.run(f"{TABLE}.length") > 100
