@@ -40,7 +40,8 @@ SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 #: How long something that is waited for may take [s].
 PATIENCE = 90.0
 
-KEYS = {"ArrowRight": 39, "Enter": 13, " ": 32}
+#: Numbers of keys, and what they write.
+KEYS = {"ArrowRight": (39, ""), "Enter": (13, "\r"), " ": (32, " ")}
 
 
 class Live:
@@ -64,10 +65,9 @@ class Live:
 
     def press(self, key: str) -> None:
         """Press and release a key."""
-        code = {"key": key, "code": "Space" if key == " " else key}
-        code |= {"windowsVirtualKeyCode": KEYS[key]}
-        text = {"text": key} if key == " " else {}
-        self.call("Input.dispatchKeyEvent", type="keyDown", **code, **text)
+        number, text = KEYS[key]
+        code = {"key": key, "windowsVirtualKeyCode": number}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **code, text=text)
         self.call("Input.dispatchKeyEvent", type="keyUp", **code)
 
     def type(self, field: str, text: str) -> None:
@@ -207,6 +207,7 @@ def test_value_that_is_refused_is_marked_and_nothing_else_changes(opened):
 
 
 def test_space_plays_and_stops(opened):
+    assert opened.run("document.querySelector('.scene canvas') !== null")
     opened.run("document.activeElement.blur()")
     opened.press(" ")
     now = "parseFloat(document.getElementById('now').textContent)"
