@@ -61,7 +61,7 @@ class Live:
 
     def start(self) -> None:
         """Wait for the first run."""
-        self.wait("document.readyState === 'complete' && 'auvfmu' in globalThis")
+        self.wait("document.querySelector('#indices td') !== null")
 
     def press(self, key: str) -> None:
         """Press and release a key."""

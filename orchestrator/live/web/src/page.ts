@@ -157,6 +157,13 @@ export class Page {
     this.#take(withValues(this.#settings, this.#preset, values));
   }
 
+  /** Takes settings as a whole, and runs. */
+  apply(settings: Settings): void {
+    this.#settings = settings;
+    this.#open();
+    this.#linkLater();
+  }
+
   get settings(): Settings {
     return this.#settings;
   }
