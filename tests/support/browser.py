@@ -92,8 +92,8 @@ class Browser:
 
 
 @contextmanager
-def browser(profile: Path) -> Iterator[Browser]:
-    """A browser with a profile of its own, ended at the end."""
+def browser(profile: Path, *options: str) -> Iterator[Browser]:
+    """A browser with a profile and options of its own, ended at the end."""
     reads, commands = os.pipe()
     answers, writes = os.pipe()
 
@@ -104,7 +104,7 @@ def browser(profile: Path) -> Iterator[Browser]:
             os.dup2(end, place)
 
     process = subprocess.Popen(
-        [str(BROWSER), *_OPTIONS, f"--user-data-dir={profile}"],
+        [str(BROWSER), *_OPTIONS, *options, f"--user-data-dir={profile}"],
         stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, close_fds=False,
         preexec_fn=take_places,  # noqa: PLW1509
     )  # fmt: skip
