@@ -60,7 +60,8 @@ def files() -> dict[Path, str]:
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },
         "reference/scenario-files.md": scenarios(),
-        "how-to/studies.md": studies(),
+        "how-to/studies.md": {"ready": ready()},
+        "reference/study-files.md": studies(),
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
@@ -112,11 +113,15 @@ def scenarios() -> dict[str, str]:
     }
 
 
+def ready() -> str:
+    """The table of docs/how-to/studies.md."""
+    studies = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    return _table("`auv-fmu sweep`", "what it asks", rows=studies)
+
+
 def studies() -> dict[str, str]:
-    """Tables of docs/how-to/studies.md."""
-    ready = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    """Tables of docs/reference/study-files.md."""
     return {
-        "ready": _table("`auv-fmu sweep`", "what it asks", rows=ready),
         "entries": _entries(StudyFile),
         "figures": _entries(FigureTable),
         "indices": _table("index", "meaning", rows=map(_index, INDICES)),
