@@ -4,10 +4,11 @@
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
 `<!-- / -->`, which this replaces. `docs/reference/components` and `docs/schemas` are written whole.
 
-`command_line.py` and `gallery.py` have the long texts. The other tools compute what takes minutes,
-and print it: `accuracy.py` the tables of docs/explanation/accuracy.md, `study_numbers.py` and
+`command_line.py` and `gallery.py` have the long texts. The other tools compute what takes minutes:
+`accuracy.py` prints the tables of docs/explanation/accuracy.md, `study_numbers.py` and
 `best_gains.py` the numbers below the figures of docs/explanation/ready-studies.md. `pictures.py`
-draws those figures and the ones of the scenarios, `reference.py` writes `reference`.
+draws those figures and the ones of the scenarios, `benchmarks_page.py` fills in
+docs/reference/benchmarks.md, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
