@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from fmpy.validation import validate_fmu
 
-from orchestrator.commands.options import add_variant
+from orchestrator.commands.options import add_variant, describe
 from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import unpack
@@ -37,8 +37,14 @@ _SURPRISES = {
 
 def add_check(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu check`."""
+    describe(
+        parser,
+        "Validate an FMU, an SSP, a scenario or a study without running it, and list every "
+        "problem. Exit status: 0 without problems, else 2.",
+        "check my_scenario.toml",
+    )
     parser.add_argument(
-        "file", metavar="FILE|DIR|SCENARIO", help="what to check, without running it"
+        "file", metavar="FILE|DIR|SCENARIO", help="file, folder or scenario to validate"
     )
     add_variant(parser)
     parser.set_defaults(action=_check)

@@ -86,14 +86,8 @@ def preset(name: str) -> Plain:
         InputError: there is no such scenario, or the page cannot run it.
 
     """
-    request = Request(name, kind=NATIVE)
-    scenario, system = load_scenario(name, NATIVE)
-    own = prepare(scenario, system, request)
-    compare = scenario.compare or _other(system)
-    both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
-    for one in both:
-        _check(one)
-    experiment = own.plan.experiment
+    both = runs_of(name)
+    scenario, experiment = both[0].scenario, both[0].plan.experiment
     return {
         "name": scenario.name,
         "title": scenario.title or scenario.name,
@@ -102,9 +96,29 @@ def preset(name: str) -> Plain:
         "stopTime": experiment.stop_time,
         "step": experiment.step,
         "events": scenario.name if scenario.events else "",
-        "comparing": bool(scenario.compare),
-        "loops": [_loop(both[0]) | {"scenario": name}, *map(_loop, both[1:])],
+        "comparing": bool(read_scenario(name).compare),
+        "loops": [
+            _loop(one, scenario.name) | ({"scenario": name} if one is both[0] else {})
+            for one in both
+        ],
     }
+
+
+def runs_of(name: str) -> list[Prepared]:
+    """The run of a scenario, and the one that it is compared with, if there is one.
+
+    Raises:
+        InputError: there is no such scenario, or the page cannot run it.
+
+    """
+    request = Request(name, kind=NATIVE)
+    scenario, system = load_scenario(name, NATIVE)
+    own = prepare(scenario, system, request)
+    compare = scenario.compare or _other(system)
+    both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
+    for one in both:
+        _check(one)
+    return both
 
 
 def _other(system: System) -> str:
@@ -142,7 +156,7 @@ def _check(prepared: Prepared) -> None:
             raise InputError(f"{prepared.scenario.name}: the live page cannot run {what}")
 
 
-def _loop(prepared: Prepared) -> Plain:
+def _loop(prepared: Prepared, owner: str) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
     system, order = plan.system, plan.experiment.order
     sequence = stages(system, order)
@@ -159,7 +173,7 @@ def _loop(prepared: Prepared) -> Plain:
         ],
         "stages": list(map(_stage, sequence, gathered)),
         "parameters": list(_parameters(system)),
-        "events": _events(prepared),
+        "events": _events(prepared, owner),
     }
 
 
@@ -231,12 +245,17 @@ def bundle() -> Mapping[str, Component]:
     return {name: read_component(name, folder / f"{name}.fmu") for name in components()}
 
 
-def _events(prepared: Prepared) -> dict[str, list[Plain]]:
-    """All events that can happen to a system, by the scenario that has them."""
-    scenario, plan = prepared.scenario, prepared.plan
-    system = replace(plan.system, step=plan.experiment.step)
+def _events(prepared: Prepared, owner: str) -> dict[str, list[Plain]]:
+    """All events that can happen to a system, by the scenario that has them.
+
+    Args:
+        prepared: run of the system.
+        owner: the scenario of the preset: its events may be the comparison's own.
+
+    """
+    system = replace(prepared.system, step=prepared.experiment.step)
     tables = {name: read_scenario(name).events for name in names()}
-    tables[scenario.name] = scenario.events
+    tables[owner] = prepared.scenario.events
     return {
         name: [_event(one) for one in read_events(name, shared_events(some, system), system)]
         for name, some in tables.items()

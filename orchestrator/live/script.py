@@ -90,6 +90,10 @@ def _run(folder: Path, *command: str) -> None:
     except subprocess.TimeoutExpired:
         raise InputError(f"{command[1]} has not ended after {_LIMIT:g} s") from None
     if process.returncode != 0:
-        lines = [line for line in process.stderr.splitlines() if line.startswith("npm error ") and "code" not in line]
+        lines = [
+            line
+            for line in process.stderr.splitlines()
+            if line.startswith("npm error ") and "code" not in line
+        ]
         said = (lines or [last_line(process.stderr)])[0]
         raise InputError(f"the live page has no script: {' '.join(command[:2])}: {said}")

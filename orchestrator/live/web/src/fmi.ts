@@ -24,6 +24,9 @@ export class Machine {
   private readonly encoder = new TextEncoder();
   private readonly decoder = new TextDecoder();
   private environments = 0;
+  /** The whole memory; both are empty when it has grown. */
+  private words = new Int32Array(0);
+  private numbers = new Float64Array(0);
 
   private constructor(
     private readonly exports: WebAssembly.Exports,
@@ -73,6 +76,15 @@ export class Machine {
 
   integers(address: number, n: number): Int32Array {
     return new Int32Array(this.memory.buffer, address, n);
+  }
+
+  /** Copy integers to doubles, without a view of either: it happens in every step. */
+  widen(integers: number, n: number, doubles: number): void {
+    if (this.words.length === 0) {
+      this.words = new Int32Array(this.memory.buffer);
+      this.numbers = new Float64Array(this.memory.buffer);
+    }
+    for (let i = 0; i < n; i++) this.numbers[doubles / REAL + i] = this.words[integers / INT + i];
   }
 
   text(address: number): string {
@@ -242,9 +254,7 @@ export class Instance {
         block.call(this.component, block.references, block.n, block.place),
       );
       if (block.type !== "Real") {
-        const { row, machine } = this;
-        const values = machine.integers(block.place, block.n);
-        machine.doubles(row + REAL * block.column, block.n).set(values);
+        this.machine.widen(block.place, block.n, this.row + REAL * block.column);
       }
     }
   }

@@ -188,9 +188,18 @@ class Simulation {
     const run: Run = { experiment, instances, row, overrides, values: this.set, made: 0 };
     const width = 1 + row.names.length;
     const table = new Float64Array((experiment.steps + 1) * width);
-    const append = () => {
-      table[run.made * width] = experiment.time(run.made);
-      table.set(row.values, run.made * width + 1);
+    /** Keep the row of now, unless a value is not finite. */
+    const append = (): boolean => {
+      const { values } = row;
+      const first = run.made * width;
+      table[first] = experiment.time(run.made);
+      // Times zero, what is finite is zero and what is not is nan.
+      let sum = 0;
+      for (let i = 0; i < values.length; i++) {
+        table[first + 1 + i] = values[i];
+        sum += values[i] * 0;
+      }
+      return sum === 0;
     };
     append();
     let [failure, remark]: [string | undefined, string | undefined] = [undefined, undefined];
@@ -207,9 +216,11 @@ class Simulation {
           }
           for (const instance of members) instance.getOutputs();
         }
-        if (!allFinite(row.values)) break;
         run.made += 1;
-        append();
+        if (!append()) {
+          run.made -= 1;
+          break;
+        }
         if (run.made >= due) due = events.act(run);
       }
     } catch (error) {
@@ -238,7 +249,7 @@ class Simulation {
   /** The first value that is not finite, and where it comes from, in words. */
   private wrong(components: readonly string[]): string | undefined {
     const { row, loop, data } = this;
-    if (allFinite(row.values)) return undefined;
+    if (row.values.every(Number.isFinite)) return undefined;
     const sources = new Map(loop.stages.flatMap(({ connections }) => connections));
     let passedOn: string | undefined;
     for (const component of components) {
@@ -258,14 +269,6 @@ class Simulation {
     }
     return passedOn;
   }
-}
-
-/** Whether all values are numbers that can be computed with. */
-function allFinite(values: Float64Array): boolean {
-  // Times zero, what is finite is zero and what is not is nan.
-  let sum = 0;
-  for (let i = 0; i < values.length; i++) sum += values[i] * 0;
-  return sum === 0;
 }
 
 /** The rows of a run. */
