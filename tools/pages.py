@@ -4,10 +4,10 @@
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
 `<!-- / -->`, which this replaces. `docs/reference/components` and `docs/schemas` are written whole.
 
-The other tools compute what takes minutes, and print it: `accuracy.py` the tables of
+The other tools compute what takes minutes: `accuracy.py` prints the tables of
 docs/explanation/accuracy.md, `study_numbers.py` and `best_gains.py` the numbers below the figures
-of docs/explanation/ready-studies.md. `study_pictures.py` draws those figures, `reference.py` writes
-`reference`.
+of docs/explanation/ready-studies.md. `study_pictures.py` draws those figures, `benchmarks_page.py`
+fills in docs/reference/benchmarks.md, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
