@@ -40,9 +40,12 @@ def _sections(
     # First what must be given.
     actions.sort(key=lambda one: bool(one.option_strings))
     yield f"{'#' * level} `{name}`"
-    yield f"{meaning[0].upper()}{meaning[1:]}."
+    yield command.description or f"{meaning[0].upper()}{meaning[1:]}."
     if not below:
         yield f"```text\n{_usage(name, actions)}\n```"
+    if command.epilog:
+        _, _, example = command.epilog.partition("Example: ")
+        yield f"Example:\n\n```sh\n{example}\n```"
     if actions:
         yield table(("argument", "meaning"), [(_written(one), _meaning(one)) for one in actions])
     [texts] = [

@@ -37,6 +37,17 @@ PAGES = {
 
 LIVE = "live.html"
 
+#: What the search prefers, and what comes last: the beginning of a page's place.
+BOOSTS = {
+    "tutorials/": 2.0,
+    "how-to/": 2.0,
+    "explanation/kinds.md": 2.0,
+    "contributing/": 0.2,
+    "explanation/architecture.md": 0.5,
+    "reference/fmi-answers.md": 0.5,
+    "reference/promises.md": 0.5,
+}
+
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: ([\w-]+) -->")
 
@@ -64,6 +75,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point links to the site's pages, and to the live page from where it is announced."""
+    [boost] = [n for place, n in BOOSTS.items() if page.file.src_uri.startswith(place)] or [1.0]
+    page.meta["search"] = {"boost": boost}
     if page.file.src_uri not in PAGES.values() or page.file.src_uri == PAGES["README.md"]:
         markdown = linked(markdown, f"docs/{page.file.src_uri}", files)
     up = posixpath.relpath(LIVE, posixpath.dirname(page.file.src_uri) or ".")
