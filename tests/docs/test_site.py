@@ -16,6 +16,7 @@ from urllib.parse import unquote
 import pytest
 from lxml import html
 
+import orchestrator
 from support.markdown import DOCS
 
 pytest.importorskip("mkdocs", reason="needs the extra `site`")
@@ -79,6 +80,11 @@ def test_every_image_has_an_alternative_in_words(pages):
     for page, content in pages.items():
         for image in content.xpath("//img"):
             assert len((image.get("alt") or "").split()) > 3, f"{page}: {image.get('src')}"
+
+
+def test_page_of_the_python_interface_has_every_public_name(pages):
+    names = pages["reference/python-api.html"].xpath("//article//h2/@id")
+    assert {f"orchestrator.{name}" for name in orchestrator.__all__} <= set(names)
 
 
 def test_there_are_forty_questions():
