@@ -1,4 +1,4 @@
-"""`auv-fmu build`, `new`, `list` and `gains`: build FMUs, and answer without a run."""
+"""`auv-fmu build`, `new` and `gains`: build FMUs, and answer without a run."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
 from orchestrator.runs.request import Files
-from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 
@@ -73,11 +72,6 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     controller.set_defaults(action=_controller)
 
 
-def add_list(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu list`."""
-    parser.set_defaults(action=_list)
-
-
 def add_gains(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu gains`."""
     add_set(parser)
@@ -121,12 +115,6 @@ def _controller(options: argparse.Namespace) -> int:
     show(f"change {script}, then build and run it:")
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
-    return OK
-
-
-def _list(_: argparse.Namespace) -> int:
-    for name in names():
-        show(f"{name:10} {read_scenario(name).title}")
     return OK
 
 
