@@ -194,7 +194,17 @@ def complete_study(
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(draw_figures(entries, study.title, result, unfinished, legends))
+            notes = list(
+                draw_figures(
+                    entries,
+                    study.title,
+                    result,
+                    unfinished,
+                    legends,
+                    space.units,
+                    space.logarithmic,
+                )
+            )
         for note in notes:
             say(note)
     return result
