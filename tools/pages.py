@@ -4,10 +4,10 @@
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
 `<!-- / -->`, which this replaces. `docs/reference/components` and `docs/schemas` are written whole.
 
-The other tools compute what takes minutes, and print it: `accuracy.py` the tables of
+The other tools compute what takes minutes: `accuracy.py` prints the tables of
 docs/explanation/accuracy.md, `study_numbers.py` and `best_gains.py` the numbers below the figures
-of docs/explanation/ready-studies.md. `study_pictures.py` draws those figures, `reference.py` writes
-`reference`.
+of docs/explanation/ready-studies.md. `study_pictures.py` draws those figures, `benchmarks_page.py`
+fills in docs/reference/benchmarks.md, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
@@ -60,7 +60,8 @@ def files() -> dict[Path, str]:
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },
         "reference/scenario-files.md": scenarios(),
-        "how-to/studies.md": studies(),
+        "how-to/studies.md": {"ready": ready()},
+        "reference/study-files.md": studies(),
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
@@ -112,11 +113,15 @@ def scenarios() -> dict[str, str]:
     }
 
 
+def ready() -> str:
+    """The table of docs/how-to/studies.md."""
+    studies = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    return _table("`auv-fmu sweep`", "what it asks", rows=studies)
+
+
 def studies() -> dict[str, str]:
-    """Tables of docs/how-to/studies.md."""
-    ready = ((f"`{name}`", read_study(name).title) for name in ready_studies())
+    """Tables of docs/reference/study-files.md."""
     return {
-        "ready": _table("`auv-fmu sweep`", "what it asks", rows=ready),
         "entries": _entries(StudyFile),
         "figures": _entries(FigureTable),
         "indices": _table("index", "meaning", rows=map(_index, INDICES)),

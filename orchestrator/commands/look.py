@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from orchestrator.commands.options import (
     add_options,
@@ -20,7 +19,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
-from orchestrator.figures.plot import plot, wanted_columns
+from orchestrator.figures.plot import plot, told_apart, wanted_columns
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
@@ -30,11 +29,7 @@ from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
-from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
-
-#: Runs of one scenario are told apart by so many parameters.
-_FEW = 2
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
@@ -109,34 +104,10 @@ def _plot(options: argparse.Namespace) -> int:
     runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
     runs = _named(runs, paths)
     tables = (run.result for run in runs)
-    figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
+    figure = plot(list(zip(told_apart(runs, paths), tables, strict=True)), patterns)
     with _written([options.out], options.force) as folder:
         save(figure, folder / options.out.name)
     return OK
-
-
-def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
-    """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
-    names = [run.label for run in runs]
-    given = [run.result.header.parameters for run in runs]
-    differing = [
-        name
-        for name in dict.fromkeys(name for values in given for name in values)
-        if len({str(values.get(name)) for values in given}) > 1
-    ]
-    changes = [
-        ", ".join([name] * (len(set(names)) > 1) + [f"{k} = {_text(values, k)}" for k in differing])
-        for name, values in zip(names, given, strict=True)
-    ]
-    parts = [path.resolve().parts for path in paths]
-    ends = [["/".join(part[-n:]) for part in parts] for n in range(1, max(map(len, parts)))]
-    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends]
-    return next((labels for labels in candidates if len(set(labels)) == len(labels)), ends[0])
-
-
-def _text(values: Mapping[PortName, Any], name: PortName) -> str:
-    value = values.get(name, "none")
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _warn(table: Path) -> None:

@@ -136,5 +136,8 @@ def assignments(options: argparse.Namespace) -> dict[PortName, object]:
         name, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
-        values[port_name(name.strip())] = value.strip()
+        port = port_name(name.strip())
+        # The last one wins, also over a group before it.
+        values.pop(port, None)
+        values[port] = value.strip()
     return values

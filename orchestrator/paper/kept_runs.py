@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.kinds import AUTO
+from fmus.kinds import AUTO, KindName
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
@@ -54,7 +54,7 @@ class KeptRuns:
         self,
         folder: Path,
         stop_time: float | None = None,
-        kind: str = AUTO,
+        kind: KindName = AUTO,
         force: bool = False,
     ) -> None:
         """Start without any.

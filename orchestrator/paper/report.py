@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from fmus.kinds import AUTO
+from fmus.kinds import AUTO, KindName
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper import printed_table
@@ -67,7 +67,7 @@ def write_report(
     scenarios: Sequence[str],
     command: Sequence[str],
     stop_time: float | None = None,
-    kind: str = AUTO,
+    kind: KindName = AUTO,
     ready: Sequence[str] = (),
     variants: bool = False,
     force: bool = False,

@@ -12,12 +12,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
-from fmus.kinds import AUTO, KINDS
-from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, format_order, read_order
+from fmus.kinds import AUTO, KINDS, KindName
+from orchestrator.master.experiment import (
+    COUPLINGS,
+    ORDERS,
+    CouplingName,
+    Order,
+    format_order,
+    read_order,
+)
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.hooks.checkpoint import check_every
-from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import TABLE_FORMATS
+from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
 from orchestrator.master.observers.observer import check_interval
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
@@ -48,8 +55,8 @@ def flag(name: str) -> str:
 
 
 #: Which FMUs of the bundle.
-Kind = Annotated[
-    str,
+KindOption = Annotated[
+    KindName,
     CliOption(
         "kind of the bundle's FMUs: python (source code) or native (its translation to C); both "
         f"give the same numbers; default: {AUTO} (native if it is present or can be built)",
@@ -58,8 +65,8 @@ Kind = Annotated[
 ]
 
 #: What makes the steps.
-LoopName = Annotated[
-    str,
+LoopOption = Annotated[
+    LoopName,
     CliOption(
         "stepping loop: python, or compiled (in C); both give the same rows; default: auto "
         "(compiled where available)",
@@ -112,7 +119,7 @@ class Request:
         ),
     ] = None
     coupling: Annotated[
-        str | None,
+        CouplingName | None,
         CliOption(
             "method for algebraic loops: solve them, delay them by one step, or solve them with "
             "inputs that change linearly within the step; default: from the scenario, else solve "
@@ -120,7 +127,7 @@ class Request:
             choices=COUPLINGS,
         ),
     ] = None
-    kind: Kind = AUTO
+    kind: KindOption = AUTO
     events: Annotated[
         str | Sequence[Mapping[str, Any]] | None,
         CliOption(
@@ -136,7 +143,7 @@ class Request:
             metavar="FILE",
         ),
     ] = None
-    loop: LoopName = LOOPS[0]
+    loop: LoopOption = LOOPS[0]
     isolate: Annotated[
         bool,
         CliOption(
@@ -212,7 +219,8 @@ class Files:
         ),
     ] = "all"
     format: Annotated[
-        str, CliOption("file format of the table; default: csv", choices=tuple(TABLE_FORMATS))
+        TableFormat,
+        CliOption("file format of the table; default: csv", choices=tuple(TABLE_FORMATS)),
     ] = "csv"
     no_figures: Annotated[bool, CliOption("do not draw figures", action="store_true")] = False
     checkpoint_every: Annotated[

@@ -1,6 +1,6 @@
 """What a study file may hold, and the study and the figures that it stands for.
 
-docs/how-to/studies.md and the JSON schema of these files are made from this.
+docs/reference/study-files.md and the JSON schema of these files are made from this.
 """
 
 from __future__ import annotations

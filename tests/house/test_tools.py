@@ -10,8 +10,8 @@ import pytest
 
 TOOLS = sorted((Path(__file__).parents[2] / "tools").glob("*.py"))
 
-#: Packages of the extras `docs` and `studies`.
-NEEDED = ("pandas", "PIL", "pyarrow", "scipy")
+#: Packages of the extras `dev`, `docs` and `studies`.
+NEEDED = ("pandas", "PIL", "proselint", "pyarrow", "scipy")
 
 
 @pytest.mark.parametrize("tool", TOOLS, ids=lambda tool: tool.stem)
