@@ -79,7 +79,7 @@ def _sweep(options: argparse.Namespace) -> int:
             study, from_options(Means, options), folder, options.command, say, progress=True
         )
     except KeyboardInterrupt:
-        say(f"interrupted; {folder} keeps the finished runs: the same command goes on from there")
+        say(f"interrupted; {folder} keeps the finished runs: the same command continues from there")
         return INTERRUPTED
     show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
     show(f"written to {folder}{os.sep}")

@@ -366,10 +366,10 @@ def draw_figures(
         values = (*entry.x, *([entry.y] if entry.y else ()), *entry.show)
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]
         if lacking:
-            yield f"figure {entry.name} left out: no run has {lacking[0]}"
+            yield f"figure {entry.name} skipped: no run has {lacking[0]}"
             continue
         if (parts := len(list(runs.parts(entry.by)))) > _MOST_PARTS:
-            yield f"figure {entry.name} left out: by tells {parts} parts of the runs apart"
+            yield f"figure {entry.name} skipped: by tells {parts} parts of the runs apart"
             continue
         with styled():
             figure = _DRAW[entry.chart](entry, title, runs)

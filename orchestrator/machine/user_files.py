@@ -206,8 +206,7 @@ def unpack(archive: Path) -> Unpacked:
         with _LOCK, archive.open("rb") as file:
             if file.peek(len(_POINTER)).startswith(_POINTER):
                 raise InputError(
-                    f"{archive}: is a pointer of Git LFS, not the file that it stands for: get "
-                    "that with `git lfs pull`"
+                    f"{archive}: is a Git LFS pointer, not the file itself: run `git lfs pull`"
                 )
             return _unpacked(archive, file)
     except InputError:
@@ -264,7 +263,7 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
                 folder = _extracted(archive, content)
                 if _version_of(file) != version:
                     rmtree(folder, ignore_errors=True)
-                    raise InputError(f"{archive}: is being written; try again when it is whole")
+                    raise InputError(f"{archive}: is being written; try again when it is complete")
                 _folders[digest] = folder
         _digests[version] = digest
     return Unpacked(_folders[digest], digest)

@@ -86,7 +86,7 @@ class Space:
             if self.columns[name] not in (float, int):
                 raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
             if self.columns[name] is int and name not in self._ranges:
-                raise InputError(f"{name}: a whole number cannot be drawn in a norm")
+                raise InputError(f"{name}: an integer cannot be part of a norm")
             for end in ends:
                 known.typed(name, end)
         samples = study.sample.n if study.sample else 1

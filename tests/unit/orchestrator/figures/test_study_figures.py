@@ -127,8 +127,8 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()
         assert list(draw_figures(entries, "A_f and A_d", columns(), folder)) == [
-            "figure drift left out: no run has largest_drift",
-            "figure many left out: by tells 25 parts of the runs apart",
+            "figure drift skipped: no run has largest_drift",
+            "figure many skipped: by tells 25 parts of the runs apart",
         ]
     found = contents(tmp_path / "a")
     assert found.keys() == {"error.png", "error.svg", "effort.png", "effort.svg"}
