@@ -8,11 +8,11 @@ from importlib import import_module
 import pytest
 from PIL import Image
 
-from gallery import PICTURES
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.indices import index_columns
+from parts.gallery import PICTURES
 from support.markdown import DOCS
 
 PAGE = DOCS / "explanation" / "ready-studies.md"

@@ -24,7 +24,7 @@ from mkdocs.structure.pages import Page
 from orchestrator.live import assembly
 from orchestrator.machine.errors import InputError
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 #: Where the site has the files of the root.
 PAGES = {
