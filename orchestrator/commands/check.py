@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 from fmpy.validation import validate_fmu
 
-from orchestrator.commands.options import add_variant, describe
-from orchestrator.commands.streams import BAD_INPUT, OK, show
+from orchestrator.commands.options import add_variant
+from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
 from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
@@ -30,7 +30,7 @@ _SURPRISES = {
     ("needsExecutionTool", True): "needs the program that it was made with",
     ("canHandleVariableCommunicationStepSize", False): "takes only steps of a fixed length: the "
     "stop time must be a multiple of the step",
-    ("canRunAsynchronuously", True): "may compute a step while its host goes on",
+    ("canRunAsynchronuously", True): "may compute a step while its host continues",
     ("canGetAndSetFMUstate", False): "cannot save its state: a run of it cannot be resumed",
 }
 

@@ -340,7 +340,7 @@ def checkpoints_of(
     times = [checkpoints.time for checkpoints in found]
     for prepared, time in zip(runs, times, strict=True):
         if time is not None:
-            say(f"{prepared.scenario.name}: goes on at t = {time:g} s")
+            say(f"{prepared.scenario.name}: continues at t = {time:g} s")
     if resume and not any(times):
         say(f"there is nothing to resume in {folders[0]}: begins at the start")
     return found
@@ -378,7 +378,7 @@ def leave_checkpoints(
             checkpoints.remove()
         elif checkpoints.time is not None:
             place = _shown(checkpoints.folder)
-            say(f"--resume goes on from t = {checkpoints.time:g} s, from {place}")
+            say(f"--resume continues from t = {checkpoints.time:g} s, from {place}")
 
 
 def _shown(folder: Path) -> Path:

@@ -96,8 +96,7 @@ class Means:
             raise InputError(f"--workers {self.workers}: must be at least 1")
         if self.workers is not None and self.scheduler is not None:
             raise InputError(
-                "--workers is for processes of this machine: those of a scheduler are started with "
-                "it"
+                "--workers is for processes of this machine: a scheduler starts its own"
             )
 
 
