@@ -40,7 +40,8 @@ SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 #: How long something that is waited for may take [s].
 PATIENCE = 90.0
 
-KEYS = {"ArrowRight": 39, "Enter": 13, " ": 32}
+#: Numbers of keys, and what they write.
+KEYS = {"ArrowRight": (39, ""), "Enter": (13, "\r"), " ": (32, " ")}
 
 
 class Live:
@@ -60,16 +61,13 @@ class Live:
 
     def start(self) -> None:
         """Wait for the first run."""
-        self.wait("document.readyState === 'complete' && 'auvfmu' in globalThis")
-        # It is there before the first run, and waits for it.
-        self.run("auvfmu.csv().then(() => null)")
+        self.wait("document.querySelector('#indices td') !== null")
 
     def press(self, key: str) -> None:
         """Press and release a key."""
-        code = {"key": key, "code": "Space" if key == " " else key}
-        code |= {"windowsVirtualKeyCode": KEYS[key]}
-        text = {"text": key} if key == " " else {}
-        self.call("Input.dispatchKeyEvent", type="keyDown", **code, **text)
+        number, text = KEYS[key]
+        code = {"key": key, "windowsVirtualKeyCode": number}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **code, text=text)
         self.call("Input.dispatchKeyEvent", type="keyUp", **code)
 
     def type(self, field: str, text: str) -> None:
@@ -209,6 +207,7 @@ def test_value_that_is_refused_is_marked_and_nothing_else_changes(opened):
 
 
 def test_space_plays_and_stops(opened):
+    assert opened.run("document.querySelector('.scene canvas') !== null")
     opened.run("document.activeElement.blur()")
     opened.press(" ")
     now = "parseFloat(document.getElementById('now').textContent)"
