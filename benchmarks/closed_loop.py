@@ -26,9 +26,10 @@ from measuring import options, python, steps_time, timed
 
 from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
+from fmus.kinds import PYTHON
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import Instance
-from orchestrator.master.fmi.loaded import LoadedInstance
+from orchestrator.master.fmi.slaves import FMU2OfOthers
 from orchestrator.master.loop import Stepping, choose_loop
 from orchestrator.master.schedule import Member
 from orchestrator.runs.bundle import current_fmus
@@ -73,7 +74,7 @@ def compiled_alone(system: System, steps: int, stepping: Stepping) -> float:
     """Seconds of the steps of the compiled loop when every function it calls does nothing."""
     # One, which is FMI's warning, is all that this one has to say.
     nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
-    with patch.object(LoadedInstance, "_address", lambda *_: nothing):
+    with patch.object(FMU2OfOthers, "address", lambda *_: nothing):
         return steps_time(system, _TIMES * steps, stepping=stepping) / _TIMES
 
 
@@ -81,7 +82,7 @@ def main() -> None:
     """Measure and print."""
     given = options(__doc__).parse_args()
     rows = []
-    system = wired(current_fmus())
+    system = wired(current_fmus(PYTHON))
     steps_time(system, 10)
     fast = choose_loop("compiled", Experiment(STEP, STEP))
     for _ in range(given.repetitions):

@@ -19,6 +19,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from measuring import resident
 
+from fmus.kinds import PYTHON
 from orchestrator.runs.bundle import current_fmus
 
 REPETITIONS = 200
@@ -46,7 +47,7 @@ def main() -> None:
         f"{'stays of an instance':>21} {'of a reset':>11}"
     )
     with TemporaryDirectory(prefix="auvfmu") as folder:
-        for path in sorted(current_fmus().glob("*.fmu")):
+        for path in sorted(current_fmus(PYTHON).glob("*.fmu")):
             unpacked = fmpy.extract(path, unzipdir=Path(folder, path.stem))
             guid = fmpy.read_model_description(path).guid
 

@@ -13,6 +13,7 @@ from statistics import median
 from measuring import options, python, steps_time, timed
 
 from auv_fmu.euler import STEP
+from fmus.kinds import PYTHON
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
@@ -32,7 +33,7 @@ def start_time(system: System, order: str) -> float:
 def main() -> None:
     """Measure and print."""
     given = options(__doc__).parse_args()
-    system = closed_loop(current_fmus())
+    system = closed_loop(current_fmus(PYTHON))
     print(f"{python()}, {len(os.sched_getaffinity(0))} cores")
     print(f"medians of {given.repetitions} repetitions of {given.steps} steps")
     starts = []

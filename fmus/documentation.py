@@ -26,17 +26,25 @@ _HTML = Path(__file__).with_name("page.html")
 _REFUSALS = """\
 ## What is refused
 
-A value that is not finite, out of its range or not one of the choices, a value for an output, a new
-value for a fixed parameter during the run: the call is answered with fmi2Discard, none of its
-values is taken, and `fault` rises. So is a step whose size is negative or not finite, or whose
-result would not be finite: everything is as it was before, noise included. The run goes on with the
-next good call; `fault` stays true until fmi2Reset, or until a state without a fault is restored.
+The FMU answers with fmi2Discard:
 
-A parameter that cannot be taken before the run, a call in the wrong mode, a value reference that
-does not exist or is of another type, a state that no run can have led to: the call is answered with
-fmi2Error, and so is every later call except a get, until fmi2Reset or a good state. The parameter
-raises `fault` as well. A refused get has no consequence, and fmi2GetReal also gives the numbers of
-Integers and Booleans.
+- a set of a value that is not finite, out of its range or not one of the choices;
+- a set of an output, or of a new value for a fixed parameter during the run;
+- a step whose size is negative or not finite, or whose result would not be finite.
+
+None of the values of such a call is taken, and such a step changes nothing, not even the noise.
+`fault` rises. The run continues with the next good call. `fault` stays true until fmi2Reset, or
+until a state without a fault is restored.
+
+The FMU answers with fmi2Error:
+
+- a set of a parameter that cannot be taken before the run, which also raises `fault`;
+- a call in the wrong mode;
+- a value reference that does not exist or is of another type;
+- a state that no run can have led to.
+
+Then it answers every later call except a get with fmi2Error, until fmi2Reset or a good state. A
+refused get has no consequence. fmi2GetReal also gives the numbers of Integers and Booleans.
 
 The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
 `docs/reference/fmi-answers.md` of the project."""
@@ -47,32 +55,37 @@ _PLACE = re.compile(r"\[\d+\]\.")
 _NATIVE = """\
 ## What it is made of
 
-This FMU holds libraries and needs only the C library of its platform, no Python. They were
-compiled from the C sources in its folder `sources`, which any importer can compile for another
-platform: one file that includes all others. The equations in them were translated from the Python
-text that the FMU's twin runs, so both give the same numbers."""
+This FMU holds compiled libraries. It needs only the C library of its platform, not Python. The C
+sources are in its folder `sources`. Any importer can compile them for another platform: one file
+includes all others. Their equations were translated from the Python source that the FMU's Python
+kind runs, so both kinds give the same numbers."""
 
 _REFERENCE = """\
 ## Reference results
 
-The folder `extra/org.fmi-standard.fmi-ls-ref` in the FMU holds experiments with this FMU alone:
-parameter sets, inputs over time, and the outputs to compare with, as the drafts FMI-LS-REF and
-MA-HS-Experiments of the Modelica Association have them. The inputs of a step are set at its
-beginning. `auv-fmu verify {name}.fmu` makes the experiments and compares."""
+The folder `extra/org.fmi-standard.fmi-ls-ref` in the FMU holds experiments with only this FMU:
+parameter sets, inputs over time, and the outputs to compare with. Its format follows the drafts
+FMI-LS-REF and MA-HS-Experiments of the Modelica Association. The inputs of a step are set at its
+beginning. `auv-fmu verify {name}.fmu` makes the experiments and compares the outputs."""
 
 _EXAMPLE = """\
 ## Example
 
-Alone, with the inputs at zero, for 10 s:
+Run only this FMU for 10 s, with the inputs at zero:
 
-    fmpy simulate {name}.fmu --stop-time 10 --output-interval 0.02 --output-file result.csv
+```sh
+fmpy simulate {name}.fmu --stop-time 10 --output-interval 0.02 --output-file result.csv
+```
 
 In Python:
 
-    import fmpy
-    result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
+```python
+import fmpy
 
-A step longer than `h_max`, where there is such a parameter, is split evenly with held inputs."""
+result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
+```
+
+If the FMU has a parameter `h_max`, a longer step is split evenly, with held inputs."""
 
 
 def component_page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import argparse
 import tomllib
 
-from orchestrator.commands.streams import OK, show
+from orchestrator.commands.streams import OK, describe, show
 from orchestrator.machine.user_files import names_in
 from orchestrator.runs import SCENARIOS_FOLDER
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu list`."""
+    describe(parser, "List the scenarios with their titles.", "list")
     parser.set_defaults(action=_list)
 
 
@@ -20,5 +21,5 @@ def _list(_: argparse.Namespace) -> int:
     width = max(map(len, names))
     for name in names:
         content = tomllib.loads((SCENARIOS_FOLDER / f"{name}.toml").read_text(encoding="utf-8"))
-        show(f"{name:{width}} {content['title']}")
+        show(f"{name:{width}}  {content['title']}")
     return OK

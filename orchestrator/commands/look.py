@@ -15,7 +15,7 @@ from orchestrator.commands.options import (
     request,
     status,
 )
-from orchestrator.commands.streams import OK, say, show
+from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
@@ -30,32 +30,65 @@ from orchestrator.runs.record import changed_files, read_record, read_result, ta
 from orchestrator.runs.request import Files, Request
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
+#: The scenario that a live page opens unless another is named.
+_OPENED = "fig4"
+
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu plot`."""
+    describe(
+        parser,
+        "Draw signals of stored results over time. Several results are drawn over each other.",
+        "plot results/fig5 results/fig5/fig5-pd 'plant.y.*' --out y.png",
+    )
     parser.add_argument(
         "what",
         nargs="+",
         metavar="RESULT|PATTERN",
-        help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
-        "default patterns: errors, commands and estimates",
+        help="result folders or tables, and patterns of signals such as plant.y.*; default "
+        "patterns: errors, commands and estimates",
     )
-    _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    _add_file(parser, "picture to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu view`."""
-    parser.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
-    _add_file(parser, f"a .html; default: {VIEW} beside the table")
+    describe(
+        parser,
+        "Write one self-contained page that plays a stored result: the path in 3D, and signals "
+        "over time.",
+        "view results/fig4",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT", help="result folder or table")
+    _add_file(parser, f"page to write: .html; default: {VIEW} next to the table")
     parser.set_defaults(action=_view)
+
+
+def add_live(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu live`."""
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default=_OPENED,
+        metavar="SCENARIO|FILE.toml",
+        help="the scenario that the page opens, of the bundle's components; it has all scenarios "
+        f"of `auv-fmu list` besides; default: {_OPENED}",
+    )
+    _add_file(parser, "a .html; default: SCENARIO-live.html")
+    parser.set_defaults(action=_live)
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
+    describe(
+        parser,
+        "Run a scenario and write a film of the vehicle with its errors and commands.",
+        "animate fig4 --out fig4.gif",
+    )
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
@@ -64,9 +97,9 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=FRAMES_PER_SECOND,
         metavar="N",
-        help=f"frames per second; default: {FRAMES_PER_SECOND}",
+        help=f"number of frames per second; default: {FRAMES_PER_SECOND}",
     )
-    _add_file(parser, "a .gif or .mp4; default: results/SCENARIO.gif")
+    _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
     parser.set_defaults(action=_animate)
 
 
@@ -77,7 +110,7 @@ def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None =
 
 def _plot(options: argparse.Namespace) -> int:
     if options.out.suffix not in _PLOTS:
-        raise InputError(f"{options.out}: write a {', '.join(_PLOTS)}")
+        raise InputError(f"{options.out}: must end with {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}")
     paths = [Path(text) for text in options.what if _is_there(text)]
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
@@ -85,6 +118,7 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
+    runs = _named(runs, paths)
     tables = (run.result for run in runs)
     figure = plot(list(zip(told_apart(runs, paths), tables, strict=True)), patterns)
     with _written([options.out], options.force) as folder:
@@ -98,6 +132,18 @@ def _warn(table: Path) -> None:
         say(f"warning: {file} was changed since the run wrote it")
 
 
+def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
+    """Runs by their labels, or by their scenarios if labels are missing or the same."""
+    records = [read_record(table_in(path)) for path in paths]
+    labels = {record.get("label") for record in records} - {"", None}
+    if len(labels) == len(runs):
+        return list(runs)
+    return [
+        run._replace(label=str(record.get("scenario") or run.label))
+        for run, record in zip(runs, records, strict=True)
+    ]
+
+
 def _is_there(text: str) -> bool:
     """Whether there is such a file or folder; not if the text cannot be the name of one."""
     with suppress(OSError):
@@ -109,10 +155,14 @@ def _view(options: argparse.Namespace) -> int:
     file = table_in(options.result)
     out = options.out or file.with_name(VIEW)
     if out.suffix != ".html":
-        raise InputError(f"{out}: write a .html")
+        raise InputError(f"{out}: must end with .html")
     _warn(file)
     run = read_result(file)
-    title = str(read_record(file).get("title") or run.label)
+    record = read_record(file)
+    title = str(record.get("title") or run.label)
+    # A title may name all runs that a scenario compares; the page shows one.
+    if label := record.get("label"):
+        title += f" (shown: {label})"
     shown = list(_of_vehicles(run, out, title))
     try:
         pages = {file.name: view_page(heading, one) for one, file, heading in shown}
@@ -121,6 +171,19 @@ def _view(options: argparse.Namespace) -> int:
     with _written([file for _, file, _ in shown], options.force) as folder:
         for name, text in pages.items():
             (folder / name).write_text(text, encoding="utf-8")
+    return OK
+
+
+def _live(options: argparse.Namespace) -> int:
+    # Only this command needs them.
+    from orchestrator.live.assembly import live_page  # noqa: PLC0415
+
+    out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
+    if out.suffix != ".html":
+        raise InputError(f"{out}: write a .html")
+    text = live_page(options.scenario)
+    with _written([out], options.force) as folder:
+        (folder / out.name).write_text(text, encoding="utf-8")
     return OK
 
 

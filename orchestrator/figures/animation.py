@@ -17,6 +17,7 @@ from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.figures.drawing import styled
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, draw_all_errors, draw_commands, over_time
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading
 from orchestrator.figures.view import PAINT, Z_UP, body
@@ -61,11 +62,11 @@ def check_film(path: Path, fps: int) -> None:
 
     """
     if path.suffix not in (".gif", ".mp4"):
-        raise InputError(f"{path}: write a .gif or an .mp4")
+        raise InputError(f"{path}: must end with .gif or .mp4")
     if path.suffix == ".mp4" and which("ffmpeg") is None:
         raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
     if not 1 <= fps <= 50:
-        raise InputError(f"--fps {fps}: write a number from 1 to 50")
+        raise InputError(f"--fps {fps}: must be from 1 to 50")
 
 
 def animate(text: str, run: Drawn, path: Path, fps: int = FRAMES_PER_SECOND) -> None:
@@ -124,6 +125,7 @@ def _frames(text: str, run: Drawn, n: int) -> Iterator[Image.Image]:
         grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
         scene = _Scene(figure.add_subplot(grid[0]), run)
         series = _draw_series(Cell(figure, grid[1]), run)
+        list_events(figure, [run], grow=False)
         markers = [
             axes.axvline(0.0, color="black", linewidth=1.0, animated=True) for axes in series
         ]

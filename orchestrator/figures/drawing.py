@@ -18,6 +18,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, Panel, Rows
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import FIGURE_FORMATS, FIGURE_WIDTH, SETTINGS, Drawn, heading
@@ -79,7 +80,7 @@ def save(figure: Figure, *paths: Path) -> None:
             try:
                 engine.execute(figure)
             except (ValueError, OverflowError) as error:
-                raise InputError("values lie too far apart to be drawn") from error
+                raise InputError("values are too far apart to draw") from error
         figure.set_layout_engine(None)
         for path in paths:
             figure.savefig(path, metadata=_NO_DATE[path.suffix])
@@ -116,6 +117,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
             width = columns // len(row)
             for j, panel in enumerate(row):
                 panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
+        list_events(figure, runs)
     return figure, [note for panel in panels for note in _left_out(panel, runs)]
 
 
@@ -123,9 +125,9 @@ def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
     """What a panel does not show, and why."""
     missing = {run.label: run.lacks(panel.needs) for run in runs}
     if all(missing.values()):
-        return [f"{panel.name} left out: no {missing[runs[0].label][0]}"]
+        return [f"{panel.name} skipped: no {missing[runs[0].label][0]}"]
     return [
-        f"{panel.name} of {label} left out: no {names[0]}"
+        f"{panel.name} of {label} skipped: no {names[0]}"
         for label, names in missing.items()
         if names
     ]
@@ -234,9 +236,9 @@ def _drawn(
                 save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
                 notes += left_out
             except InputError as error:
-                notes.append(f"{stem}{suffix} left out: {error}")
+                notes.append(f"{stem}{suffix} skipped: {error}")
         elif not suffix:
             return [f"no figure: the run has no {left_out[0]}"]
         else:
-            notes.append(f"{stem}{suffix} left out: no {left_out[0]}")
+            notes.append(f"{stem}{suffix} skipped: no {left_out[0]}")
     return notes

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from orchestrator.figures.drawing import Plot, styled
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.style import (
     COLOURS,
@@ -82,7 +83,9 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
             _draw_panel(place, group, unit, members, runs)
             for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
         ]
-        over_time(list(axes), [Drawn(*run) for run in runs], any(has_means))
+        drawn = [Drawn(*run) for run in runs]
+        over_time(list(axes), drawn, any(has_means))
+        list_events(figure, drawn)
         if len(runs) > 1:
             in_colour = all(len(members) == 1 for members in panels.values())
             lines = [
@@ -137,7 +140,12 @@ def group_of(column: str) -> str:
 
 
 def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
-    return table.time, table[name]
+    time, values = table.time, table[name]
+    if table.header.units.get(name) == "rad":
+        # An angle that wraps has a gap: a line across the panel would be no motion.
+        wraps = 1 + np.flatnonzero(np.abs(np.diff(values)) > np.pi)
+        time, values = np.insert(time, wraps, np.nan), np.insert(values, wraps, np.nan)
+    return time, values
 
 
 def _draw_panel(

@@ -60,7 +60,7 @@ class EventTable(TomlTable):
         "Whether it happens each time that `when` becomes true, not only the first time.", "`false`"
     )
     duration: Annotated[float, Field(gt=0.0), "positive number"] = entry(
-        "How long it lasts [s].", "for good", key="for"
+        "How long it lasts [s].", "until the run ends", key="for"
     )
     label: str = entry("Its name in figures.", "what it does")
     set: dict[str, Any] = entry(
@@ -112,9 +112,9 @@ class ScenarioFile(TomlTable):
         "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
         "file, relative to this one. It keeps its controller. Other components, the wires between "
         "them, `[path]` and the parameters of the planner are this scenario's, so that both follow "
-        "one reference; everything else that this scenario and the command line set applies to "
-        "both, as far as both have it. If both have the same controller, it keeps all components "
-        "but the planner.",
+        "one reference. Other settings of this scenario and of the command line apply to both "
+        "runs, where both have such a parameter. If both have the same controller, it keeps all "
+        "components except the planner.",
         "none",
     )
     stop_time: float = entry("End of the run [s].", "100 s")
@@ -130,11 +130,11 @@ class ScenarioFile(TomlTable):
         "`gauss-seidel`",
     )
     coupling: Annotated[str, OneOf(COUPLINGS)] = entry(
-        "How rings of direct feedthroughs are closed.",
+        "How algebraic loops, which are rings of direct feedthroughs, are closed.",
         "`solve` where the FMUs allow it, else `delay`",
     )
     only: list[Name] = entry(
-        "The components to keep; the wires of the others go with them.", "all of them"
+        "The components to keep; wires to the others are removed too.", "all of them"
     )
     remark: str = entry("What the report says below the figure, in Markdown.", "none")
     components: dict[str, Name] = entry(
@@ -164,7 +164,7 @@ class ScenarioFile(TomlTable):
         "A table of inputs over time: [see below](#inputs).", "inputs keep their values"
     )
     ours: Annotated[dict[str, Any], "table of texts"] = entry(
-        'Which of the values above are not the paper\'s, and why: `stop_time = "why"`, '
+        'Values above that are not the paper\'s, and why: `stop_time = "why"`, '
         '`plant.noise.std = "why"`.',
         "none",
     )

@@ -67,8 +67,8 @@ class Means:
     engine: Annotated[
         EngineName | None,
         CliOption(
-            "what makes the runs: the FMUs, or the compiled equations, with the same numbers; "
-            "default: the study's own",
+            "engine that makes the runs: fmu (the FMUs) or batch (the compiled equations); both "
+            "give the same numbers; default: from the study",
             choices=ENGINES,
         ),
     ] = None
@@ -84,7 +84,9 @@ class Means:
     ] = None
     workers: Annotated[
         int | None,
-        CliOption("number of processes on this machine; default: its cores", type=int, metavar="N"),
+        CliOption(
+            "number of processes on this machine; default: one per core", type=int, metavar="N"
+        ),
     ] = None
     force: Force = False
 
@@ -93,8 +95,8 @@ class Means:
             raise InputError(f"--workers {self.workers}: must be at least 1")
         if self.workers is not None and self.scheduler is not None:
             raise InputError(
-                "--workers is for processes of this machine: those of a scheduler are started with "
-                "it"
+                "--workers sets the processes on this machine; workers of a scheduler are started "
+                "with the scheduler"
             )
 
 
@@ -191,7 +193,17 @@ def complete_study(
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(draw_figures(entries, study.title, result, unfinished, legends))
+            notes = list(
+                draw_figures(
+                    entries,
+                    study.title,
+                    result,
+                    unfinished,
+                    legends,
+                    space.units,
+                    space.logarithmic,
+                )
+            )
         for note in notes:
             say(note)
     return result

@@ -61,6 +61,18 @@ def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
     assert len({line.get_color() for line in members.get_lines()}) == 3
 
 
+def test_an_angle_that_wraps_has_a_gap():
+    table = loop_table()
+    yaw = np.remainder(np.linspace(0.0, 9.0, len(table)) + np.pi, 2.0 * np.pi) - np.pi
+    table["plant.eta.psi"][:] = yaw
+    [[_, line]] = drawn(plot([("run", table)], ["plant.eta.psi"])).values()
+    wraps = np.flatnonzero(np.isnan(line))
+    # Between 0 and 9 it passes pi, and does not reach 3 pi.
+    assert len(wraps) == 1
+    assert line[wraps[0] - 1] > 3.0 and line[wraps[0] + 1] < -3.0
+    np.testing.assert_array_equal(line[~np.isnan(line)], yaw)
+
+
 def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
     own = table_of(TIME, mine__a=np.arange(10.0))
     lines = drawn(plot([("loop", loop_table()), ("own", own)], ["mine.a"]))
@@ -81,7 +93,7 @@ def test_what_cannot_be_chosen_is_explained():
 
 def test_values_that_no_axis_can_show_are_refused(tmp_path):
     figure = plot([("own", table_of(TIME, mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"])
-    with pytest.raises(InputError, match="too far apart to be drawn"):
+    with pytest.raises(InputError, match="too far apart to draw"):
         save(figure, tmp_path / "plot.png")
     assert list(tmp_path.iterdir()) == []
 

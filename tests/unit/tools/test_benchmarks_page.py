@@ -1,0 +1,45 @@
+"""The page of benchmarks: its commands, and how a new measurement comes into it."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+
+import pytest
+
+import benchmarks_page
+from benchmarks_page import PAGE, ROOT, measured, write_part
+
+
+def test_every_part_of_the_page_has_a_command_that_is_there():
+    text = PAGE.read_text(encoding="utf-8")
+    places = benchmarks_page._PLACE.findall(text)
+    assert len(places) == text.count("<!-- filled:") > 10
+    for name, command in places:
+        assert (ROOT / shlex.split(command)[0]).is_file(), name
+
+
+def test_a_measurement_takes_its_place(tmp_path, monkeypatch):
+    page, script = tmp_path / "page.md", tmp_path / "script.py"
+    script.write_text("import sys; print('1.5 us', sys.argv[1:])\n")
+    parts = [
+        f"<!-- filled: {name} -->\n`python {script} --n 3`, once:\n\n```text\n0\n```\n<!-- / -->"
+        for name in ("first", "second")
+    ]
+    page.write_text("\n\n".join(parts))
+    monkeypatch.setattr(benchmarks_page, "PAGE", page)
+    write_part("second", measured("second", f"{script} --n 3"))
+    first, second = page.read_text().split("\n\n<!--")
+    assert first == parts[0]
+    assert re.search(rf"`python {script} --n 3`, \d{{4}}-\d\d-\d\d, .+:\n", second)
+    assert "```text\n1.5 us ['--n', '3']\n```\n<!-- / -->" in second
+    write_part("second", measured("second", f"{script} --n 4"))
+    assert page.read_text().count("1.5 us") == 1
+
+
+def test_a_script_that_fails_changes_nothing(tmp_path):
+    script = tmp_path / "script.py"
+    script.write_text("raise SystemExit(3)\n")
+    with pytest.raises(subprocess.CalledProcessError):
+        measured("first", str(script))
