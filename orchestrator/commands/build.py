@@ -58,7 +58,7 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         "--loader",
         choices=("native", "plain"),
         help=f"loader in the FMUs of --kind {PYTHON}: native also works in hosts that are not "
-        "Python programs and needs a C compiler; plain needs none; default: native if there is a "
+        "Python programs and needs a C compiler; plain does not; default: native if there is a "
         "C compiler",
     )
     parser.set_defaults(action=_build)

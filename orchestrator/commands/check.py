@@ -30,7 +30,7 @@ _SURPRISES = {
     ("needsExecutionTool", True): "needs the program that it was made with",
     ("canHandleVariableCommunicationStepSize", False): "takes only steps of a fixed length: the "
     "stop time must be a multiple of the step",
-    ("canRunAsynchronuously", True): "may compute a step while its host goes on",
+    ("canRunAsynchronuously", True): "may compute a step while its host continues",
     ("canGetAndSetFMUstate", False): "cannot save its state: a run of it cannot be resumed",
 }
 

@@ -301,7 +301,7 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
 
 def _check_room(whole: _Whole, files: int, size: int) -> None:
     """Refuse what fills the disk together with what there is."""
-    within = f"and {whole.archive} with all that is in it to"
+    within = f"and {whole.archive} with everything in it to"
     if (together := whole.files + files) > _MOST_FILES:
         raise ValueError(
             f"it unpacks to {files:,} files, {within} {together:,}, more than {_MOST_FILES:,}"

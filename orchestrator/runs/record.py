@@ -378,7 +378,7 @@ def leave_checkpoints(
             checkpoints.remove()
         elif checkpoints.time is not None:
             place = _shown(checkpoints.folder)
-            say(f"--resume goes on from t = {checkpoints.time:g} s, from {place}")
+            say(f"--resume continues from t = {checkpoints.time:g} s, from {place}")
 
 
 def _shown(folder: Path) -> Path:
