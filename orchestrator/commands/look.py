@@ -11,12 +11,11 @@ from orchestrator.commands.options import (
     add_options,
     add_set,
     add_system,
-    describe,
     read_system,
     request,
     status,
 )
-from orchestrator.commands.streams import OK, say, show
+from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
@@ -30,6 +29,9 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
+
+#: The scenario that a live page opens unless another is named.
+_OPENED = "fig4"
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
@@ -64,6 +66,26 @@ def add_view(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("result", type=Path, metavar="RESULT", help="result folder or table")
     _add_file(parser, f"page to write: .html; default: {VIEW} next to the table")
     parser.set_defaults(action=_view)
+
+
+def add_live(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu live`."""
+    describe(
+        parser,
+        "Write one self-contained page in which the closed loop runs in the browser: change gains, "
+        "limits, noise or the start, and the figures follow.",
+        "live fig5 --out live.html",
+    )
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default=_OPENED,
+        metavar="SCENARIO|FILE.toml",
+        help="scenario that the page opens with, made of the bundle's components; the page also "
+        f"offers every scenario of `auv-fmu list`; default: {_OPENED}",
+    )
+    _add_file(parser, "page to write: .html; default: SCENARIO-live.html")
+    parser.set_defaults(action=_live)
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
@@ -155,6 +177,19 @@ def _view(options: argparse.Namespace) -> int:
     with _written([file for _, file, _ in shown], options.force) as folder:
         for name, text in pages.items():
             (folder / name).write_text(text, encoding="utf-8")
+    return OK
+
+
+def _live(options: argparse.Namespace) -> int:
+    # Only this command needs them.
+    from orchestrator.live.assembly import live_page  # noqa: PLC0415
+
+    out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
+    if out.suffix != ".html":
+        raise InputError(f"{out}: must end with .html")
+    text = live_page(options.scenario)
+    with _written([out], options.force) as folder:
+        (folder / out.name).write_text(text, encoding="utf-8")
     return OK
 
 
