@@ -47,7 +47,11 @@ def main() -> None:
         space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
         entries = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
-            list(draw_figures(entries, study.title, result, Path(drawn)))
+            list(
+                draw_figures(
+                    entries, study.title, result, Path(drawn), None, space.units, space.logarithmic
+                )
+            )
             for file in sorted(Path(drawn).glob("*.png")):
                 _keep(Image.open(file).convert("RGB"), f"studies/{study.name}-{file.name}")
 

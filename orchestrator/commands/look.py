@@ -110,7 +110,7 @@ def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None =
 
 def _plot(options: argparse.Namespace) -> int:
     if options.out.suffix not in _PLOTS:
-        raise InputError(f"{options.out}: write a {', '.join(_PLOTS)}")
+        raise InputError(f"{options.out}: must end with {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}")
     paths = [Path(text) for text in options.what if _is_there(text)]
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
@@ -155,7 +155,7 @@ def _view(options: argparse.Namespace) -> int:
     file = table_in(options.result)
     out = options.out or file.with_name(VIEW)
     if out.suffix != ".html":
-        raise InputError(f"{out}: write a .html")
+        raise InputError(f"{out}: must end with .html")
     _warn(file)
     run = read_result(file)
     record = read_record(file)

@@ -17,7 +17,7 @@ import pytest
 from orchestrator.commands.main import main
 from orchestrator.live.assembly import ENGINE, WEB, live_page, live_script
 from orchestrator.live.module import live_module
-from orchestrator.live.presets import page_data, runs_of
+from orchestrator.live.presets import page_data, preset, runs_of
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.scenario import names
 from orchestrator.vehicle.indices import metrics_of
@@ -124,6 +124,76 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         assert said["metrics"].keys() == wanted.keys()
         for index, values in wanted.items():
             assert said["metrics"][index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)
+
+
+#: Events of all kinds, at times and conditions, one upon another.
+EVENTS = """
+stop_time = 20.0
+[parameters]
+planner.eta0.z = -2.0
+[[events]]
+at = 2.0
+for = 3.0
+override = { controller.tau.u = 15.0 }
+[[events]]
+at = 3.0
+for = 1.0
+bias = { plant.y = 0.2 }
+[[events]]
+at = 3.5
+for = 4.0
+freeze = "planner.y_d"
+[[events]]
+when = "plant.nu.u > 0.2"
+repeat = true
+for = 0.5
+set = { controller.eps_t = 2.0, plant.current.x = 0.1 }
+[[events]]
+at = 5.0
+set = { plant.water = [0.1, 0.2, 0.0] }
+[[events]]
+at = 7.0
+release = "planner.y_d"
+[[events]]
+at = 9.0
+bias = { plant.water.x = 0.3 }
+[[events]]
+at = 10.0
+reset = ["controller"]
+[[events]]
+at = 12.0
+release = "plant.water"
+[[events]]
+at = 15.0
+drop = "plant.y"
+LAST
+"""
+
+
+@pytest.mark.parametrize(
+    ("last", "end"),
+    [
+        ('[[events]]\nwhen = "plant.eta.x < 1e9"\nstop = true', 20.0),
+        ("[[events]]\nat = 18.0\nstop = true", 18.0),
+        ("[[events]]\nat = 18.0\noverride = { disturbance.tau_w.u = 1e300 }", 18.0),
+    ],
+    ids=["whole", "stopped", "refused"],
+)
+def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text(EVENTS.replace("LAST", last))
+    data = json.loads(parts.data.read_text())
+    (tmp_path / "data.json").write_text(json.dumps(data | {"presets": [preset(str(scenario))]}))
+    said = parts._replace(data=tmp_path / "data.json").node("rows.mjs", str(tmp_path))["mine.0"]
+    [run, _] = runs_of(str(scenario))
+    table = Table()
+    ending = run.run([table])
+    assert table.time[-1] == pytest.approx(end)
+    found = np.fromfile(tmp_path / "mine.0").reshape(table.rows.shape)
+    assert found == pytest.approx(table.rows, rel=TOLERANCE, abs=TOLERANCE)
+    assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
+    assert len(ending.events) > 12
+    assert (said.get("failure"), said.get("remark")) == (ending.failure, ending.remark)
 
 
 def test_tables_are_the_same_in_node_and_in_a_browser(parts: Parts, opened: Browser):
