@@ -126,9 +126,7 @@ def linked(text: str, place: str, files: Files) -> str:
         if (ROOT / file).is_dir():
             wanted += "/README.md"
         if files.get_file_from_path(wanted):
-            return (
-                f"[{label}]({posixpath.relpath(wanted, posixpath.dirname(place) or '.')}{anchor})"
-            )
+            return f"[{label}]({posixpath.relpath(wanted, here)}{anchor})"
         if (ROOT / file).exists() and not file.startswith("docs/"):
             return label if label.startswith("`") else f"{label} (`{file}`)"
         return link.group()
