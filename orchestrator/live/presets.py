@@ -143,7 +143,7 @@ def _check(prepared: Prepared) -> None:
     ours = {part.digest for part in bundle().values()}
     foreign = [name for name, part in system.components.items() if part.digest not in ours]
     lacking = {
-        f"FMUs of others ({', '.join(foreign)})": foreign,
+        f"third-party FMUs ({', '.join(foreign)})": foreign,
         "rings of direct feedthroughs": rings(system),
         "linear inputs": experiment.coupling == LINEAR,
         "components with longer steps": any(n > 1 for n in plan.decimations.values()),
@@ -293,7 +293,7 @@ def _action(action: Action) -> Plain:
             return {"kind": "reset", "components": list(components)}
         case Stop(why):
             return {"kind": "stop", "why": why}
-    raise TypeError(f"the page knows no event {action!r}")
+    raise TypeError(f"the page does not know the event {action!r}")
 
 
 def _assigned(values: Sequence[tuple[PortName, Value]]) -> list[list[Value]]:

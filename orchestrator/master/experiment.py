@@ -258,6 +258,6 @@ def _common_measure(steps: Iterable[float]) -> float:
         listed = ", ".join(f"{float(step):g}" for step in sorted(set(exact)))
         raise InputError(
             f"the components want steps of {listed} s, which have no common divisor; give a "
-            "communication step of which all of them are multiples"
+            "communication step that divides all of them"
         )
     return float(common)

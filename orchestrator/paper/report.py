@@ -39,7 +39,7 @@ _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
 #: The files.
 _NAMES = _PAGE, _MARKDOWN = "report.html", "report.md"
 
-_TITLE = "# The paper's section 4, run again"
+_TITLE = "# Section 4 reproduced"
 
 _INTRODUCTION = """\
 *Three-dimensional tracking control of autonomous underwater vehicles with limited torque and \
@@ -47,7 +47,7 @@ without velocity sensors*, simulated from FMI 2.0 components. Differences from t
 stated; no parameter was chosen to bring the results closer. The paper gives neither the level of \
 its measurement noise nor the end times of its figures: the scenarios have ours, and all but Fig. \
 4 run without noise, so that roughness in a signal comes from the controller itself. In every run \
-the righting moment of roll, 5 N·m (reading 1), and the seed of any noise are ours as well. The \
+the righting moment of roll, 5 N·m (reading 1), and the seed of any noise are also ours. The \
 readings, points where the paper is silent or contradicts itself, are explained [at the \
 end](#readings)."""
 
@@ -58,8 +58,8 @@ end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_
 millimetres, up to a centimetre, for the same reason."""
 
 _NO_VARIANTS = """\
-No choice of what is not given brings all of them together: `auv-fmu table` tries every \
-combination, and so does `auv-fmu report --studies`, for this section."""
+No choice of the open points gives all of them together: `auv-fmu table` tries every \
+combination. `auv-fmu report --studies` does so for this section."""
 
 
 def write_report(
@@ -187,10 +187,19 @@ def _text(
 
 
 def _claims(kept_runs: KeptRuns) -> str:
-    rows = []
+    rows, verdicts = [], []
     for claim in CLAIMS:
         finding = claim.finding([kept_runs[request] for request in claim.runs])
+        verdicts.append(finding.verdict)
         cells = [claim.title, claim.published, finding.ours, finding.verdict]
         runs = ", ".join(f"`{kept_runs.label(request)}`" for request in claim.runs)
         rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
-    return table(["claim", "paper", "ours", "verdict", "run"], rows)
+    return f"{counted(verdicts)}\n\n" + table(["claim", "paper", "ours", "verdict", "run"], rows)
+
+
+def counted(verdicts: Sequence[str]) -> str:
+    """How many verdicts there are of each kind, in a sentence."""
+    agree, differ = (sum(v.startswith(kind) for v in verdicts) for kind in ("agrees", "**"))
+    text = f"Of {len(verdicts)} printed numbers and claims, {agree} agree and {differ} do not"
+    rest = len(verdicts) - agree - differ
+    return f"{text}; for the other {rest} the verdict is a ratio, ours to the printed number."

@@ -181,8 +181,8 @@ def test_a_run_with_a_companion_and_figures(capsys):
     capsys.readouterr()
     assert run(*arguments, "--resume", out="killed") == 0
     assert capsys.readouterr().err.splitlines() == [
-        "auv-fmu: fig5: goes on at t = 0.9 s",
-        "auv-fmu: fig5-pd: goes on at t = 0.6 s",
+        "auv-fmu: fig5: continues at t = 0.9 s",
+        "auv-fmu: fig5-pd: continues at t = 0.6 s",
     ]
     assert result("killed") == result("whole")
 
@@ -241,7 +241,7 @@ def test_another_run_is_refused(left, capsys, change, words):
     before = contents(Path("r"))
     assert run(*LEFT, *change, "--resume", out="r") == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert line.startswith("auv-fmu: r/checkpoint is of another run: ")
+    assert line.startswith("auv-fmu: r/checkpoint belongs to another run: ")
     assert mentions(line, words)
     assert contents(Path("r/checkpoint")) == {
         name.removeprefix("checkpoint/"): content
