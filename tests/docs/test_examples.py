@@ -71,7 +71,6 @@ def test_scenario_of_a_guide_runs_and_is_drawn(page: Path, number: int):
     """What it says of its stop time holds, unless the command line says another."""
     [table] = [text for _, text in blocks(EVENTS, "text") if text.startswith("time")]
     Path("inputs.csv").write_text(table)
-    exec(compile(blocks(EVENTS, "python")[1].text, str(EVENTS), "exec"), {})
     Path("survey.csv").write_text("x,y,z\n3,6,0\n15,6,4\n15,10,4\n")
     Path("mine.toml").write_text(blocks(page, "toml")[number].text)
     assert main(["run", "mine.toml", "--stop-time", "2", "--kind", "native"]) == 0
