@@ -7,16 +7,24 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Final, Literal, NamedTuple, TypeAlias, get_args
 
-#: Python sources that PythonFMU runs, or libraries translated from them. The first is the default.
-KINDS = PYTHON, NATIVE = "python", "native"
+#: What a run can ask for: Python sources that PythonFMU runs, or libraries translated from them.
+KindName: TypeAlias = Literal["auto", "python", "native"]
 
-#: What a run asks for unless a kind is named: native where available, else Python.
-AUTO = "auto"
+#: Native where available, else Python: the default of runs. The others are kinds of FMUs, and the
+#: first of them is the default of a build.
+AUTO: Final = "auto"
+PYTHON: Final = "python"
+NATIVE: Final = "native"
+KINDS: tuple[KindName, ...] = tuple(kind for kind in get_args(KindName) if kind != AUTO)
 
 #: Packages besides ours whose code is in the FMUs of each kind.
 CONTAINED: Mapping[str, Sequence[str]] = {PYTHON: ("pythonfmu",), NATIVE: ()}
+
+#: The versions of FMI. The Python kind has the first.
+FmiVersion: TypeAlias = Literal["2", "3"]
+FMI_VERSIONS: tuple[FmiVersion, ...] = get_args(FmiVersion)
 
 #: What FMI 3.0 and the zig compiler call a machine; with the oldest glibc that libraries run on.
 TARGETS = {
@@ -44,8 +52,6 @@ _MACHINES: Mapping[str, Mapping[str, Sequence[str]]] = {
     "3": {machine: (machine,) for machine in TARGETS},
 }
 
-#: The versions of FMI. The Python kind has the first.
-FMI_VERSIONS = tuple(_MACHINES)
 
 #: Other names of processors.
 _PROCESSORS = {"amd64": "x86_64", "arm64": "aarch64"}

@@ -30,15 +30,19 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from orchestrator.runs.loading import load
-    from orchestrator.runs.result import Result, simulate
+    from orchestrator.runs.result import Result, read
+    from orchestrator.runs.simulate import simulate
+    from orchestrator.studies.study_result import StudyResult
     from orchestrator.studies.sweep import sweep
 
-__all__ = ["Result", "load", "simulate", "sweep"]
+__all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
 
 _MODULES = {
     "Result": "runs.result",
+    "StudyResult": "studies.study_result",
     "load": "runs.loading",
-    "simulate": "runs.result",
+    "read": "runs.result",
+    "simulate": "runs.simulate",
     "sweep": "studies.sweep",
 }
 

@@ -33,7 +33,6 @@ REASONS = {
     "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
     "fmus/python/own.py": "a program of its own: python -m fmus.python.own",
-    "orchestrator/commands/many_runs.py": "imports studies, which other commands must not wait for",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/exchange/hosts/drivers.py": "a function for each tool, and nothing of ours",
     "orchestrator/paper/claims.py": "a function for each claim of the paper",

@@ -1,9 +1,9 @@
 """Check the English of the pages: words to avoid, and how long the sentences are.
 
-`python tools/prose.py` reads all pages, the Markdown of notebooks and the help of every command;
-`python tools/prose.py PATH...` reads some pages, or all in a folder. It prints what to write
-instead, a line for each finding, then for each page how many words its sentences have. It fails
-where there is a finding, and where sentences have more than 20 words on average.
+`python tools/prose.py` reads all pages, the Markdown of notebooks and the messages in the code of
+`orchestrator`; `python tools/prose.py PATH...` reads some pages, or all in a folder. It prints a
+line for each finding, with the words to write instead. Then it prints the lengths of the sentences
+of each page, in words. It fails if there is a finding, or an average above 20 words.
 
 The words are in `tools/prose.toml`; others come from proselint, which the extra `dev` installs.
 Code, the targets of links and comments are not read. Lengths are of whole sentences in paragraphs
@@ -13,6 +13,7 @@ and lists; headings, cells of tables and other items of lists are read for their
 from __future__ import annotations
 
 import argparse
+import ast
 import json
 import re
 import sys
@@ -31,8 +32,6 @@ from proselint.checks import __register__ as library_checks
 from proselint.config import DEFAULT
 from proselint.registry import CheckRegistry
 from proselint.tools import LintFile
-
-from orchestrator.commands.main import parser
 
 ROOT = Path(__file__).parents[1]
 
@@ -63,7 +62,7 @@ _ABBREVIATION = re.compile(
 
 
 class Block(NamedTuple):
-    """A paragraph, a heading, an item or a cell: its first line, and whether it is sentences."""
+    """A paragraph, heading, item, cell or message: its first line, and whether it is sentences."""
 
     line: int
     text: str
@@ -71,7 +70,7 @@ class Block(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page under the name that a reader finds it by, or the help of a command."""
+    """A page or a module, by its path."""
 
     name: str
     blocks: Sequence[Block]
@@ -104,23 +103,29 @@ def pages(paths: Sequence[Path]) -> Iterator[Page]:
 
 
 def all_pages() -> Iterator[Page]:
-    """All pages of the repository, then the help of all commands."""
+    """All pages of the repository, then the messages of the program."""
     yield from pages([*sorted(ROOT.glob("*.md")), ROOT / "docs"])
-    yield from helps(parser())
+    for file in sorted(ROOT.glob("orchestrator/**/*.py")):
+        blocks = list(message_blocks(file.read_text(encoding="utf-8")))
+        yield Page(file.relative_to(ROOT).as_posix(), blocks)
 
 
-def helps(command: argparse.ArgumentParser) -> Iterator[Page]:
-    """The help of a command, then of the commands below it."""
-    texts, below = [command.description, command.epilog], []
-    for action in command._actions:
-        texts.append(action.help)
-        if isinstance(action, argparse._SubParsersAction):
-            texts += [choice.help for choice in action._choices_actions]
-            below += action.choices.values()
-    blocks = [Block(0, text, False) for text in texts if text and text != argparse.SUPPRESS]
-    yield Page(f"{command.prog} --help", blocks)
-    for other in below:
-        yield from helps(other)
+def message_blocks(text: str) -> Iterator[Block]:
+    """The texts in a module that a user may read: errors, help, labels, and not docstrings."""
+    tree = ast.parse(text)
+    hidden = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            hidden |= set(map(id, node.values))
+            words = "".join(
+                str(part.value) if isinstance(part, ast.Constant) else _CODE for part in node.values
+            )
+        elif isinstance(node, ast.Constant) and id(node) not in hidden:
+            words = str(node.value)
+        else:
+            continue
+        if " " in words:
+            yield Block(node.lineno, words, False)
 
 
 def notebook_blocks(text: str) -> Iterator[Block]:
@@ -202,8 +207,8 @@ def findings(page: Page) -> Iterator[str]:
         block = page.blocks[number]
         first = begin - begins[number]
         line = block.line + block.text.count("\n", 0, first)
-        place = f"{page.name}:{line}" if block.line else page.name
-        yield f'{place}: "{quotation(block.text, first, end - begins[number])}" -> {write}'
+        quoted = quotation(block.text, first, end - begins[number])
+        yield f'{page.name}:{line}: "{quoted}" -> {write}'
 
 
 def library_findings(text: str) -> Iterator[tuple[int, int, str]]:

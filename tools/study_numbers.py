@@ -2,7 +2,7 @@
 
 `python tools/study_numbers.py results/noise ...` prints the numbers of the ready studies that were
 made in these folders, a line each: a statistic, of a column of runs.parquet, over the runs that a
-query selects. So nothing is read off bins. Columns have the names of studies.md without the
+query selects. So nothing is read off bins. Columns have the names of study-files.md without the
 component and with _ for what is no letter; `peak` is the largest of the three peak commands, and
 `final_error` of the three final errors.
 

@@ -22,9 +22,9 @@ _FOLDER = Path(__file__).parent
 RUNTIME = _FOLDER / "runtime"
 
 #: The file to compile, by the version of FMI: it includes all others.
-MAIN = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
+MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
 
-_DESCRIBE = dict(
+_DESCRIBE: dict[str, Callable[[str, str, str, Sequence[Port]], bytes]] = dict(
     zip(FMI_VERSIONS, (description.fmi2_description, description_fmi3.fmi3_description))
 )
 

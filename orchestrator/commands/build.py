@@ -15,6 +15,7 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     assignments,
+    describe,
 )
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.machine.errors import InputError
@@ -28,20 +29,27 @@ from orchestrator.vehicle.proof import gain_check
 
 def add_build(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu build`."""
+    describe(
+        parser,
+        "Build every FMU and the bundle auv.ssp, or the FMU of a component of your own. Files that "
+        "are up to date are not built again.",
+        "build --kind native --out dist",
+    )
     add_kind(parser)
     add_fmi(parser)
     parser.add_argument(
         "--platforms",
         metavar="NAME,...|all",
-        help=f"platforms for the libraries of --kind {NATIVE}, by their FMI names; other than this "
-        "machine's need auv-fmu[native]; default: this machine",
+        help=f"platforms to compile for with --kind {NATIVE}, by their FMI names; platforms other "
+        "than this machine's need auv-fmu[native]; default: this machine",
     )
     parser.add_argument(
         "script",
         nargs="?",
         type=Path,
         metavar="SCRIPT.py",
-        help="a PythonFMU slave, whose FMU is built beside it; default: the bundle",
+        help="script with a PythonFMU component of your own; its FMU is written next to it; "
+        "default: build the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
     add_out(parser, f"{folders}, or the folder of SCRIPT.py")
@@ -49,17 +57,28 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--loader",
         choices=("native", "plain"),
-        help=f"for --kind {PYTHON}; native: the FMUs also run in hosts that are not Python "
-        "programs; needs a C compiler and is the default if there is one",
+        help=f"loader in the FMUs of --kind {PYTHON}: native also works in hosts that are not "
+        "Python programs and needs a C compiler; plain does not; default: native if there is a "
+        "C compiler",
     )
     parser.set_defaults(action=_build)
 
 
 def add_new(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu new`."""
-    kinds = parser.add_subparsers(required=True, metavar="KIND")
-    controller = kinds.add_parser("controller", help="a folder with a controller that runs")
-    controller.add_argument("name", metavar="NAME", help="its name: MyLaw or my_law")
+    describe(parser, "Create the files of a component of your own.", "new controller my_law")
+    kinds = parser.add_subparsers(required=True, metavar="KIND", help="kind of component")
+    controller = kinds.add_parser(
+        "controller", help="create a folder with a controller and a scenario that run"
+    )
+    describe(
+        controller,
+        "Create a folder with a controller, a scenario that runs it, and a README.",
+        "new controller my_law --base hardened",
+    )
+    controller.add_argument(
+        "name", metavar="NAME", help="name of the controller, for example MyLaw or my_law"
+    )
     controller.add_argument(
         "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
     )
@@ -67,19 +86,26 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         "--base",
         choices=CONTROLLER_BASES,
         default=CONTROLLER_BASES[0],
-        help="plain: only PythonFMU; hardened: the base of the bundle's components, which checks "
-        f"values, saves states and survives exceptions; default: {CONTROLLER_BASES[0]}",
+        help="base class: plain uses only PythonFMU; hardened is the base of the bundle's "
+        "components and checks values, saves states and survives exceptions; default: "
+        f"{CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu list`."""
+    describe(parser, "List the scenarios with their titles.", "list")
     parser.set_defaults(action=_list)
 
 
 def add_gains(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu gains`."""
+    describe(
+        parser,
+        "Check whether the gains meet the conditions of Theorems 1 and 2.",
+        "gains --set controller.k_d=2",
+    )
     add_set(parser)
     parser.set_defaults(action=_gains)
 
@@ -125,8 +151,9 @@ def _controller(options: argparse.Namespace) -> int:
 
 
 def _list(_: argparse.Namespace) -> int:
+    width = max(map(len, names()))
     for name in names():
-        show(f"{name:10} {read_scenario(name).title}")
+        show(f"{name:{width}}  {read_scenario(name).title}")
     return OK
 
 

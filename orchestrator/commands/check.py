@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 from fmpy.validation import validate_fmu
 
-from orchestrator.commands.options import add_variant
+from orchestrator.commands.options import add_variant, describe
 from orchestrator.commands.streams import BAD_INPUT, OK, show
 from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import unpack
@@ -30,15 +30,21 @@ _SURPRISES = {
     ("needsExecutionTool", True): "needs the program that it was made with",
     ("canHandleVariableCommunicationStepSize", False): "takes only steps of a fixed length: the "
     "stop time must be a multiple of the step",
-    ("canRunAsynchronuously", True): "may compute a step while its host goes on",
+    ("canRunAsynchronuously", True): "may compute a step while its host continues",
     ("canGetAndSetFMUstate", False): "cannot save its state: a run of it cannot be resumed",
 }
 
 
 def add_check(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu check`."""
+    describe(
+        parser,
+        "Validate an FMU, an SSP, a scenario or a study without running it, and list every "
+        "problem. Exit status: 0 without problems, else 2.",
+        "check my_scenario.toml",
+    )
     parser.add_argument(
-        "file", metavar="FILE|DIR|SCENARIO", help="what to check, without running it"
+        "file", metavar="FILE|DIR|SCENARIO", help="file, folder or scenario to validate"
     )
     add_variant(parser)
     parser.set_defaults(action=_check)

@@ -16,6 +16,7 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
+    describe,
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, say, show
@@ -48,12 +49,18 @@ _OF_TABLES = ("scenario", "order", "initial", "verbose", "set")
 
 def add_export(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu export`."""
+    describe(
+        parser,
+        "Write a scenario for other tools: its FMUs, connections and parameters.",
+        "export fig4 --format osp --out exports/fig4",
+    )
     add_system(parser)
     parser.add_argument(
         "--format",
         choices=tuple(EXPORT_FORMATS),
         default="ssp",
-        help="an SSP, libcosim's own folder, or one FMU (needs auv-fmu[hosts]); default: ssp",
+        help="output format: ssp (SSP archive), osp (folder for libcosim) or container (one FMU, "
+        "needs auv-fmu[hosts]); default: ssp",
     )
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
@@ -66,6 +73,11 @@ def add_export(parser: argparse.ArgumentParser) -> None:
 
 def add_release(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu release`."""
+    describe(
+        parser,
+        "Write the archives of a release: every FMU, for all platforms.",
+        "release --out release",
+    )
     add_out(parser, Path("release"))
     add_options(parser, Files, "force")
     parser.set_defaults(action=_release)
@@ -73,15 +85,20 @@ def add_release(parser: argparse.ArgumentParser) -> None:
 
 def add_hosts(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu hosts`."""
+    describe(
+        parser,
+        "Run a scenario in other co-simulation tools and compare their results with this one's.",
+        "hosts fmpy ecos --steps 1000",
+    )
     beside = [name for name, host in HOSTS.items() if not host.pins]
     parser.add_argument(
         "host",
         nargs="*",
         metavar="HOST",
-        help=f"of {', '.join(HOSTS)}; default: {', '.join(beside)}. The others are installed when "
-        "they are first named, each into an environment in the user's cache folder",
+        help=f"tool to run: {', '.join(HOSTS)}; default: {', '.join(beside)}. The others are "
+        "installed at first use, each into its own environment in the user's cache folder",
     )
-    parser.add_argument("--all", action="store_true", help="every host")
+    parser.add_argument("--all", action="store_true", help="run in every tool")
     _add_scenario(parser)
     add_kind(parser)
     add_fmi(parser)
@@ -93,37 +110,43 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu verify`."""
+    describe(
+        parser,
+        "Compare a table from another tool with a run of the same scenario, or run the reference "
+        "experiments of an FMU and compare them with the results that it carries.",
+        "verify their_result.csv --scenario fig4",
+    )
     parser.add_argument(
         "table",
         type=Path,
         metavar="RESULT.csv|FILE.fmu",
-        help="table with a column `time`; or an FMU from any tool: its experiments "
-        "(FMI-LS-REF) are run and compared with the results that it carries",
+        help="table with a `time` column, or FMU with reference experiments (FMI-LS-REF)",
     )
     _add_scenario(parser)
     parser.add_argument(
         "--tolerance",
         type=float,
-        help="largest deviation, relative to the larger of 1 and the port's largest value; "
-        f"default: {TOLERANCE:g}, for an FMU what its experiment says",
+        help="largest allowed deviation, relative to the larger of 1 and the port's largest value; "
+        f"default: {TOLERANCE:g}; for an FMU, as its experiment states",
     )
     parser.add_argument(
         "--order",
         type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help="order in which the tool steps the components, or the names of all of them, with "
-        f"NAME+NAME for some side by side; default: the better match of {' and '.join(ORDERS)}",
+        help=f"order in which the tool steps the components: {', '.join(ORDERS)}, or the names of "
+        f"all components, joined by + where they are stepped side by side; default: whichever of "
+        f"{' and '.join(ORDERS)} matches better",
     )
     parser.add_argument(
         "--initial",
         choices=INITIAL,
         default=INITIAL[0],
-        help="full: the tool exchanges values in initialisation mode; none: only just before the "
-        "first step; zero: not before it, so that inputs begin with zeros or start values; "
-        f"default: {INITIAL[0]}",
+        help="when the tool first exchanges values: full (in initialisation mode), none (just "
+        "before the first step) or zero (not before it; inputs begin with zeros or start "
+        f"values); default: {INITIAL[0]}",
     )
     parser.add_argument(
-        "--verbose", action="store_true", help="name every column that was not compared"
+        "--verbose", action="store_true", help="list every column that was not compared"
     )
     add_set(parser)
     parser.set_defaults(action=partial(_verify, parser.get_default))
@@ -134,7 +157,7 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         default="fig4",
         metavar="SCENARIO|FILE|DIR",
-        help="what the other tool runs; default: fig4",
+        help="scenario that the other tool runs; default: fig4",
     )
 
 

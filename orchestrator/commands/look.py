@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from orchestrator.commands.options import (
     add_options,
     add_set,
     add_system,
+    describe,
     read_system,
     request,
     status,
@@ -19,7 +19,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import OK, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
-from orchestrator.figures.plot import plot, wanted_columns
+from orchestrator.figures.plot import plot, told_apart, wanted_columns
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
@@ -29,11 +29,7 @@ from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
-from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
-
-#: Runs of one scenario are told apart by so many parameters.
-_FEW = 2
 
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
@@ -41,26 +37,42 @@ _PLOTS = (".png", ".svg", ".pdf")
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu plot`."""
+    describe(
+        parser,
+        "Draw signals of stored results over time. Several results are drawn over each other.",
+        "plot results/fig5 results/fig5/fig5-pd 'plant.y.*' --out y.png",
+    )
     parser.add_argument(
         "what",
         nargs="+",
         metavar="RESULT|PATTERN",
-        help="folders or tables of runs, drawn over each other, and patterns such as plant.y.*; "
-        "default patterns: errors, commands and estimates",
+        help="result folders or tables, and patterns of signals such as plant.y.*; default "
+        "patterns: errors, commands and estimates",
     )
-    _add_file(parser, "a .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    _add_file(parser, "picture to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu view`."""
-    parser.add_argument("result", type=Path, metavar="RESULT", help="folder or table of a run")
-    _add_file(parser, f"a .html; default: {VIEW} beside the table")
+    describe(
+        parser,
+        "Write one self-contained page that plays a stored result: the path in 3D, and signals "
+        "over time.",
+        "view results/fig4",
+    )
+    parser.add_argument("result", type=Path, metavar="RESULT", help="result folder or table")
+    _add_file(parser, f"page to write: .html; default: {VIEW} next to the table")
     parser.set_defaults(action=_view)
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
+    describe(
+        parser,
+        "Run a scenario and write a film of the vehicle with its errors and commands.",
+        "animate fig4 --out fig4.gif",
+    )
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
@@ -69,9 +81,9 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=FRAMES_PER_SECOND,
         metavar="N",
-        help=f"frames per second; default: {FRAMES_PER_SECOND}",
+        help=f"number of frames per second; default: {FRAMES_PER_SECOND}",
     )
-    _add_file(parser, "a .gif or .mp4; default: results/SCENARIO.gif")
+    _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
     parser.set_defaults(action=_animate)
 
 
@@ -90,41 +102,30 @@ def _plot(options: argparse.Namespace) -> int:
     for path in paths:
         _warn(table_in(path))
     runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
+    runs = _named(runs, paths)
     tables = (run.result for run in runs)
-    figure = plot(list(zip(_labels(runs, paths), tables, strict=True)), patterns)
+    figure = plot(list(zip(told_apart(runs, paths), tables, strict=True)), patterns)
     with _written([options.out], options.force) as folder:
         save(figure, folder / options.out.name)
     return OK
-
-
-def _labels(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[str]:
-    """What tells runs apart: scenarios, or else a few parameters, or else the ends of paths."""
-    names = [run.label for run in runs]
-    given = [run.result.header.parameters for run in runs]
-    differing = [
-        name
-        for name in dict.fromkeys(name for values in given for name in values)
-        if len({str(values.get(name)) for values in given}) > 1
-    ]
-    changes = [
-        ", ".join([name] * (len(set(names)) > 1) + [f"{k} = {_text(values, k)}" for k in differing])
-        for name, values in zip(names, given, strict=True)
-    ]
-    parts = [path.resolve().parts for path in paths]
-    ends = [["/".join(part[-n:]) for part in parts] for n in range(1, max(map(len, parts)))]
-    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends]
-    return next((labels for labels in candidates if len(set(labels)) == len(labels)), ends[0])
-
-
-def _text(values: Mapping[PortName, Any], name: PortName) -> str:
-    value = values.get(name, "none")
-    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def _warn(table: Path) -> None:
     """Say of a result that is not what the run wrote."""
     for file in changed_files(table):
         say(f"warning: {file} was changed since the run wrote it")
+
+
+def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
+    """Runs by their labels, or by their scenarios if labels are missing or the same."""
+    records = [read_record(table_in(path)) for path in paths]
+    labels = {record.get("label") for record in records} - {"", None}
+    if len(labels) == len(runs):
+        return list(runs)
+    return [
+        run._replace(label=str(record.get("scenario") or run.label))
+        for run, record in zip(runs, records, strict=True)
+    ]
 
 
 def _is_there(text: str) -> bool:
@@ -141,7 +142,11 @@ def _view(options: argparse.Namespace) -> int:
         raise InputError(f"{out}: write a .html")
     _warn(file)
     run = read_result(file)
-    title = str(read_record(file).get("title") or run.label)
+    record = read_record(file)
+    title = str(record.get("title") or run.label)
+    # A title may name all runs that a scenario compares; the page shows one.
+    if label := record.get("label"):
+        title += f" (shown: {label})"
     shown = list(_of_vehicles(run, out, title))
     try:
         pages = {file.name: view_page(heading, one) for one, file, heading in shown}

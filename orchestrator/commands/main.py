@@ -26,21 +26,21 @@ COMMANDS = {
     "build": ("build", "build every FMU and the bundle auv.ssp, or a component of your own"),
     "list": ("build", "list the scenarios"),
     "gains": ("build", "check the conditions of Theorems 1 and 2"),
-    "run": ("run_command", "run a scenario, a scenario file or an SSP"),
-    "check": ("check", "list everything wrong with an FMU, an SSP, a scenario or a study"),
-    "sweep": ("many_runs", "make the runs of a study that are still missing"),
-    "plot": ("look", "draw any signals of stored results"),
+    "run": ("run_command", "run a scenario, a scenario file, an SSP or an FMU"),
+    "check": ("check", "validate an FMU, an SSP, a scenario or a study without running it"),
+    "sweep": ("many_runs", "make the runs of a study"),
+    "plot": ("look", "draw signals of stored results"),
     "view": ("look", "write a page that plays a stored result in 3D"),
     "animate": ("look", "write a film of a scenario"),
-    "new": ("build", "start a controller of your own"),
-    "report": ("many_runs", "run all scenarios and compare with the paper"),
+    "new": ("build", "create a controller from a template"),
+    "report": ("many_runs", "run all scenarios and compare them with the paper"),
     "table": (
-        "many_runs", "compare the printed table of section 4.2 with every reading of the paper"
+        "many_runs", "compare the paper's table with every reading"
     ),
     "export": ("exchange", "write a scenario for other tools"),
-    "release": ("exchange", "write the archives of a release: every FMU, for all platforms"),
+    "release": ("exchange", "write the archives of a release"),
     "hosts": ("exchange", "run a scenario in other co-simulation tools"),
-    "verify": ("exchange", "check a table from another tool, or an FMU by the results it carries"),
+    "verify": ("exchange", "compare another tool's table, or an FMU's own results, with a run"),
 }  # fmt: skip
 
 
@@ -123,7 +123,8 @@ def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
         description="Co-simulate an autonomous underwater vehicle with limited torque and "
         "without velocity sensors, from FMI 2.0 components.",
         epilog="Exit status: 0 on success; 1 if a simulation failed (its rows are kept); 2 for bad "
-        "usage or input; 130 if ended by Ctrl-C.",
+        "usage or input; 130 after Ctrl-C. `auv-fmu COMMAND --help` shows the options of a command "
+        "and an example.",
     )
     parser.add_argument("--version", action="version", version=__version__)
     commands = parser.add_subparsers(required=True, metavar="COMMAND")

@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from orchestrator.commands.options import add_options, add_out, from_options
+from orchestrator.commands.options import add_options, add_out, describe, from_options
 from orchestrator.commands.streams import INTERRUPTED, OK, say, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
@@ -19,9 +19,15 @@ from orchestrator.studies.sweep import Means, complete_study, study_folder
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu sweep`."""
+    describe(
+        parser,
+        "Make the runs of a study and draw its figures. Started again on the same folder, it makes "
+        "only the missing runs.",
+        "sweep noise --engine batch",
+    )
     ready = ", ".join(ready_studies())
     parser.add_argument(
-        "study", metavar="STUDY.toml|NAME", help=f"a study file, or a ready study: {ready}"
+        "study", metavar="STUDY.toml|NAME", help=f"study file (.toml), or a ready study: {ready}"
     )
     add_options(parser, Means)
     add_out(parser, "results/NAME/")
@@ -30,17 +36,22 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
 
 def add_report(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu report`."""
+    describe(
+        parser,
+        "Run all scenarios, compare them with the paper, and write report.html and "
+        "report.md. Finished runs are kept for the next report.",
+        "report --out results/report",
+    )
     parser.add_argument(
         "scenarios",
         nargs="*",
         metavar="FILE.toml",
-        help="a scenario file to include in the report, besides the ones of `auv-fmu list`",
+        help="scenario file to add to the scenarios of `auv-fmu list`",
     )
     parser.add_argument(
         "--studies",
         action="store_true",
-        help="also compare the printed table with every reading, and make the missing runs of the "
-        "ready studies",
+        help="also run the comparison of `auv-fmu table` and the missing runs of the ready studies",
     )
     add_options(parser, Request, "kind")
     add_out(parser, Path("results", "report"))
@@ -50,6 +61,11 @@ def add_report(parser: argparse.ArgumentParser) -> None:
 
 def add_table(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu table`."""
+    describe(
+        parser,
+        "Compare the printed table of section 4.2 with every reading of the paper.",
+        "table --out results/table",
+    )
     add_out(parser, Path("results", "table"))
     add_options(parser, Files, "force")
     parser.set_defaults(action=_table)
@@ -63,7 +79,7 @@ def _sweep(options: argparse.Namespace) -> int:
             study, from_options(Means, options), folder, options.command, say, progress=True
         )
     except KeyboardInterrupt:
-        say(f"interrupted; {folder} keeps the finished runs: the same command goes on from there")
+        say(f"interrupted; {folder} keeps the finished runs: the same command continues from there")
         return INTERRUPTED
     show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
     show(f"written to {folder}{os.sep}")

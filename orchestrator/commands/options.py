@@ -20,13 +20,18 @@ from orchestrator.system.structure import System
 T = TypeVar("T")
 
 
+def describe(parser: argparse.ArgumentParser, text: str, example: str) -> None:
+    """Say above the options what a command does, and give an example below them."""
+    parser.description, parser.epilog = text, f"Example: auv-fmu {example}"
+
+
 def add_system(parser: argparse.ArgumentParser) -> None:
     """What is run."""
     parser.add_argument(
         "scenario",
         metavar="SCENARIO|FILE|DIR",
-        help="a scenario of `auv-fmu list`, a scenario file, an SSP or the folder of an unpacked "
-        "one, an FMU, or libcosim's OspSystemStructure.xml",
+        help="scenario from `auv-fmu list`, scenario file (.toml), SSP archive (.ssp) or unpacked "
+        "SSP folder, FMU, or OspSystemStructure.xml of libcosim",
     )
     add_variant(parser)
 
@@ -36,7 +41,7 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--variant",
         metavar="NAME",
-        help="which description in an SSP: NAME.ssd; default: SystemStructure",
+        help="system description to use in an SSP, NAME.ssd; default: SystemStructure",
     )
 
 
@@ -66,7 +71,7 @@ def add_fmi(parser: argparse.ArgumentParser) -> None:
         "--fmi",
         choices=FMI_VERSIONS,
         default=FMI_VERSIONS[0],
-        help=f"version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
+        help=f"FMI version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
     )
 
 
@@ -76,8 +81,8 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
         "--kind",
         choices=KINDS,
         default=PYTHON,
-        help="kind of the FMUs: Python source, or its translation to C, with the same numbers; "
-        f"default: {PYTHON}",
+        help=f"kind of FMU: {PYTHON} (source code) or {NATIVE} (its translation to C, compiled); "
+        f"both give the same numbers; default: {PYTHON}",
     )
 
 
@@ -88,14 +93,14 @@ def add_set(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="COMPONENT.PARAMETER=VALUE",
-        help="change a parameter, for example plant.noise.std=0; may be repeated",
+        help="set a parameter, for example plant.noise.std=0; may be repeated",
     )
 
 
 def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
     """Where the files go: a path, or in words."""
     path = default if isinstance(default, Path) else None
-    text = f"folder to write into; default: {default}"
+    text = f"output folder; default: {default}"
     parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
 
 
@@ -131,5 +136,8 @@ def assignments(options: argparse.Namespace) -> dict[PortName, object]:
         name, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
-        values[port_name(name.strip())] = value.strip()
+        port = port_name(name.strip())
+        # The last one wins, also over a group before it.
+        values.pop(port, None)
+        values[port] = value.strip()
     return values

@@ -6,16 +6,17 @@ import argparse
 import os
 from collections.abc import Callable, Mapping
 from contextlib import suppress
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from orchestrator.commands.options import (
     add_options,
     add_out,
     add_set,
     add_system,
+    describe,
     from_options,
     read_system,
     request,
@@ -26,12 +27,18 @@ from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Files, Request
+from orchestrator.runs.result import summary
 from orchestrator.runs.run import run_into
-from orchestrator.vehicle.indices import metrics, of_vehicles
 
 
 def add_run(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu run`."""
+    describe(
+        parser,
+        "Run a scenario, a scenario file, an SSP or an FMU, and write its table, metrics and "
+        "figures. FMUs that are missing are built first.",
+        "run fig4 --stop-time 20 --set plant.noise.std=0",
+    )
     add_system(parser)
     add_options(parser, Request)
     add_set(parser)
@@ -75,7 +82,7 @@ def _drawing() -> Callable[..., list[str]]:
 
 def _answer(interrupts: Interrupts) -> None:
     """Tell the user at once what happens now, from within the handler of the signal."""
-    text = "stopping: writing what was computed and drawing it; once more leaves the figures out"
+    text = "stopping: writing what was computed and drawing it; press again to skip the figures"
     if interrupts.urgent:
         text = "stopping at once, without figures; a third time ends an FMU that does not return"
     # print could have been interrupted itself, and must not be entered a second time.
@@ -84,18 +91,7 @@ def _answer(interrupts: Interrupts) -> None:
 
 
 def _print_summary(values: Mapping[str, Any]) -> None:
-    for vehicle, found in of_vehicles(values).items():
-        measured = [index for index in metrics() if index.name in found]
-        if measured:
-            show(", ".join(filter(None, (values["scenario"], vehicle))))
-        for index in measured:
-            title = f"{index.label} {index.members}" + f" [{index.unit}]" * bool(index.unit)
-            numbers = np.atleast_1d(found[index.name]).tolist()
-            show(f"  {title:44}" + "".join(f"{_number(number):>11}" for number in numbers))
-
-
-def _number(value: float) -> str:
-    """Four digits; an exponent only where zeros would be all that is seen."""
-    if value and not 1e-4 <= abs(value) < 1e7:
-        return f"{value:.3e}"
-    return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
+    for vehicle, lines in groupby(summary(values), key=itemgetter(0)):
+        show(", ".join(filter(None, (values["scenario"], vehicle))))
+        for _, title, numbers in lines:
+            show(f"  {title:44}" + "".join(f"{number:>11}" for number in numbers))

@@ -26,7 +26,7 @@ _PAGE, _TEMPLATE = "README.md", Path(__file__).with_name("release.md")
 _REFERENCES = Path(__file__).with_name(REFERENCE), Path(__file__).parents[2] / REFERENCE
 
 #: The version of SSP that goes with each of FMI.
-_SSP_VERSIONS = dict(zip(FMI_VERSIONS, ("1.0", "2.0"), strict=True))
+_SSP_VERSIONS: dict[str, str] = dict(zip(FMI_VERSIONS, ("1.0", "2.0"), strict=True))
 
 #: The licences of what ziglang links into libraries, where it has them.
 _LINKED = {"zig.txt": "LICENSE", "mingw-w64.txt": "lib/libc/mingw/COPYING"}

@@ -17,6 +17,7 @@ from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.figures.drawing import styled
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, draw_all_errors, draw_commands, over_time
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading
 from orchestrator.figures.view import PAINT, Z_UP, body
@@ -124,6 +125,7 @@ def _frames(text: str, run: Drawn, n: int) -> Iterator[Image.Image]:
         grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
         scene = _Scene(figure.add_subplot(grid[0]), run)
         series = _draw_series(Cell(figure, grid[1]), run)
+        list_events(figure, [run], grow=False)
         markers = [
             axes.axvline(0.0, color="black", linewidth=1.0, animated=True) for axes in series
         ]

@@ -9,6 +9,7 @@ import logging
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from math import lcm
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,11 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from tqdm import tqdm
 
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, Panel, Rows
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import FIGURE_FORMATS, FIGURE_WIDTH, SETTINGS, Drawn, heading
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.vehicle.signals import Loop, suffixes
 
 #: What a file would say of its time and tool, by its ending.
@@ -35,6 +37,15 @@ _HEADING = 0.3
 
 #: Seconds before a bar appears on a terminal.
 _PATIENCE = 2.0
+
+
+class Plot(Figure):
+    """A figure that a notebook shows without a call."""
+
+    def _repr_png_(self) -> bytes:
+        image = BytesIO()
+        self.savefig(image, format="png")
+        return image.getvalue()
 
 
 @contextmanager
@@ -97,7 +108,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
         return None, runs[0].lacks(panels[0].needs)
     heights = [max(panel.height for panel in row) for row in drawn]
     with styled():
-        figure = Figure(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
+        figure = Plot(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
         if title:
             figure.suptitle(heading(title), wrap=True)
         columns = lcm(*map(len, drawn))
@@ -106,6 +117,7 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
             width = columns // len(row)
             for j, panel in enumerate(row):
                 panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
+        list_events(figure, runs)
     return figure, [note for panel in panels for note in _left_out(panel, runs)]
 
 
@@ -119,6 +131,34 @@ def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
         for label, names in missing.items()
         if names
     ]
+
+
+def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") -> Figure:
+    """One figure by its name.
+
+    Args:
+        name: key of :data:`FIGURES`, with what the name of the figure's file ends with.
+        title: heading; empty for none.
+        runs: the first is the one the figure is about.
+        vehicle: that is shown; empty: the first.
+
+    Raises:
+        InputError: there is no such figure or vehicle, or the runs have nothing that it shows.
+
+    """
+    known = {f"{key}{end}": rows for key, of in FIGURES.items() for end, rows in of.items()}
+    if name not in known:
+        hint = did_you_mean(name, known) or f"; there are {', '.join(known)}"
+        raise InputError(f"no figure {name!r}{hint}")
+    loops = {loop.vehicle: (i, loop) for i, loop in enumerate(runs[0].loops)}
+    if vehicle and vehicle not in loops:
+        raise InputError(f"no vehicle {vehicle!r}; there are {', '.join(loops)}")
+    i, loop = loops[vehicle] if vehicle else (0, runs[0].loop)
+    shown = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
+    figure, missing = compose(title, known[name], shown)
+    if figure is None:
+        raise InputError(f"no figure: the run has no {missing[0]}")
+    return figure
 
 
 def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:

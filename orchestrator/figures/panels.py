@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fmus.ports.quantities import TAU
+from orchestrator.figures.event_marks import mark_events
 from orchestrator.figures.style import (
     COLOURS,
     REFERENCE,
@@ -32,6 +33,7 @@ from orchestrator.vehicle.signals import (
     limits,
     tracking_error,
     true_control_point,
+    waypoints,
 )
 
 if TYPE_CHECKING:
@@ -54,12 +56,6 @@ _SMALLEST_ERROR = 1e-5
 
 #: The second of two runs: thin and solid, for dashes of a signal that swings are a smear.
 _THICK, _THIN = 1.4, 0.8
-
-#: Of the events of a run, so many are marked; names of those after this share stand before them.
-_MOST_MARKS, _LATE = 20, 0.6
-
-#: What a line of text needs of the height of a panel.
-_ROOM = 0.25
 
 #: Peaks from here on are written with an exponent [N, N.m].
 _MANY = 1e6
@@ -116,7 +112,12 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     for run, _ in list(runs_with(runs, Loop.for_reference))[:1]:
         paths.append(run.result.group(*run.loop.y_d))
         axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
-        axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="its start")
+        axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="reference start")
+        if len(points := waypoints(run.result, run.loop)):
+            paths.append(points)
+            axes.scatter(
+                *points.T, color="black", marker="x", s=25, depthshade=False, label="waypoints"
+            )
     shown = list(runs_with(runs, Loop.for_control_point))
     for i, (run, colour) in enumerate(shown):
         y = true_control_point(run.result, run.loop)
@@ -126,7 +127,7 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
         # Rings around each other: vehicles that start together stay to be seen.
         axes.scatter(
             *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
-            facecolors="none" if i else colour, label=None if i else "start",
+            facecolors="none" if i else colour, label=None if i else "vehicle start",
         )  # fmt: skip
     _frame_path(axes, np.vstack(paths), runs[0].z_up)
     title(axes, "path")
@@ -149,14 +150,14 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     box = np.maximum(extent, 0.5 * extent.max())
     flat = float(box.max() / box[2]) - 1.0
     # A tall box would reach into the panel below, a flat one into that beside it.
-    zoom = min(0.95 - 0.1 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
+    zoom = min(0.95 - 0.17 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
     axes.set_box_aspect(box, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.get_major_locator().set_params(nbins=4, steps=None)
     axes.tick_params(labelsize="small", pad=0)
     # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
     axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat - 2
-    axes.zaxis.labelpad = 4 - 8 * flat
+    axes.zaxis.labelpad = 4 - 3.5 * flat
 
 
 def draw_lines(
@@ -207,39 +208,10 @@ def over_time(panels: Sequence[Axes], runs: Sequence[Drawn], has_means: bool = F
     end = max(run.result.time[-1] for run in runs)
     for axes in panels:
         axes.set_xlim(start, end)
-    _mark_events(panels, runs)
-    means = f", lines: means over {mean_window(runs[0].result.time):.3g} s" if has_means else ""
+    mark_events(panels, runs)
+    window = mean_window(runs[0].result.time)
+    means = f" (line: {window:.3g} s mean, band: raw)" if has_means else ""
     panels[-1].set_xlabel(f"time [s]{means}")
-
-
-def _mark_events(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
-    """Lines where something has happened, or ended, in a run; their names in the first panel."""
-    marks: dict[float, str] = {}
-    for run in runs:
-        for occurrence in run.result.ending.events[:_MOST_MARKS]:
-            marks[occurrence.time] = marks.get(occurrence.time) or occurrence.label
-    if any(marks.values()):
-        _make_room_below(panels[0])
-    start, end = panels[0].get_xlim()
-    for time, label in marks.items():
-        for axes in panels:
-            axes.axvline(time, color="0.35", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
-        is_late = time - start > _LATE * (end - start)
-        panels[0].annotate(
-            escape_math(label), (time, 0), xycoords=panels[0].get_xaxis_transform(),
-            xytext=(-2 if is_late else 2, 2), textcoords="offset points",
-            ha="right" if is_late else "left", va="bottom", fontsize="small",
-            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
-        )  # fmt: skip
-
-
-def _make_room_below(axes: Axes) -> None:
-    """Room for a line of text below the data."""
-    bottom, top = axes.get_ylim()
-    if axes.get_yscale() == "log":
-        axes.set_ylim(bottom=bottom * (bottom / top) ** _ROOM)
-    else:
-        axes.set_ylim(bottom=bottom - _ROOM * (top - bottom))
 
 
 def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> None:
@@ -299,7 +271,7 @@ def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit
     if max(peaks.values()) < _NEAR * min(upper, -lower):
         bottom, top = axes.get_ylim()
         axes.set_ylim(bottom, top + 0.2 * (top - bottom))
-        _say(axes, f"{words}: far away", 0.98, axes.transAxes, "top")
+        _say(axes, f"{words} (off scale)", 0.98, axes.transAxes, "top")
         return
     for limit in (lower, upper):
         axes.axhline(limit, color="black", linewidth=0.8)

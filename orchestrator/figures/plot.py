@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from orchestrator.figures.drawing import styled
+from orchestrator.figures.drawing import Plot, styled
+from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.style import (
     COLOURS,
@@ -26,6 +27,7 @@ from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table
+from orchestrator.system.names import PortName
 
 #: What is drawn where nothing is asked for, as far as it is there.
 DEFAULT_PATTERNS = ("controller.e", "plant.tau", "controller.theta_hat")
@@ -33,20 +35,14 @@ DEFAULT_PATTERNS = ("controller.e", "plant.tau", "controller.theta_hat")
 #: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
 _PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
 
+#: Runs of one scenario are told apart by so many parameters.
+_FEW = 2
+
 #: Letters in a row of a legend, of which the line of an entry takes some.
 _LETTERS, _LINE = 100, 6
 
 #: Of the lines, so many that few runs look alike.
 _STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
-
-
-class Plot(Figure):
-    """A figure that a notebook shows without a call."""
-
-    def _repr_png_(self) -> bytes:
-        image = BytesIO()
-        self.savefig(image, format="png")
-        return image.getvalue()
 
 
 def wanted_columns(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
@@ -87,7 +83,9 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
             _draw_panel(place, group, unit, members, runs)
             for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
         ]
-        over_time(list(axes), [Drawn(*run) for run in runs], any(has_means))
+        drawn = [Drawn(*run) for run in runs]
+        over_time(list(axes), drawn, any(has_means))
+        list_events(figure, drawn)
         if len(runs) > 1:
             in_colour = all(len(members) == 1 for members in panels.values())
             lines = [
@@ -100,6 +98,38 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
     return figure
 
 
+def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[str]:
+    """What tells runs apart: scenarios, or a few parameters, or ends of paths, or else numbers.
+
+    Args:
+        runs: that are drawn together.
+        paths: they were read from.
+
+    """
+    names = [run.label for run in runs]
+    given = [run.result.header.parameters for run in runs]
+    differing = [
+        name
+        for name in dict.fromkeys(name for values in given for name in values)
+        if len({str(values.get(name)) for values in given}) > 1
+    ]
+    changes = [
+        ", ".join([name] * (len(set(names)) > 1) + [f"{k} = {_text(values, k)}" for k in differing])
+        for name, values in zip(names, given, strict=True)
+    ]
+    parts = [path.resolve().parts for path in paths]
+    longest = max(map(len, parts), default=1)
+    ends = [["/".join(part[-n:]) for part in parts] for n in range(1, longest)]
+    numbered = [f"{name} ({number})" for number, name in enumerate(names, start=1)]
+    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends, numbered]
+    return next(labels for labels in candidates if len(set(labels)) == len(labels))
+
+
+def _text(values: Mapping[PortName, Any], name: PortName) -> str:
+    value = values.get(name, "none")
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
 def group_of(column: str) -> str:
     """The group that a column belongs to: plant.y of plant.y.x; the column itself for others."""
     for separator in ("[", "."):
@@ -110,7 +140,12 @@ def group_of(column: str) -> str:
 
 
 def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
-    return table.time, table[name]
+    time, values = table.time, table[name]
+    if table.header.units.get(name) == "rad":
+        # An angle that wraps has a gap: a line across the panel would be no motion.
+        wraps = 1 + np.flatnonzero(np.abs(np.diff(values)) > np.pi)
+        time, values = np.insert(time, wraps, np.nan), np.insert(values, wraps, np.nan)
+    return time, values
 
 
 def _draw_panel(

@@ -67,11 +67,11 @@ def _estimated_velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
         axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true, never measured")
         axes.set_ylabel(rf"$\dot{{y}}_{k}$ [m/s]")
     title(panels[0], "velocity of the control point")
-    over_time(panels, [run], has_means)
+    over_time(panels, runs, has_means)
 
 
 def _velocity_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    """Estimated less true velocity of the control point."""
+    """Estimated velocity of the control point minus the true one."""
     run, _ = next(runs_with(runs, Loop.for_velocity_estimates))
     panels = cell.stack(3)
     has_means = False
@@ -79,8 +79,8 @@ def _velocity_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
         error = partial(_velocity_error, estimate, truth)
         has_means |= draw_signal(axes, run.result, error, color=COLOURS[1])
         axes.set_ylabel(rf"$\Delta \dot{{y}}_{k}$ [m/s]")
-    title(panels[0], "estimated less true")
-    over_time(panels, [run], has_means)
+    title(panels[0], "estimate - true")
+    over_time(panels, runs, has_means)
 
 
 def _estimated(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
@@ -109,7 +109,7 @@ def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
         symbol = r"$\dot{{{}}}$" if is_rate else "${}$"
         draw_lines(axes, time, values, [symbol.format(column[-1]) for column in columns])
         title(axes, name)
-        over_time([axes], [run])
+        over_time([axes], runs)
 
     return Panel(name, needs, draw)
 

@@ -27,6 +27,7 @@ from orchestrator.vehicle.signals import (
     real_parameter,
     tracking_error,
     true_control_point,
+    waypoints,
 )
 
 _PAGE = Path(__file__).with_name("view.html")
@@ -242,7 +243,14 @@ def _series(panels: Sequence[_Lines]) -> dict[str, Any]:
                     "line": {"color": colour, "width": 1.3},
                 }
             )  # fmt: skip
-    return {"traces": traces, "layout": layout}
+    narrow = [_coloured(panel) for panel in panels]
+    return {"traces": traces, "layout": layout, "narrow": narrow}
+
+
+def _coloured(panel: _Lines) -> str:
+    """The names of the lines of a panel in their colours, in place of a legend."""
+    names = zip(panel.names, COLOURS, strict=False)
+    return " ".join(f'<span style="color:{colour}">{name}</span>' for name, colour in names)
 
 
 def _axis(name: str, i: int) -> str:
@@ -286,7 +294,9 @@ def _frames(run: Drawn) -> dict[str, Any]:
     paths = [y]
     if not table.missing(loop.y_d):
         paths.append(table.group(*loop.y_d))
-    lower, upper = np.min(np.vstack(paths), axis=0), np.max(np.vstack(paths), axis=0)
+    points = waypoints(table, loop)
+    seen = np.vstack((*paths, points))
+    lower, upper = np.min(seen, axis=0), np.max(seen, axis=0)
     length = max(_SHARE * float((upper - lower).max()), _LENGTH * real_parameter(table, loop.ell))
     instants = np.linspace(time[0], time[-1], _FRAMES)
     rows = np.unique(np.searchsorted(time, instants).clip(0, len(time) - 1))
@@ -302,11 +312,16 @@ def _frames(run: Drawn) -> dict[str, Any]:
     if len(paths) > 1:
         frames["reference"] = [_numbers(point) for point in paths[1][rows]]
         traces.append(_line(paths[1][rows], REFERENCE, 3, "reference"))
-    traces.append(_line(y[rows], "#b3d4e8", 2, "path to come"))
+    traces.append(_line(y[rows], "#b3d4e8", 2, "future path"))
+    if len(points):
+        marker = {"color": "black", "size": 3, "symbol": "diamond"}
+        traces.append(
+            _line(points, "black", 1, "waypoints") | {"mode": "markers", "marker": marker}
+        )
     moving = len(traces)
     traces.append(_line(y[:1], COLOURS[0], 5, "path of the control point"))
     shape = body()
-    points = length * shape.points * (Z_UP if z_up else 1.0)
+    corners = length * shape.points * (Z_UP if z_up else 1.0)
     parts = []
     for part, (colour, name) in enumerate(
         zip(PAINT, ("vehicle", "upper fin", "other fins"), strict=True)
@@ -314,14 +329,14 @@ def _frames(run: Drawn) -> dict[str, Any]:
         chosen = shape.triangles[shape.part == part]
         used, triangles = np.unique(chosen, return_inverse=True)
         i, j, k = triangles.reshape(chosen.shape).T.tolist()
-        parts.append([_numbers(point) for point in points[used]])
+        parts.append([_numbers(point) for point in corners[used]])
         traces.append(
             {"type": "mesh3d", "i": i, "j": j, "k": k, "color": colour, "name": name}
             | {"x": [0.0], "y": [0.0], "z": [0.0], "hoverinfo": "skip", "flatshading": True}
         )
     if len(paths) > 1:
         traces.append(
-            _line(paths[1][:1], REFERENCE, 1, "reference now")
+            _line(paths[1][:1], REFERENCE, 1, "reference (current)")
             | {"mode": "markers", "marker": {"color": REFERENCE, "size": 4, "symbol": "square"}}
         )
     low, high = lower - length, upper + length
@@ -336,7 +351,10 @@ def _frames(run: Drawn) -> dict[str, Any]:
             **axes,
             "aspectmode": "manual",
             "aspectratio": dict(zip("xyz", ratio.tolist(), strict=True)),
-            "camera": {"eye": {"x": -1.35, "y": -1.35, "z": 0.7}},
+            "camera": {
+                "eye": {"x": -1.5, "y": -1.5, "z": 0.8},
+                "center": {"x": 0, "y": 0, "z": -0.1},
+            },
         },
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "legend": {"x": 0, "y": 1, "bgcolor": "rgba(255,255,255,0.6)"},

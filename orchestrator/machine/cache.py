@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from hashlib import sha256
 from multiprocessing import parent_process
@@ -22,7 +22,7 @@ from tempfile import mkdtemp, mkstemp
 
 from platformdirs import user_cache_path
 
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.operating_system import is_mine, others_write, sync_to_disk
 
 #: What came with the installation: a folder for each category, in it one for each key.
@@ -56,6 +56,26 @@ def read_cached(category: str, key: str) -> dict[Path, bytes]:
             if found := _files(root / category, record):
                 return found
     return {}
+
+
+def made_once(category: str, key: str, make: Callable[[], Mapping[str, bytes]]) -> dict[str, Path]:
+    """The places of files by their names, which are made and kept if they are not there.
+
+    Args:
+        category: of what is kept, a name of a folder.
+        key: of all that they are made of.
+        make: gives their contents.
+
+    Raises:
+        OSError: they cannot be written.
+
+    """
+    found = [*read_cached(category, key)]
+    if not found:
+        with hold_lock(category_folder(category), wait=True):
+            # Another process may have been first.
+            found = [*read_cached(category, key)] or write_cached(category, key, make())
+    return {path.name: path for path in found}
 
 
 def environment() -> dict[str, str]:

@@ -264,7 +264,7 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
                 folder = _extracted(archive, content)
                 if _version_of(file) != version:
                     rmtree(folder, ignore_errors=True)
-                    raise InputError(f"{archive}: is being written; try again when it is whole")
+                    raise InputError(f"{archive}: is being written; try again when it is complete")
                 _folders[digest] = folder
         _digests[version] = digest
     return Unpacked(_folders[digest], digest)
@@ -302,7 +302,7 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
 
 def _check_room(whole: _Whole, files: int, size: int) -> None:
     """Refuse what fills the disk together with what there is."""
-    within = f"and {whole.archive} with all that is in it to"
+    within = f"and {whole.archive} with everything in it to"
     if (together := whole.files + files) > _MOST_FILES:
         raise ValueError(
             f"it unpacks to {files:,} files, {within} {together:,}, more than {_MOST_FILES:,}"

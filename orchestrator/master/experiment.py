@@ -7,17 +7,19 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import ceil, floor, gcd, isfinite, lcm, ulp
 from numbers import Real
-from typing import NamedTuple, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias, cast, get_args
 
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 
 #: Orders in which components are stepped; the first is the default.
-ORDERS = GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
+OrderName: TypeAlias = Literal["gauss-seidel", "jacobi"]
+ORDERS: tuple[OrderName, ...] = get_args(OrderName)
+GAUSS_SEIDEL, JACOBI = ORDERS
 
 #: One of these, or the names of all components, one stepped after the other.
-Order: TypeAlias = str | Sequence[str]
+Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
 
 #: What components have at their inputs in the first step: outputs that were exchanged in
 #: initialisation mode, outputs that were exchanged after it, or start values and zeros. The first
@@ -26,7 +28,9 @@ INITIAL = FULL, NONE, ZERO = "full", "none", "zero"
 
 #: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
 #: inputs that change linearly from one communication point to the next.
-COUPLINGS = SOLVE, DELAY, LINEAR = "solve", "delay", "linear"
+CouplingName: TypeAlias = Literal["solve", "delay", "linear"]
+COUPLINGS: tuple[CouplingName, ...] = get_args(CouplingName)
+SOLVE, DELAY, LINEAR = COUPLINGS
 
 #: A rest shorter than this share of the run, and of a step, is a rounding error.
 ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
@@ -40,7 +44,10 @@ _MOST_PARTS = 1000
 
 def read_order(text: str) -> Order:
     """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
-    return tuple(name.strip() for name in text.split(",")) if "," in text else text
+    if "," in text:
+        return tuple(name.strip() for name in text.split(","))
+    # Any other name is refused by the experiment.
+    return cast(OrderName, text)
 
 
 def format_order(order: Order) -> str:
@@ -251,6 +258,6 @@ def _common_measure(steps: Iterable[float]) -> float:
         listed = ", ".join(f"{float(step):g}" for step in sorted(set(exact)))
         raise InputError(
             f"the components want steps of {listed} s, which have no common divisor; give a "
-            "communication step of which all of them are multiples"
+            "communication step that divides all of them"
         )
     return float(common)

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from ctypes import CDLL
 from functools import partial
-from typing import NamedTuple, Protocol
+from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args
 
 import numpy as np
 
@@ -21,7 +21,8 @@ from orchestrator.master.schedule import step_members
 from orchestrator.master.stepper import compile_stepper, load_stepper, step_compiled
 
 #: Loops that can be asked for; the first is the default.
-LOOPS = ("auto", "python", "compiled")
+LoopName: TypeAlias = Literal["auto", "python", "compiled"]
+LOOPS: tuple[LoopName, ...] = get_args(LoopName)
 
 #: To set the compiled loop up takes as long as so many steps in Python, and to compile it as long
 #: as so many.

@@ -19,7 +19,7 @@ from auv_fmu.disturbance import Disturbance
 from auv_fmu.euler import STEP
 from auv_fmu.motion_planner import TAU_D
 from auv_fmu.vehicle import Vehicle
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, OrderName
 from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,
@@ -58,7 +58,7 @@ class Option(NamedTuple):
     text: str
     parameters: Mapping[str, Any] = _NOTHING
     against: str = ""
-    order: str = ""
+    order: OrderName | None = None
 
 
 class Choice(NamedTuple):

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.kinds import AUTO
+from fmus.kinds import AUTO, KindName
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.ledger import Ledger
@@ -54,7 +54,7 @@ class KeptRuns:
         self,
         folder: Path,
         stop_time: float | None = None,
-        kind: str = AUTO,
+        kind: KindName = AUTO,
         force: bool = False,
     ) -> None:
         """Start without any.
@@ -148,7 +148,7 @@ def _make(request: Request, key: str) -> KeptRun:
     try:
         prepared = prepare_request(request)
         if key_of(prepared) != key:
-            raise InputError("FMUs have changed while the report was made; make it anew")
+            raise InputError("FMUs have changed while the report was made; make it again")
         metrics = Metrics(prepared.loops)
         seen = VisibleRows({name for loop in prepared.loops for name in loop.drawn()})
         prepared.run([metrics, seen])

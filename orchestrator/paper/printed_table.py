@@ -74,15 +74,15 @@ def _paragraphs(found: Found) -> Iterator[str]:
     variants = found.printed
     first, *_, last = END_TIMES
     yield (
-        f"{found.six.scores.size:,} variants: all combinations of what the paper leaves open of "
-        "the runs behind its table, listed below, with every T_f from "
+        f"{found.six.scores.size:,} variants: all combinations of the points that the paper "
+        "leaves open in the runs of its table, listed below, with every T_f from "
         f"{first:g} to {last:g} s. The "
         "score of a variant is the sum of |ln(ours / printed)| over the twelve numbers; the factor "
-        "is their geometric mean of ours / printed, or of its inverse where that is larger. "
+        "is the geometric mean of these ratios, or of its inverse where that is larger. "
         "*Nearest* has the least score of all variants that contradict nothing that is printed, "
         "*nearest of five* of those whose only contradiction is a vehicle of five degrees of "
         f"freedom: {found.five.scores.size:,} more, by medians over {len(SEARCHED)} starts each. "
-        "Ranges are of what has come to the reference with six, with e_f of at most "
+        "Ranges are of the variants with six that have come to the reference, with e_f of at most "
         f"{REACHED:g} m, and, but in the last column, of variants that contradict nothing; where "
         "they do not hold what is printed, they are bold. The mean of |tau| is not among the "
         "formulas: like (59) it cannot exceed 80."
@@ -196,9 +196,9 @@ def _reached(found: Found) -> str:
     ]
     return (
         f"**Among variants that contradict nothing, {'; '.join(texts)}.** At most {counts[0]} of "
-        f"the twelve come at once within {percent} % of what is printed in any variant with six "
-        f"degrees of freedom, and {counts[1]} with five. The six efforts alone, of what "
-        f"contradicts nothing, are at once within {near[0]} % with the two formulas and six "
+        f"the twelve are at once within {percent} % of the printed numbers in any variant with six "
+        f"degrees of freedom, and {counts[1]} with five. Of the same variants, the six "
+        f"efforts by themselves are at once within {near[0]} % with the two formulas and six "
         f"degrees of freedom, and within {near[1]} % with five."
     )
 

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from fmus.kinds import AUTO
+from fmus.kinds import AUTO, KindName
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper import printed_table
@@ -47,7 +47,7 @@ without velocity sensors*, simulated from FMI 2.0 components. Differences from t
 stated; no parameter was chosen to bring the results closer. The paper gives neither the level of \
 its measurement noise nor the end times of its figures: the scenarios have ours, and all but Fig. \
 4 run without noise, so that roughness in a signal comes from the controller itself. In every run \
-the righting moment of roll, 5 N·m (reading 1), and the seed of any noise are ours as well. The \
+the righting moment of roll, 5 N·m (reading 1), and the seed of any noise are also ours. The \
 readings, points where the paper is silent or contradicts itself, are explained [at the \
 end](#readings)."""
 
@@ -58,8 +58,8 @@ end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_
 millimetres, up to a centimetre, for the same reason."""
 
 _NO_VARIANTS = """\
-No choice of what is not given brings all of them together: `auv-fmu table` tries every \
-combination, and so does `auv-fmu report --studies`, for this section."""
+No choice of the open points gives all of them together: `auv-fmu table` tries every \
+combination. `auv-fmu report --studies` does so for this section."""
 
 
 def write_report(
@@ -67,7 +67,7 @@ def write_report(
     scenarios: Sequence[str],
     command: Sequence[str],
     stop_time: float | None = None,
-    kind: str = AUTO,
+    kind: KindName = AUTO,
     ready: Sequence[str] = (),
     variants: bool = False,
     force: bool = False,

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.kinds import AUTO
+from fmus.kinds import AUTO, KindName
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
@@ -61,7 +61,7 @@ class Section:
         return escape_markdown(self.scenario.title or self.scenario.name)
 
 
-def sections(references: Sequence[str], kind: str = AUTO) -> list[Section]:
+def sections(references: Sequence[str], kind: KindName = AUTO) -> list[Section]:
     """The sections of some scenarios.
 
     Args:
@@ -83,7 +83,7 @@ def sections(references: Sequence[str], kind: str = AUTO) -> list[Section]:
     return found
 
 
-def _runs(reference: str, scenario: Scenario, kind: str) -> dict[str, Request]:
+def _runs(reference: str, scenario: Scenario, kind: KindName) -> dict[str, Request]:
     """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
     request = Request(reference, kind=kind)
     try:
@@ -236,7 +236,7 @@ def _ours(scenario: Scenario) -> Iterator[str]:
 
 
 def make_studies(
-    names: Sequence[str], folder: Path, kind: str, command: Sequence[str], force: bool = False
+    names: Sequence[str], folder: Path, kind: KindName, command: Sequence[str], force: bool = False
 ) -> list[Study]:
     """Make what is missing of some studies.
 

@@ -8,9 +8,9 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
-from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE
+from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
 from orchestrator.figures.run_figures import check_figure
 from orchestrator.formats.osp_and_container import OSP_STRUCTURE, read_osp
 from orchestrator.formats.ssp import STRUCTURE
@@ -19,7 +19,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import is_folder
 from orchestrator.master.experiment import step_of
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.scenario import Scenario, names, read_scenario
+from orchestrator.runs.scenario import Scenario, names, read_scenario, scenario_of
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -30,10 +30,10 @@ T = TypeVar("T")
 
 
 def load(
-    name: str | Path,
-    kind: str = AUTO,
+    name: str | Path | Mapping[str, Any],
+    kind: KindName = AUTO,
     *,
-    fmi: str = FMI_VERSIONS[0],
+    fmi: FmiVersion = FMI_VERSIONS[0],
     variant: str | None = None,
     strict: bool = False,
 ) -> System:
@@ -43,7 +43,8 @@ def load(
 
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
-            OspSystemStructure.xml; an SSP and the latter may also be a folder.
+            OspSystemStructure.xml; an SSP and the latter may also be a folder; or what a scenario
+            file would hold, as a dictionary.
         kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
         fmi: their version of FMI, `2` or `3`.
         variant: which of the descriptions in an SSP; None: the default.
@@ -54,7 +55,7 @@ def load(
 
     """
     with notes_as_warnings(strict) as findings:
-        scenario, system = load_scenario(str(name), kind, fmi, variant, findings)
+        scenario, system = load_scenario(name, kind, fmi, variant, findings)
         left = left_behind(scenario)
         for note in [left] if left else doubts_of(system):
             findings.note(note)
@@ -77,7 +78,7 @@ def notes_as_warnings(strict: bool = False) -> Iterator[Findings]:
 
 
 def load_scenario(
-    name: str,
+    name: str | Path | Mapping[str, Any],
     kind: str = AUTO,
     fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
@@ -87,7 +88,8 @@ def load_scenario(
 
     Args:
         name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
-            OspSystemStructure.xml; an SSP and the latter may also be a folder.
+            OspSystemStructure.xml; an SSP and the latter may also be a folder; or what a scenario
+            file would hold.
         kind: of the bundle's FMUs: `python`, `native` or `auto`; FMUs that a file names are as
             they are.
         fmi: their version of FMI, `2` or `3`; the Python kind has only the first.
@@ -98,19 +100,28 @@ def load_scenario(
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
+    if isinstance(name, Mapping):
+        if variant is not None:
+            raise InputError("a dictionary has no variants; only an SSP can have them")
+        return _of_the_bundle(scenario_of(name), kind, fmi)
     path = Path(name)
     read = _reader(path)
     if variant is not None and read is not read_ssp:
         raise InputError(f"{name}: has no variants; only an SSP can have them")
-    if read is not None:
-        check_brings_its_own(name, kind, fmi)
-        system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
-        whole = path.resolve()
-        named = whole.parent if path.name in (STRUCTURE, OSP_STRUCTURE) else whole
-        return Scenario(named.stem, title=path.name or named.name), system
-    scenario = read_scenario(name)
+    if read is None:
+        return _of_the_bundle(read_scenario(str(name)), kind, fmi)
+    check_brings_its_own(str(name), kind, fmi)
+    system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
+    whole = path.resolve()
+    named = whole.parent if path.name in (STRUCTURE, OSP_STRUCTURE) else whole
+    return Scenario(named.stem, title=path.name or named.name), system
+
+
+def _of_the_bundle(scenario: Scenario, kind: str, fmi: str) -> tuple[Scenario, System]:
+    """A scenario, with a value for each port, and its system."""
     check_figure(scenario.figure)
-    return scenario, closed_loop(current_fmus(kind, fmi), scenario)
+    system = closed_loop(current_fmus(kind, fmi), scenario)
+    return replace(scenario, parameters=system.expanded(scenario.parameters)), system
 
 
 def read_fmu(path: Path, findings: Findings | None = None) -> System:

@@ -132,7 +132,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         InputError: something about the request cannot be done.
 
     """
-    findings, values = Findings(request.strict), request.values
+    findings, values = Findings(request.strict), system.expanded(request.values)
     system = system.with_parameters(values)
     input_table = None
     if request.inputs is not None:
@@ -189,9 +189,10 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
     inputs = scenario.inputs or companion.inputs
     followed = set(map(system.named, inputs.content[0])) if inputs else ()
+    given = prepared.system.expanded(request.values)
     shared = {
         target: value
-        for target, value in {**scenario.parameters, **request.values}.items()
+        for target, value in {**scenario.parameters, **given}.items()
         if system.has(target) and system.named(target) not in followed
     }
     steps = {

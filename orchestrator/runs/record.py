@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import platform
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from importlib.metadata import version
+from itertools import chain
 from math import inf, isfinite
 from pathlib import Path
 from time import monotonic
@@ -97,6 +98,7 @@ def write_record(
         "title": prepared.scenario.title,
         "label": prepared.scenario.label,
         "z_up": prepared.scenario.z_up,
+        "figure": prepared.scenario.figure,
         "sha256": prepared.scenario.digest,
         "identity": digest_of(prepared.identity),
         "command": list(command),
@@ -136,14 +138,21 @@ def write_content(
     folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED_PACKAGES
 ) -> None:
     """Write a record, with versions, the platform, and the names of all files beside it."""
+    versions = {package: version(package) for package in packages}
+    copy_record(
+        folder,
+        {
+            **content,
+            "versions": {"python": platform.python_version()} | versions,
+            "platform": platform.platform(),
+        },
+    )
+
+
+def copy_record(folder: Path, content: Mapping[str, object]) -> None:
+    """Write a record as it is, but for the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
-    whole = {
-        **content,
-        "versions": {"python": platform.python_version()}
-        | {package: version(package) for package in packages},
-        "platform": platform.platform(),
-        "files": sorted(files | {RECORD}),
-    }
+    whole = {**content, "files": sorted(files | {RECORD})}
     (folder / RECORD).write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
 
 
@@ -193,6 +202,25 @@ def read_result(
     """
     file = table_in(path)
     record = read_record(file)
+    header, blocks = stored_rows(file, record)
+    loops = loops_in(record)
+    drawn = {name for loop in loops for name in loop.drawn()}
+    table = VisibleRows(drawn if watched is None else watched(header.columns))
+    table.begin(header)
+    for rows in blocks:
+        table.take(rows)
+    table.end(ending_in(record))
+    label = str(record.get("label") or record.get("scenario") or file.stem)
+    return Drawn(label, table, bool(record.get("z_up")), loops)
+
+
+def stored_rows(file: Path, record: dict[str, Any]) -> tuple[Header, Iterator[np.ndarray]]:
+    """The header and the rows of a stored table, block by block, without columns of texts.
+
+    Raises:
+        InputError: it cannot be read, or has no rows.
+
+    """
     texts = record.get("texts", [])
     place = locate(file)
     columns = tuple(name for name in read_columns(place) if name not in texts)
@@ -200,16 +228,7 @@ def read_result(
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
-    loops = loops_in(record)
-    drawn = {name for loop in loops for name in loop.drawn()}
-    table = VisibleRows(drawn if watched is None else watched(columns))
-    table.begin(_header(record, columns, first, file))
-    table.take(first)
-    for rows in blocks:
-        table.take(rows)
-    table.end(ending_in(record))
-    label = str(record.get("label") or record.get("scenario") or file.stem)
-    return Drawn(label, table, bool(record.get("z_up")), loops)
+    return _header(record, columns, first, file), chain([first], blocks)
 
 
 def table_in(path: Path) -> Path:
@@ -321,7 +340,7 @@ def checkpoints_of(
     times = [checkpoints.time for checkpoints in found]
     for prepared, time in zip(runs, times, strict=True):
         if time is not None:
-            say(f"{prepared.scenario.name}: goes on at t = {time:g} s")
+            say(f"{prepared.scenario.name}: continues at t = {time:g} s")
     if resume and not any(times):
         say(f"there is nothing to resume in {folders[0]}: begins at the start")
     return found
@@ -359,7 +378,7 @@ def leave_checkpoints(
             checkpoints.remove()
         elif checkpoints.time is not None:
             place = _shown(checkpoints.folder)
-            say(f"--resume goes on from t = {checkpoints.time:g} s, from {place}")
+            say(f"--resume continues from t = {checkpoints.time:g} s, from {place}")
 
 
 def _shown(folder: Path) -> Path:

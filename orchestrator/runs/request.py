@@ -12,12 +12,19 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
-from fmus.kinds import AUTO, KINDS
-from orchestrator.master.experiment import COUPLINGS, ORDERS, Order, format_order, read_order
+from fmus.kinds import AUTO, KINDS, KindName
+from orchestrator.master.experiment import (
+    COUPLINGS,
+    ORDERS,
+    CouplingName,
+    Order,
+    format_order,
+    read_order,
+)
 from orchestrator.master.fmi.isolated import STEP_TIMEOUT
 from orchestrator.master.hooks.checkpoint import check_every
-from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import TABLE_FORMATS
+from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
 from orchestrator.master.observers.observer import check_interval
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
@@ -48,21 +55,21 @@ def flag(name: str) -> str:
 
 
 #: Which FMUs of the bundle.
-Kind = Annotated[
-    str,
+KindOption = Annotated[
+    KindName,
     CliOption(
-        "kind of the bundle's FMUs: Python source, or its translation to C, with the same numbers; "
-        f"default: {AUTO}, native where it is there or can be built",
+        "kind of the bundle's FMUs: python (source code) or native (its translation to C); both "
+        f"give the same numbers; default: {AUTO} (native if it is present or can be built)",
         choices=(AUTO, *KINDS),
     ),
 ]
 
 #: What makes the steps.
-LoopName = Annotated[
-    str,
+LoopOption = Annotated[
+    LoopName,
     CliOption(
-        "what makes the steps: Python, or a loop in C, with the same rows; default: auto, the "
-        "compiled loop where it is available",
+        "stepping loop: python, or compiled (in C); both give the same rows; default: auto "
+        "(compiled where available)",
         choices=LOOPS,
     ),
 ]
@@ -71,8 +78,8 @@ LoopName = Annotated[
 Force = Annotated[
     bool,
     CliOption(
-        "rename your files that are in the way to NAME.~1~; without it they stay, and nothing is "
-        "written",
+        "move your own files out of the way, to NAME.~1~; without this option they stay and "
+        "nothing is written",
         action="store_true",
     ),
 ]
@@ -94,74 +101,70 @@ class Request:
     parameters: Mapping[Any, Any] = field(default_factory=dict, hash=False)
     stop_time: Annotated[
         float | None,
-        CliOption("end of the run [s]; default: the scenario's", type=float, metavar="S"),
+        CliOption("end time of the run [s]; default: from the scenario", type=float, metavar="S"),
     ] = None
     step: Annotated[
         float | None,
         CliOption(
-            "communication step [s]; default: the scenario's, else 0.02", type=float, metavar="S"
+            "communication step [s]; default: from the scenario, else 0.02", type=float, metavar="S"
         ),
     ] = None
     order: Annotated[
         Order | None,
         CliOption(
-            "order in which the components are stepped, or the names of all of them; default: "
-            f"the scenario's, else {ORDERS[0]}",
+            f"order in which components are stepped: {', '.join(ORDERS)}, or the names of all "
+            f"components; default: from the scenario, else {ORDERS[0]}",
             type=read_order,
             metavar=f"{'|'.join(ORDERS)}|NAME,...",
         ),
     ] = None
     coupling: Annotated[
-        str | None,
+        CouplingName | None,
         CliOption(
-            "how rings of direct feedthroughs are closed: solved, delayed by a step, or solved "
-            "with inputs that change linearly during a step; default: the scenario's, else solved "
+            "method for algebraic loops: solve them, delay them by one step, or solve them with "
+            "inputs that change linearly within the step; default: from the scenario, else solve "
             "where the FMUs allow it",
             choices=COUPLINGS,
         ),
     ] = None
-    kind: Kind = AUTO
+    kind: KindOption = AUTO
     events: Annotated[
         str | Sequence[Mapping[str, Any]] | None,
         CliOption(
-            "take the events of another scenario, for this one or an SSP",
+            "scenario whose events happen in this run",
             metavar="SCENARIO|FILE.toml",
         ),
     ] = field(default=None, hash=False)
     inputs: Annotated[
         str | Path | None,
         CliOption(
-            "table of inputs over time, in CSV or Parquet, for inputs that nothing feeds",
+            "table (CSV or Parquet) with values over time for unconnected inputs",
             type=Path,
             metavar="FILE",
         ),
     ] = None
-    loop: LoopName = LOOPS[0]
+    loop: LoopOption = LOOPS[0]
     isolate: Annotated[
         bool,
         CliOption(
-            "run each FMU in a separate process, where it may crash or hang",
+            "run each FMU in a separate process, so that a crash or hang cannot take the run down",
             action="store_true",
         ),
     ] = False
     step_timeout: Annotated[
         float | None,
         CliOption(
-            "how long an isolated FMU may take for one call [s]; "
-            f"default: {STEP_TIMEOUT:g}; needs --isolate",
+            f"time limit for one call of an isolated FMU [s]; default: {STEP_TIMEOUT:g}; needs "
+            "--isolate",
             type=float,
             metavar="S",
         ),
     ] = None
     real_time: Annotated[
         float | None,
-        CliOption(
-            "go no faster than FACTOR simulated seconds per second", type=float, metavar="FACTOR"
-        ),
+        CliOption("limit the speed to FACTOR times real time", type=float, metavar="FACTOR"),
     ] = None
-    strict: Annotated[
-        bool, CliOption("refuse anything that would be a warning", action="store_true")
-    ] = False
+    strict: Annotated[bool, CliOption("treat warnings as errors", action="store_true")] = False
     steps: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
@@ -203,7 +206,7 @@ class Files:
     interval: Annotated[
         float | None,
         CliOption(
-            "keep one row in the table for each interval [s]; default: one for each step",
+            "time between rows in the table [s]; default: a row for each step",
             type=float,
             metavar="S",
         ),
@@ -211,25 +214,25 @@ class Files:
     columns: Annotated[
         str,
         CliOption(
-            "keep only these columns in the table, for example plant.y.*,controller.tau; "
-            "default: all",
+            "columns of the table, for example plant.y.*,controller.tau; default: all",
             metavar="outputs|all|PATTERN,...",
         ),
     ] = "all"
     format: Annotated[
-        str, CliOption("format of the table; default: csv", choices=tuple(TABLE_FORMATS))
+        TableFormat,
+        CliOption("file format of the table; default: csv", choices=tuple(TABLE_FORMATS)),
     ] = "csv"
-    no_figures: Annotated[bool, CliOption("draw no figures", action="store_true")] = False
+    no_figures: Annotated[bool, CliOption("do not draw figures", action="store_true")] = False
     checkpoint_every: Annotated[
         float | None,
         CliOption(
-            "save a checkpoint in DIR/checkpoint, every S simulated seconds",
+            "write a checkpoint to DIR/checkpoint every S simulated seconds",
             type=float,
             metavar="S",
         ),
     ] = None
     resume: Annotated[
-        bool, CliOption("go on from the last checkpoint in DIR/checkpoint", action="store_true")
+        bool, CliOption("continue from the last checkpoint in DIR/checkpoint", action="store_true")
     ] = False
     force: Force = False
 

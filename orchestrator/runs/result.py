@@ -1,40 +1,45 @@
-"""Runs from Python: `simulate` and its result."""
+"""What a run gives to Python, when it was made or when it is read again."""
 
 from __future__ import annotations
 
-import signal
-import sys
+import json
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import suppress
 from functools import cached_property
+from html import escape
 from importlib.util import find_spec
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
-from fmus.kinds import AUTO
-from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.master.experiment import Order, format_order
-from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.loop import LOOPS
-from orchestrator.master.observers.files import TABLE_FORMATS
-from orchestrator.master.observers.observer import Observer, Occurrence, Progress
+import numpy as np
+
+from orchestrator.figures.style import Drawn
+from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.ledger import locate
+from orchestrator.machine.user_files import explain_errors, read_text
+from orchestrator.master.experiment import format_order
+from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
+from orchestrator.master.observers.observer import Occurrence
 from orchestrator.master.observers.table import Table
-from orchestrator.runs.folder import lock_folder, make_folder, replace_files
-from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
-from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.folder import replace_files
 from orchestrator.runs.record import (
     FILES,
-    Stopwatch,
-    checkpoints_of,
-    leave_checkpoints,
+    METRICS,
+    changed_files,
+    copy_record,
+    ending_in,
+    loops_in,
+    read_record,
+    stored_rows,
+    table_in,
     write_metrics,
-    write_record,
 )
-from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.vehicle.indices import metrics_of
+from orchestrator.vehicle.indices import metrics, of_vehicles
+from orchestrator.vehicle.signals import Loop
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,6 +77,33 @@ class Parameters(Mapping[Any, Any]):
         return repr(self._values)
 
 
+class Origin(Protocol):
+    """Where a result comes from: a run of this process, or the files of one."""
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run, as far as its figures need it."""
+        ...
+
+    @property
+    def loops(self) -> Sequence[Loop]:
+        """Of its vehicles."""
+        ...
+
+    @property
+    def system(self) -> System:
+        """What was run."""
+        ...
+
+    def metrics(self, result: Result) -> dict[str, Any]:
+        """What metrics.json holds."""
+        ...
+
+    def write_ends(self, folder: Path, result: Result) -> None:
+        """Write metrics.json and run.json, after everything else."""
+        ...
+
+
 class Result(Table):
     """The table of a run, with its indices and figures.
 
@@ -84,11 +116,10 @@ class Result(Table):
 
     """
 
-    def __init__(self, prepared: Prepared) -> None:
+    def __init__(self, origin: Origin) -> None:
         """Take the rows of a run."""
         super().__init__()
-        self._prepared = prepared
-        self._clock = Stopwatch()
+        self._origin = origin
         self.resumed_at: float | None = None
 
     def __repr__(self) -> str:
@@ -96,8 +127,22 @@ class Result(Table):
         end = f", {self.failure}" if self.failure else ""
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
-            f"<Result {self._prepared.scenario.name}: {len(self)} rows of {len(self.columns)} "
+            f"<Result {self._origin.scenario.name}: {len(self)} rows of {len(self.columns)} "
             f"columns, {first:g} to {last:g} s, {format_order(self.header.experiment.order)}{end}>"
+        )
+
+    def _repr_html_(self) -> str:
+        """The same for a notebook, with the indices."""
+        rows = []
+        with suppress(InputError):
+            for vehicle, title, numbers in summary(self.metrics()):
+                cells = "".join(f"<td>{number}</td>" for number in numbers)
+                heading = escape(", ".join(filter(None, (vehicle, title))))
+                rows.append(f"<tr><th style='text-align: left'>{heading}</th>{cells}</tr>")
+        title = escape(self._origin.scenario.title or self._origin.scenario.name)
+        return (
+            f"<div><b>{title}</b><br><code>{escape(repr(self))}</code>"
+            f"<table>{''.join(rows)}</table></div>"
         )
 
     @cached_property
@@ -107,8 +152,13 @@ class Result(Table):
 
     @property
     def system(self) -> System:
-        """What was run."""
-        return self._prepared.system
+        """What was run.
+
+        Raises:
+            ValueError: the result was read from files, which do not hold it.
+
+        """
+        return self._origin.system
 
     @property
     def events(self) -> tuple[Occurrence, ...]:
@@ -117,8 +167,7 @@ class Result(Table):
 
     def metrics(self) -> dict[str, Any]:
         """What the command line writes into metrics.json."""
-        found = metrics_of(self, self._prepared.loops)
-        return found.content(self._prepared.scenario.name, self.system)
+        return self._origin.metrics(self)
 
     def to_dataframe(self) -> pd.DataFrame:
         """All columns as a pandas DataFrame, with the time as its index.
@@ -134,29 +183,54 @@ class Result(Table):
         index = pd.Index(self.time, name="time")
         return pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
 
-    def plot(self, *patterns: str) -> Figure:
+    def plot(self, *what: str | Result) -> Figure:
         """Draw columns over time, a group such as `plant.y` a panel.
 
         Args:
-            patterns: names of groups or columns, or patterns such as `plant.eta.*`; none: errors,
-                commands and estimates of the loop.
+            what: names of groups or columns, or patterns such as `plant.eta.*`; none: errors,
+                commands and estimates of the loop. Other results are drawn over this one.
 
         Raises:
             ValueError: a pattern matches no column.
 
         """
-        from orchestrator.figures.plot import plot  # noqa: PLC0415
+        from orchestrator.figures.plot import plot, told_apart  # noqa: PLC0415
 
-        return plot([(self._prepared.scenario.name, self)], patterns)
+        others = [one for one in what if isinstance(one, Result)]
+        runs = [one._drawn() for one in (self, *others)]
+        tables = (run.result for run in runs)
+        patterns = [one for one in what if not isinstance(one, Result)]
+        return plot(list(zip(told_apart(runs), tables, strict=True)), patterns)
+
+    def figure(self, *others: Result, name: str | None = None, vehicle: str = "") -> Figure:
+        """Draw the figure of its scenario, or another, as `auv-fmu run` does.
+
+        Args:
+            others: results that are drawn with it, as in a comparison.
+            name: of the figure, such as `comparison`, or `tracking-velocity`; None: the one that
+                its scenario names.
+            vehicle: whose, if there are several; the first, if none is named.
+
+        Raises:
+            ValueError: there is no such figure, or the result has nothing that it shows.
+
+        """
+        from orchestrator.figures.drawing import one_figure  # noqa: PLC0415
+        from orchestrator.figures.plot import told_apart  # noqa: PLC0415
+
+        scenario = self._origin.scenario
+        runs = [one._drawn() for one in (self, *others)]
+        named = [run._replace(label=x) for run, x in zip(runs, told_apart(runs), strict=True)]
+        return one_figure(name or scenario.figure, scenario.title, named, vehicle)
 
     def save(
         self,
         folder: str | Path,
-        format: str = "csv",  # noqa: A002
+        format: TableFormat = "csv",  # noqa: A002
         *,
         force: bool = False,
     ) -> Path:
-        """Write the table, metrics.json and run.json; `auv-fmu plot` and `view` take the folder.
+        """Write the table, metrics.json and run.json; :func:`read` and `auv-fmu plot` take them.
 
         Args:
             folder: made if it does not exist; an earlier result in it is replaced.
@@ -179,142 +253,85 @@ class Result(Table):
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)
-            write_metrics(unfinished, self.metrics())
-            write_record(
-                unfinished, self._prepared, self.header, self.ending, sys.argv, self._clock
-            )
+            self._origin.write_ends(unfinished, self)
         return folder
 
+    def _drawn(self) -> Drawn:
+        scenario = self._origin.scenario
+        return Drawn(scenario.legend, self, scenario.z_up, self._origin.loops)
 
-def simulate(
-    system: str | Path | System,
-    parameters: Mapping[str, object] | None = None,
-    *,
-    stop_time: float | None = None,
-    step: float | None = None,
-    order: Order | None = None,
-    kind: str = AUTO,
-    progress: bool = False,
-    isolate: bool = False,
-    step_timeout: float | None = None,
-    loop: str = LOOPS[0],
-    variant: str | None = None,
-    strict: bool = False,
-    steps: Mapping[str, float] | None = None,
-    events: Sequence[Mapping[str, Any]] | None = None,
-    inputs: str | Path | None = None,
-    coupling: str | None = None,
-    checkpoint: str | Path | None = None,
-    checkpoint_every: float | None = None,
-    resume: bool = False,
-) -> Result:
-    """Run a scenario, an SSP or a system.
 
-        result = simulate("fig4", {"controller.eps_t": 10.0}, stop_time=50.0)
-        result["plant.eta.x"], result.metrics(), result.plot("plant.tau.*")
+def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
+    """What metrics.json holds, to be read by people.
 
     Args:
-        system: name of a scenario, path of a .toml or .ssp file, or what :func:`load` has given.
-        parameters: values that win over the scenario's, by `component.parameter`: numbers, truth
-            values, names, or text as it stands on the command line.
-        stop_time: end of the run [s]; None: the scenario's own.
-        step: communication step [s]; None: the scenario's own, else the longest that fits into
-            the steps that the FMUs were made for, else 0.02.
-        order: `gauss-seidel`, as the paper's scheme has it, `jacobi`, as most tools step, or the
-            names of all components, one stepped after the other; None: the scenario's own, else
-            `gauss-seidel`.
-        kind: of the bundle's FMUs, `python`, `native`: translated to C, with the same numbers, or
-            `auto`, native where available.
-        progress: show a bar on runs that take longer than some seconds.
-        isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
-            a failure of the run.
-        step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
-        loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
-            to be had; the rows are the same.
-        variant: which of the descriptions in an SSP; None: the default.
-        strict: refuse what otherwise is a warning.
-        steps: of components that take longer ones of their own [s], multiples of the communication
-            step; they win over the scenario's.
-        events: what happens during the run, instead of the scenario's own: tables as a
-            scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
-        inputs: a table of inputs over time, instead of the scenario's own: a .csv or .parquet
-            file.
-        coupling: how rings of direct feedthroughs are closed: `solve`, at every communication
-            point, `delay`, by a delay of one step, or `linear`, solved, with inputs that change
-            linearly during a step; None: the scenario's own, else `solve` where the FMUs allow it.
-        checkpoint: folder for what it takes to go on after the process has ended, whatever ended
-            it; removed when the run has come to its end.
-        checkpoint_every: how often that is written, in simulated seconds; None: as often as
-            before, if the run is resumed.
-        resume: go on from there. The result has all rows, as if nothing had happened, and says in
-            `resumed_at` where it went on.
+        values: of metrics.json.
 
-    Returns:
-        The rows that were computed: all of them, or those before a failure, which
-        `Result.failure` then describes.
-
-    Raises:
-        ValueError: a name, a value or a file is not usable; the text says what to change.
-        KeyboardInterrupt: Ctrl-C, when the step has ended that it came in.
+    Yields:
+        The vehicle, empty if there is only one; an index with its members and unit; its numbers.
 
     """
-    is_named = not isinstance(system, System)
-    if isinstance(system, System):
-        check_brings_its_own(str(system), kind)
-        if variant is not None:
-            raise InputError(f"{system}: has no variants; give it to load")
-        scenario = Scenario(system.name)
-    else:
-        with notes_as_warnings(strict) as findings:
-            scenario, system = load_scenario(str(system), kind, variant=variant, findings=findings)
-    if not isinstance(parameters, Mapping | None):
-        raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
-    request = Request(
-        parameters=parameters or {},
-        stop_time=stop_time,
-        step=step,
-        order=order,
-        coupling=coupling,
-        kind=kind,
-        events=events,
-        inputs=inputs,
-        loop=loop,
-        isolate=isolate,
-        step_timeout=step_timeout,
-        strict=strict,
-        steps=steps or {},
-    )
-    prepared = prepare(scenario, system, request)
-    if is_named:
-        with notes_as_warnings(strict) as findings:
-            for doubt in prepared.doubts():
-                findings.note(doubt)
-            findings.refuse()
-    result = Result(prepared)
-    observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
-    with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:
-        result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
-        ending = prepared.run([*observers, *kept], kept)
-        leave_checkpoints(kept, ending.failure is None)
-    for number in ending.interrupts:
-        # Held back while the FMUs computed; now it acts as usual.
-        signal.raise_signal(number)
+    for vehicle, found in of_vehicles(values).items():
+        for index in metrics():
+            if index.name in found:
+                title = f"{index.label} {index.members}" + f" [{index.unit}]" * bool(index.unit)
+                yield vehicle, title, [*map(_number, np.atleast_1d(found[index.name]).tolist())]
+
+
+def _number(value: float) -> str:
+    """Four digits; an exponent only where zeros would be all that is seen."""
+    if value and not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.3e}"
+    return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
+
+
+class _Stored:
+    """Where a result comes from that was read from files."""
+
+    def __init__(self, file: Path, record: dict[str, Any]) -> None:
+        self._file, self._record = file, record
+        self.loops: Sequence[Loop] = loops_in(record)
+        shown = {"title", "label", "z_up", "figure"} & record.keys()
+        said = {name: record[name] for name in shown}
+        self.scenario = Scenario(str(record.get("scenario", file.stem)), **said)
+
+    @property
+    def system(self) -> System:
+        """Nothing: files do not hold it."""
+        raise InputError(f"{self._file}: a stored result has no system; load() gives it")
+
+    def metrics(self, _: Result) -> dict[str, Any]:
+        """What the run wrote: the table may have fewer rows and columns."""
+        path = locate(self._file.with_name(METRICS))
+        with explain_errors(path, "not the indices of a run"):
+            return dict(json.loads(read_text(path, "not the indices of a run")))
+
+    def write_ends(self, folder: Path, result: Result) -> None:
+        """Write what the files hold, once more."""
+        if self._record:
+            write_metrics(folder, self.metrics(result))
+            copy_record(folder, self._record)
+
+
+def read(path: str | Path) -> Result:
+    """A result that `auv-fmu run` or :meth:`Result.save` has written.
+
+        result = read("results/fig4")
+
+    Its columns are numbers: those with texts are left out.
+
+    Args:
+        path: of the folder, or of a table in it.
+
+    Raises:
+        ValueError: there is no result, or it cannot be read.
+
+    """
+    file = table_in(Path(path))
+    record = read_record(file)
+    for changed in changed_files(file) if record else ():
+        warnings.warn(f"{changed} was changed since the run wrote it", stacklevel=2)
+    result = Result(_Stored(file, record))
+    header, blocks = stored_rows(file, record)
+    result.hold(header, np.concatenate(list(blocks)), ending_in(record))
     return result
-
-
-@contextmanager
-def _checkpoints(
-    prepared: Prepared, folder: str | Path | None, every: float | None, resume: bool
-) -> Iterator[Sequence[Checkpoints]]:
-    """The checkpoints of a run in a folder that is kept from others; none, if none are wanted."""
-    if folder is None and every is None and not resume:
-        yield ()
-        return
-    if folder is None or (every is None and not resume):
-        raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
-    place = Path(folder)
-    try:
-        with make_folder(place), lock_folder(place):
-            yield checkpoints_of([prepared], [place], every, resume)
-    except OSError as error:
-        raise InputError(f"cannot write into {place}: {reason(error)}") from error

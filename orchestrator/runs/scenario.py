@@ -32,6 +32,9 @@ _NOT_A_SCENARIO = "not a scenario"
 #: Scenarios that come with the bundle.
 SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
 
+#: The name of a scenario that has no file.
+_NAMELESS = "scenario"
+
 #: What is run besides the scenarios that come with the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
 
@@ -129,7 +132,17 @@ def read_scenario(name: str) -> Scenario:
     path = find_toml(name, SCENARIOS_FOLDER, "scenario", _OTHERS)
     text = read_text(path, _NOT_A_SCENARIO)
     with explain_errors(path, _NOT_A_SCENARIO):
-        return _scenario(path, text)
+        return _scenario(path, tomllib.loads(text), text)
+
+
+def scenario_of(content: Mapping[str, Any]) -> Scenario:
+    """A scenario from what its file would hold; paths in it are relative to the current folder.
+
+    Raises:
+        InputError: there is a mistake in it.
+
+    """
+    return _scenario(Path(_NAMELESS), dict(content), repr(content))
 
 
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
@@ -144,10 +157,9 @@ def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
     ScenarioFile.check(where, {"events": list(tables)})
 
 
-def _scenario(path: Path, text: str) -> Scenario:
+def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
-    content = tomllib.loads(text)
     ScenarioFile.check(path, content)
     content["parameters"] = {
         port_name(key): value for key, value in flatten(content.get("parameters", {}))

@@ -20,13 +20,10 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.system.names import PortName, flatten, port_name, splits
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.names import PortName, flatten, port_name
+from orchestrator.system.structure import Connection, System, paired
 from orchestrator.system.units import Linear, Mapped
 from orchestrator.system.values import TYPES, Value, finite, is_finite, literal, type_of, typed
-
-#: What is between the names of a group and of its members.
-_MEMBER = (".", "[")
 
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
@@ -141,17 +138,8 @@ def _ports(
 
     """
     port = system.named(port_name(text))
-    if not system.has(port) and not single:
-        for component, group in splits(text):
-            if component in system.components:
-                members = [
-                    PortName(component, variable.name)
-                    for causality in causalities
-                    for variable in system.components[component].having(causality)
-                    if variable.name.startswith(tuple(group + mark for mark in _MEMBER))
-                ]
-                if members:
-                    return members
+    if not system.has(port) and not single and (members := system.members(text, causalities)):
+        return members
     variable = system.component(port.component).variable(port.port)
     if variable.causality not in causalities:
         raise InputError(
@@ -184,10 +172,7 @@ def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
 
 def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple[PortName, Any]]:
     """Ports of a group with their values: one for all, or a list with one for each."""
-    values = value if isinstance(value, list) else [value] * len(ports)
-    if len(values) != len(ports):
-        raise InputError(f"{name}: {len(values)} values for {len(ports)} signals")
-    return zip(ports, values, strict=True)
+    return paired(name, ports, value if isinstance(value, list) else [value] * len(ports))
 
 
 # What events do

@@ -203,4 +203,6 @@ class _Cluster:
 
 
 def _gone(what: str) -> InputError:
-    return InputError(f"the {what} is gone; finished runs are kept: start the study again to go on")
+    return InputError(
+        f"the {what} is gone; finished runs are kept: start the study again to continue"
+    )

@@ -7,14 +7,17 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import names_in, read_text
+from orchestrator.master.experiment import OrderName
 from orchestrator.system.names import file_name
 
 #: What makes the runs; the first is the default.
-ENGINES = FMU, BATCH = "fmu", "batch"
+EngineName: TypeAlias = Literal["fmu", "batch"]
+ENGINES: tuple[EngineName, ...] = get_args(EngineName)
+FMU, BATCH = ENGINES
 
 #: How values that are not listed are spread between two ends.
 SPACINGS = LINEAR_SPACING, LOG_SPACING = "linear", "log"
@@ -107,7 +110,7 @@ class Study:
     engine: str = FMU
     stop_time: StopTime | None = None
     step: float | None = None
-    order: str | None = None
+    order: OrderName | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     sample: Sample | None = None

@@ -1,6 +1,6 @@
 """What a study file may hold, and the study and the figures that it stands for.
 
-docs/how-to/studies.md and the JSON schema of these files are made from this.
+docs/reference/study-files.md and the JSON schema of these files are made from this.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ class FigureTable(TomlTable):
     y: Name = entry("Value along the vertical axis.")
     show: Names = entry("Values to show, a row each.")
     by: Names = entry(
-        "Columns that tell runs apart, by colours or in separate panels; `[]` for none.",
+        "Columns that distinguish runs, by colours or in separate panels; `[]` for none.",
         "the scenario, if there are several",
     )
     where: dict[str, Any] = entry("Only runs in which these columns have these values.", "none")

@@ -16,23 +16,23 @@ from typing import Annotated, Any
 from tqdm import tqdm
 
 from fmus.compilers import machines_compiler
-from fmus.kinds import AUTO, KINDS, PYTHON
+from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.loop import LOOPS
+from orchestrator.master.loop import LOOPS, LoopName
 from orchestrator.master.plan import PACKAGES
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.request import CliOption, Force, Kind, LoopName
+from orchestrator.runs.request import CliOption, Force, KindOption, LoopOption
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine, check_systems
 from orchestrator.studies.blocks import Making, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, open_store
-from orchestrator.studies.study import BATCH, ENGINES, FMU, Study
+from orchestrator.studies.study import BATCH, ENGINES, FMU, EngineName, Study
 from orchestrator.studies.study_file import read_figures, read_study, study_of
 from orchestrator.studies.study_result import StudyResult, read_study_record
 from orchestrator.system.structure import System
@@ -66,15 +66,15 @@ class Means:
     """
 
     engine: Annotated[
-        str | None,
+        EngineName | None,
         CliOption(
-            "what makes the runs: the FMUs, or the compiled equations, with the same numbers; "
-            "default: the study's own",
+            "engine that makes the runs: fmu (the FMUs) or batch (the compiled equations); both "
+            "give the same numbers; default: from the study",
             choices=ENGINES,
         ),
     ] = None
-    kind: Kind = AUTO
-    loop: LoopName = LOOPS[0]
+    kind: KindOption = AUTO
+    loop: LoopOption = LOOPS[0]
     scheduler: Annotated[
         str | None,
         CliOption(
@@ -85,7 +85,9 @@ class Means:
     ] = None
     workers: Annotated[
         int | None,
-        CliOption("number of processes on this machine; default: its cores", type=int, metavar="N"),
+        CliOption(
+            "number of processes on this machine; default: one per core", type=int, metavar="N"
+        ),
     ] = None
     force: Force = False
 
@@ -94,17 +96,16 @@ class Means:
             raise InputError(f"--workers {self.workers}: must be at least 1")
         if self.workers is not None and self.scheduler is not None:
             raise InputError(
-                "--workers is for processes of this machine: those of a scheduler are started with "
-                "it"
+                "--workers is for processes of this machine: a scheduler starts its own"
             )
 
 
 def sweep(
     study: str | Path | Mapping[str, Any],
     *,
-    engine: str | None = None,
-    kind: str = AUTO,
-    loop: str = LOOPS[0],
+    engine: EngineName | None = None,
+    kind: KindName = AUTO,
+    loop: LoopName = LOOPS[0],
     scheduler: str | None = None,
     workers: int | None = None,
     out: str | Path | None = None,
@@ -169,11 +170,11 @@ def complete_study(
 
     """
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
-    kind = _kind_begun(folder) if means.kind == AUTO else means.kind
+    kind: str = _kind_begun(folder) if means.kind == AUTO else means.kind
     systems = {name: load_scenario(name, kind) for name in study.scenario}
     if any(scenario.digest for scenario, _ in systems.values()):
         kind = settings_of(current_fmus(kind))["kind"]
-    means = replace(means, kind=kind)
+    means = replace(means, kind=_kind(kind))
     space = Space(study, systems)
     entries = read_figures(
         study.name, study.figures, space.columns, space.has_scenarios, space.indices
@@ -198,12 +199,16 @@ def complete_study(
     return result
 
 
-def _kind_begun(folder: Path) -> str:
+def _kind_begun(folder: Path) -> KindName:
     """The kind of FMU that the study in a folder was begun with; if there is none, any."""
     with suppress(InputError):
-        if (begun := read_study_record(folder).get("kind")) in KINDS:
-            return str(begun)
+        return _kind(read_study_record(folder).get("kind"))
     return AUTO
+
+
+def _kind(name: object) -> KindName:
+    """The kind of a name; of any other name, each kind will do."""
+    return next((kind for kind in KINDS if kind == name), AUTO)
 
 
 def check_installed(needed: Sequence[str] = _NEEDED) -> None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from sys import float_info
+from typing import Any
 
 import numpy as np
 from fmpy.model_description import ModelVariable
@@ -16,6 +17,9 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, listed, plain_file_names, splits
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
 from orchestrator.system.values import EXACT, TYPES, Value, typed, unit_of
+
+#: What is between the names of a group and of its members.
+_MEMBER = (".", "[")
 
 #: What can be fed from another family of types, besides from its own.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
@@ -71,18 +75,48 @@ class System:
         """The same system with further values, which win over its own.
 
         Args:
-            values: by the names of their ports; text is read as the command line reads it.
+            values: by the names of their ports, or of groups; text is read as the command line
+                reads it.
 
         Raises:
             InputError: there is no such port, or the value is not of its type or out of range.
 
         """
         new = {}
-        for name, value in values.items():
+        for name, value in self.expanded(values).items():
             target = self.named(name)
             variable = self.component(target.component).variable(target.port)
             new[target] = typed(str(target), variable, value)
         return replace(self, parameters={**self.parameters, **new})
+
+    def expanded(self, values: Mapping[PortName, object]) -> dict[PortName, object]:
+        """Values by ports only: a list for a group has a value for each member. The last one wins.
+
+        Raises:
+            InputError: a list is not as long as its group.
+
+        """
+        found: dict[PortName, object] = {}
+        for name, value in values.items():
+            several = None if self.has(name) else _several(value)
+            ports = [] if several is None else self.members(str(name), ("parameter", "input"))
+            found |= dict(paired(name, ports, several)) if several and ports else {name: value}
+        return found
+
+    def members(self, text: str, causalities: Sequence[str]) -> list[PortName]:
+        """The ports of a group `component.group`, in their order; none: there is no such group."""
+        for component, group in splits(text):
+            if component in self.components:
+                starts = tuple(group + mark for mark in _MEMBER)
+                found = [
+                    PortName(component, variable.name)
+                    for causality in causalities
+                    for variable in self.components[component].having(causality)
+                    if variable.name.startswith(starts)
+                ]
+                if found:
+                    return found
+        return []
 
     def named(self, name: PortName) -> PortName:
         """The port that a name means, which may have dots in its component's name as well.
@@ -235,6 +269,27 @@ class System:
         if converted is not None:
             names = " and ".join(unit.name for unit in units if unit)
             raise InputError(f"{source} -> {target}: units differ, {names}")
+
+
+def paired(
+    name: object, ports: Sequence[PortName], values: Sequence[Any]
+) -> Iterator[tuple[PortName, Any]]:
+    """The ports of a group, each with its value.
+
+    Raises:
+        InputError: there are more of one than of the other.
+
+    """
+    if len(values) != len(ports):
+        raise InputError(f"{name}: takes {len(ports)} values, not {len(values)}")
+    return zip(ports, values, strict=True)
+
+
+def _several(value: object) -> list[Any] | None:
+    """The values of a list, which a command line writes with commas; None: it is one value."""
+    if isinstance(value, str):
+        return value.strip().strip("[]").split(",") if "," in value else None
+    return list(value) if isinstance(value, list | tuple | np.ndarray) else None
 
 
 def _can_feed(source: ModelVariable, target: ModelVariable) -> bool:

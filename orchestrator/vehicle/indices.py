@@ -112,8 +112,8 @@ INDICES: tuple[Index, ...] = (
         "l2_effort",
         "L2 effort",
         _EFFORT,
-        "root of the integral of the square of the applied signal, the size of what the paper "
-        "prints (reading 6)",
+        "root of the integral of the square of the applied signal, the quantity that the "
+        "paper prints (reading 6)",
         _actuation,
         _ENERGY,
         "square",

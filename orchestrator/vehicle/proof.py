@@ -44,8 +44,8 @@ _NOTE = """\
 The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
 where they are violated. The zetas of (26) and (29) are known from below only, by states of a level
 vehicle. C_2 has a pole at the vertical, so that no finite zetas hold at all attitudes: open means
-that a condition may hold for pitches that keep off it. The report has the proofs, under "What is
-wrong in the paper"; so has docs/explanation/paper.md."""
+that a condition may hold for pitches that keep off it. docs/explanation/paper.md has the
+proofs, and so does the report under "What is wrong in the paper"."""
 
 _PAPER = """\
 These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""

@@ -209,6 +209,15 @@ def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:
     return Vehicle._make(value(name) for name in loop.vehicle_parameters)
 
 
+def waypoints(table: Table, loop: Loop = STANDARD) -> np.ndarray:
+    """The waypoints of a planner that has some, (n, 3) [m]."""
+    n = value_of(table, f"{loop.planner}.count")
+    names = (f"{loop.planner}.waypoint[{k}]" for k in range(1, int(n or 0) + 1))
+    return np.array(
+        [[real_parameter(table, f"{name}.{axis}") for axis in AXES] for name in names]
+    ).reshape(-1, 3)
+
+
 def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
     """y without measurement noise: (9) on the vehicle's posture, (rows, 3) [m]."""
     ell = real_parameter(table, loop.ell)

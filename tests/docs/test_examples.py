@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
+import sys
 import tomllib
 from importlib.util import find_spec
 from inspect import signature
@@ -27,15 +29,17 @@ from support.markdown import DOCS, blocks
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
-ACCURACY, BATCH, EVENTS, PYTHON, SCENARIOS, STUDIES = (
+ACCURACY, BATCH, EVENTS, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE = (
     DOCS / f"{name}.md"
     for name in (
         "explanation/accuracy",
         "explanation/batch",
         "how-to/events",
+        "how-to/change-parameters",
         "how-to/python",
         "reference/scenario-files",
         "how-to/studies",
+        "how-to/test-one-component",
     )
 )
 
@@ -56,7 +60,11 @@ def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) ->
 
 @pytest.mark.parametrize(
     ("page", "number"),
-    [(page, n) for page in (SCENARIOS, EVENTS) for n in range(len(blocks(page, "toml")))],
+    [
+        (page, n)
+        for page in (SCENARIOS, EVENTS, PARAMETERS)
+        for n in range(len(blocks(page, "toml")))
+    ],
     ids=lambda value: getattr(value, "stem", value),
 )
 def test_scenario_of_a_guide_runs_and_is_drawn(page: Path, number: int):
@@ -82,6 +90,28 @@ def test_events_in_python_are_told(capsys):
         "15.0 lose controller.tau.r, ended",
         "20.0 set plant.current.x = 0.3",
     ]
+
+
+def test_changed_gain_in_python_gives_an_error_each(capsys):
+    lines = executed(PARAMETERS, capsys)
+    assert [line.split()[0] for line in lines] == ["50.0", "25.0"]
+
+
+def test_tests_of_one_fmu_pass_as_the_page_says(native, workplace):
+    Path("dist").symlink_to(native)
+    Path("fmus").symlink_to(DOCS.parent / "fmus")
+    [code] = blocks(TEST_ONE, "python")
+    Path("test_observer.py").write_text(code.text)
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_observer.py"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    [said] = blocks(TEST_ONE, "text")
+    assert said.text.strip() in ended.stdout
+
+
+def test_tests_that_the_page_names_are_there():
+    [_, _, named] = blocks(TEST_ONE, "sh")
+    for path in named.text.split()[1:]:
+        assert (DOCS.parent / path).exists(), path
 
 
 @needs("parquet, and pandas", "pandas", "pyarrow")
@@ -120,8 +150,9 @@ def test_modules_of_the_batch_engine_on_the_page_are_there():
     assert all(f":mod:`.{name}`" in str(orchestrator.studies.batch.__doc__) for name in listed)
 
 
-def test_page_of_studies_names_all_columns_options_and_ready_studies():
-    text = STUDIES.read_text(encoding="utf-8")
+def test_pages_of_studies_name_all_columns_options_and_ready_studies():
+    pages = (STUDIES, DOCS / "reference" / "study-files.md")
+    text = "".join(page.read_text(encoding="utf-8") for page in pages)
     for name in index_columns():
         assert f"`{name.split('.')[0].split('[')[0]}" in text, name
     for name in (*signature(sweep).parameters.keys() - {"study", "progress"}, *ready_studies()):

@@ -26,20 +26,20 @@ def commands() -> dict[str, argparse.ArgumentParser]:
 
 @pytest.mark.parametrize("name", commands())
 def test_readme_names_the_command(name):
-    assert re.search(rf"^    auv-fmu (\w+ \| )*{name}\b", README, re.MULTILINE)
+    rows = re.findall(r"^\| `auv-fmu .*", README, re.MULTILINE)
+    assert any(re.search(rf"`(auv-fmu )?{name}\b", row) for row in rows)
 
 
-def test_readme_names_every_option_of_run():
-    described = README.split("auv-fmu run SCENARIO|FILE", 1)[1].split("    auv-fmu ", 1)[0]
-    options = {o for action in commands()["run"]._actions for o in action.option_strings}
-    assert options - {"-h", "--help"} == set(re.findall(r"--[\w-]+", described))
+def test_readme_is_short():
+    assert len(README.splitlines()) <= 100
 
 
-def test_readme_names_every_file_of_a_run(tmp_path):
+def test_page_of_result_files_names_every_file_of_a_run(tmp_path):
+    page = (DOCS / "reference" / "result-files.md").read_text(encoding="utf-8")
     assert main(["run", "fig5", "--stop-time", "0.1", "--out", str(tmp_path)]) == 0
     for file in tmp_path.rglob("*.*"):
         kind = "SCENARIO.png`, `.svg`" if file.suffix in (".png", ".svg") else file.name
-        assert f"| `{kind}" in README, file.name
+        assert f"| `{kind}" in page, file.name
 
 
 def test_python_on_the_first_screen_runs(capsys):

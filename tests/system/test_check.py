@@ -16,8 +16,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
-from orchestrator.runs.result import simulate
 from orchestrator.runs.scenario import names
+from orchestrator.runs.simulate import simulate
 from orchestrator.system.component import read_component
 from orchestrator.system.structure import System, unfed_inputs
 from support.others import build

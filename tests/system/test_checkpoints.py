@@ -181,8 +181,8 @@ def test_a_run_with_a_companion_and_figures(capsys):
     capsys.readouterr()
     assert run(*arguments, "--resume", out="killed") == 0
     assert capsys.readouterr().err.splitlines() == [
-        "auv-fmu: fig5: goes on at t = 0.9 s",
-        "auv-fmu: fig5-pd: goes on at t = 0.6 s",
+        "auv-fmu: fig5: continues at t = 0.9 s",
+        "auv-fmu: fig5-pd: continues at t = 0.6 s",
     ]
     assert result("killed") == result("whole")
 

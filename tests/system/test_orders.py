@@ -21,8 +21,8 @@ from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
-from orchestrator.runs.result import simulate as simulated
 from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.simulate import simulate as simulated
 from orchestrator.system.graph import delayed_connections
 from orchestrator.system.structure import System
 from support.relay import relay, system_of

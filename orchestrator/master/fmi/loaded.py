@@ -295,7 +295,7 @@ class LoadedInstance:
             )
         if status == fmi2Pending:
             return ComponentFailed(
-                f"{self.name}: its step goes on after {function}, and its description does not "
+                f"{self.name}: its step continues after {function}, and its description does not "
                 "say so (canRunAsynchronuously)"
             )
         return self._failed(FMICallException(function=function, status=status))

@@ -42,11 +42,10 @@ _PATIENCE = 500
 
 #: What the supervisor begins with: the modules that this process would find, and no main module.
 _BEGIN = """
-import json, sys
+import importlib, json, sys
 order = json.loads(sys.stdin.buffer.raw.readline())
 sys.path[:] = order["path"]
-from orchestrator.master.fmi.supervisor import supervise
-supervise(order)
+importlib.import_module("orchestrator.master.fmi.supervisor").supervise(order)
 """
 
 

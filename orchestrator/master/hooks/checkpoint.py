@@ -239,8 +239,8 @@ class Checkpoints:
                 return found
             if not resume:
                 raise InputError(
-                    f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume goes "
-                    "on with it; --force moves it aside and starts over"
+                    f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume "
+                    "continues it; --force moves it aside and starts over"
                 )
             if different := differences(found.of, self._identity):
                 raise InputError(

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from importlib import import_module
 from io import BufferedWriter, RawIOBase, StringIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -222,7 +222,8 @@ class ParquetFile:
 
 
 #: Writers by the ending of their files.
-TABLE_FORMATS: dict[str, type[CsvFile] | type[ParquetFile]] = {
+TableFormat: TypeAlias = Literal["csv", "parquet"]
+TABLE_FORMATS: dict[TableFormat, type[CsvFile] | type[ParquetFile]] = {
     "csv": CsvFile,
     "parquet": ParquetFile,
 }

@@ -45,10 +45,14 @@ class Table:
     def of(cls, header: Header, rows: np.ndarray, ending: Ending | None = None) -> Table:
         """A table of rows that are there already, time first."""
         table = cls()
-        table._enter(header, rows)
-        table._n = len(rows)
-        table.ending = ending or table.ending
+        table.hold(header, rows, ending)
         return table
+
+    def hold(self, header: Header, rows: np.ndarray, ending: Ending | None = None) -> None:
+        """Take rows that are there already, time first."""
+        self._enter(header, rows)
+        self._n = len(rows)
+        self.ending = ending or self.ending
 
     def _enter(self, header: Header, rows: np.ndarray) -> None:
         self.header, self._rows = header, rows

@@ -8,7 +8,17 @@ import pytest
 
 pytest.importorskip("proselint")
 
-from prose import Page, findings, length, markdown_blocks, notebook_blocks, pages, rules, sentences
+from prose import (
+    Page,
+    findings,
+    length,
+    markdown_blocks,
+    message_blocks,
+    notebook_blocks,
+    pages,
+    rules,
+    sentences,
+)
 
 
 @pytest.mark.parametrize(
@@ -99,6 +109,14 @@ def test_a_notebook_is_read_by_the_lines_of_its_file():
     [heading, sentence] = notebook_blocks(text)
     assert text.splitlines()[heading.line - 1].strip() == r'"# A heading\n",'
     assert text.splitlines()[sentence.line - 1].strip() == '"A sentence."'
+
+
+def test_messages_of_a_module_are_read_and_docstrings_are_not():
+    text = '"""What a module is."""\n\nsay("the file", f"{name} is not\\n{there!r} yet", "x", 3)\n'
+    assert [(block.line, block.text) for block in message_blocks(text)] == [
+        (3, "the file"),
+        (3, "`…` is not\n`…` yet"),
+    ]
 
 
 def test_a_finding_names_its_line_and_what_to_write():

@@ -61,6 +61,18 @@ def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
     assert len({line.get_color() for line in members.get_lines()}) == 3
 
 
+def test_an_angle_that_wraps_has_a_gap():
+    table = loop_table()
+    yaw = np.remainder(np.linspace(0.0, 9.0, len(table)) + np.pi, 2.0 * np.pi) - np.pi
+    table["plant.eta.psi"][:] = yaw
+    [[_, line]] = drawn(plot([("run", table)], ["plant.eta.psi"])).values()
+    wraps = np.flatnonzero(np.isnan(line))
+    # Between 0 and 9 it passes pi, and does not reach 3 pi.
+    assert len(wraps) == 1
+    assert line[wraps[0] - 1] > 3.0 and line[wraps[0] + 1] < -3.0
+    np.testing.assert_array_equal(line[~np.isnan(line)], yaw)
+
+
 def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
     own = table_of(TIME, mine__a=np.arange(10.0))
     lines = drawn(plot([("loop", loop_table()), ("own", own)], ["mine.a"]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,8 @@ from orchestrator.figures.drawing import compose, draw, overlay
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.table import Table
+from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD
 from support.machine import contents
 from support.tables import loop_table
@@ -174,3 +177,19 @@ def test_an_unknown_figure_is_refused_with_a_hint():
         check_figure("trakking")
     with pytest.raises(InputError, match="no figure 'none'; there are tracking"):
         check_figure("none")
+
+
+def test_waypoints_stand_in_the_path():
+    table = loop_table()
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
+    known = {port_name("planner.count"): 2} | {
+        port_name(f"planner.waypoint[{k}].{axis}"): value
+        for k, point in enumerate([*points, [9.0, 9.0, 9.0]], start=1)
+        for axis, value in zip("xyz", point, strict=True)
+    }
+    header = replace(table.header, parameters={**table.parameters, **known})
+    run = Drawn("run", Table.of(header, table.rows))
+    figure, _ = compose("", FIGURES["tracking"][""], [run])
+    [axes] = [axes for axes in figure.axes if axes.name == "3d"]
+    [marks] = [one for one in axes.collections if one.get_label() == "waypoints"]
+    np.testing.assert_array_equal(np.column_stack(marks._offsets3d), points)

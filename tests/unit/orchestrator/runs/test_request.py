@@ -8,13 +8,14 @@ from dataclasses import MISSING, fields
 from inspect import signature
 from pathlib import Path
 from types import NoneType
-from typing import Any, get_args, get_type_hints
+from typing import Any, Literal, get_args, get_origin, get_type_hints
 
 import pytest
 
 from orchestrator import simulate, sweep
 from orchestrator.commands.many_runs import add_sweep
 from orchestrator.commands.run_command import add_run
+from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.request import Files, Request, option_fields
 from orchestrator.studies.sweep import Means
 
@@ -89,13 +90,18 @@ def test_options_are_the_fields(add, declared, others):
         option = options[name]
         assert option.option_strings == ["--" + name.replace("_", "-")]
         assert option.default == default
-        kinds = set(get_args(hint) or [hint]) - {NoneType}
+        of = [hint] if get_origin(hint) is Literal else get_args(hint) or [hint]
+        kinds = set(of) - {NoneType}
+        words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
         if option.nargs == 0:
             assert (kinds, default) == ({bool}, False)
         elif isinstance(option.type, type):
             assert option.type in kinds
+        elif option.choices is not None:
+            # What the command line takes is what a type checker takes.
+            assert (kinds, words) == ({Literal[tuple(option.choices)]}, list(option.choices))
         else:
-            assert str in kinds
+            assert str in kinds or words == list(ORDERS)
 
 
 def test_every_keyword_arrives(monkeypatch):
@@ -107,9 +113,9 @@ def test_every_keyword_arrives(monkeypatch):
         raise StopIteration
 
     monkeypatch.setattr(
-        "orchestrator.runs.result.load_scenario", lambda *_, **options: (None, None)
+        "orchestrator.runs.simulate.load_scenario", lambda *_, **options: (None, None)
     )
-    monkeypatch.setattr("orchestrator.runs.result.prepare", note)
+    monkeypatch.setattr("orchestrator.runs.simulate.prepare", note)
     monkeypatch.setattr("orchestrator.studies.sweep.complete_study", note)
     names = keywords(simulate).keys() - OF_SIMULATE - CHECKPOINTS
     given = {name: {name: name} for name in names}

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import inspect
+from copy import deepcopy
+from html.parser import HTMLParser
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 import orchestrator
-from orchestrator import Result, load, simulate
+from orchestrator import Result, load, read, simulate
 from orchestrator.commands.main import main
+from orchestrator.figures.drawing import save
 from orchestrator.system.names import PortName
 
 
@@ -19,12 +24,10 @@ def result() -> Result:
     return simulate("fig4", stop_time=0.1)
 
 
-def test_package_shows_its_four_names():
-    assert (
-        set(orchestrator.__all__)
-        == {"Result", "load", "simulate", "sweep"}
-        <= set(dir(orchestrator))
-    )
+def test_package_shows_its_names():
+    names = {"Result", "StudyResult", "load", "read", "simulate", "sweep"}
+    assert set(orchestrator.__all__) == names <= set(dir(orchestrator))
+    assert {getattr(orchestrator, name).__name__ for name in names} == names
     assert not hasattr(orchestrator, "nothing")
 
 
@@ -110,6 +113,168 @@ def test_scenario_file_is_found_by_text_and_by_path(tmp_path):
     for system in (file, str(file), load(file)):
         result = simulate(system)
         assert (result.time[-1], result.parameters["controller.K1[1]"]) == (0.1, 12.0)
+
+
+def test_dictionary_is_a_scenario_like_its_file(tmp_path):
+    table = {
+        "title": "PD",
+        "stop_time": 0.1,
+        "components": {"controller": "PdController"},
+        "wires": {"controller.dy": "plant.dy"},
+        "parameters": {"plant.noise.std": 0.0, "controller": {"lambda": 2.0}},
+    }
+    file = tmp_path / "scenario.toml"
+    file.write_text(
+        'title = "PD"\nstop_time = 0.1\ncomponents.controller = "PdController"\n'
+        '[wires]\n"controller.dy" = "plant.dy"\n'
+        "[parameters]\nplant.noise.std = 0.0\ncontroller.lambda = 2.0\n"
+    )
+    before = deepcopy(table)
+    made, written = simulate(table), simulate(file)
+    assert np.array_equal(made.rows, written.rows)
+    assert made.metrics() == written.metrics()
+    assert (repr(made), made.parameters["controller.lambda"]) == (repr(written), 2.0)
+    assert table == before
+    assert load(table).parameters == load(file).parameters
+
+
+@pytest.mark.parametrize(
+    ("table", "complaint"),
+    [
+        ({"stop_tim": 1.0}, "unknown entry 'stop_tim'; did you mean stop_time"),
+        ({"components": {"controller": 3}}, "controller': 3}: write a table of names"),
+        ({"components": {"controller": "Nope"}}, "Nope.fmu: no such file"),
+        ({"parameters": {"plant.eta0": [1.0]}}, "plant.eta0: takes 6 values, not 1"),
+    ],
+)
+def test_mistakes_in_a_dictionary_are_told(table, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        simulate(table)
+
+
+@pytest.mark.parametrize(
+    ("given", "pose"),
+    [
+        ({"plant.eta0": [1, 2, -3, 0.1, 0, 0.2]}, (1.0, 2.0, -3.0, 0.1, 0.0, 0.2)),
+        ({"plant.eta0": np.arange(6) / 8}, (0.0, 0.125, 0.25, 0.375, 0.5, 0.625)),
+        ({"plant.eta0": "1, 2,-3,0,0,0"}, (1.0, 2.0, -3.0, 0.0, 0.0, 0.0)),
+        ({"plant.eta0": [0] * 6, "plant.eta0.y": 7}, (0.0, 7.0, 0.0, 0.0, 0.0, 0.0)),
+        ({"plant.eta0.y": 7, "plant.eta0": [0] * 6}, (0.0,) * 6),
+    ],
+)
+def test_list_is_for_the_members_of_a_group(given, pose):
+    members = [f"plant.eta0.{name}" for name in ("x", "y", "z", "phi", "theta", "psi")]
+    for result in (
+        simulate("fig4", given, stop_time=0.02),
+        simulate({"parameters": dict(given)}, stop_time=0.02),
+    ):
+        assert tuple(result.parameters[name] for name in members) == pose
+        assert tuple(result.group("plant.eta.x", "plant.eta.y", "plant.eta.z")[0]) == pose[:3]
+
+
+def test_stored_result_is_the_same_again(result, tmp_path):
+    for ending in ("csv", "parquet"):
+        if ending == "parquet":
+            pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
+        again = read(result.save(tmp_path / ending, format=ending))
+        assert np.array_equal(again.rows, result.rows)
+        assert (again.columns, again.failure, repr(again)) == (result.columns, None, repr(result))
+        assert dict(again.parameters) == dict(result.parameters)
+        assert again.metrics() == result.metrics()
+        # And once more, from what was read.
+        twice = read(again.save(tmp_path / f"again-{ending}", format="csv"))
+        assert np.array_equal(twice.rows, result.rows)
+        assert twice.metrics() == result.metrics()
+        with pytest.raises(ValueError, match=r"a stored result has no system; load\(\) gives it"):
+            _ = again.system
+
+
+def test_failure_and_events_are_read_again(tmp_path):
+    events = [{"at": 0.04, "lose": "controller.tau.r"}, {"at": 0.08, "stop": True}]
+    made = simulate("fig4", stop_time=0.2, events=events)
+    again = read(made.save(tmp_path / "stopped"))
+    assert len(again.events) == 2
+    assert [(e.time, e.text) for e in again.events] == [(e.time, e.text) for e in made.events]
+    failed = simulate("fig4", {"plant.d11": 1e4})
+    assert failed.failure is not None
+    assert read(failed.save(tmp_path / "failed")).failure == failed.failure
+
+
+def test_stored_result_that_was_changed_is_told(result, tmp_path):
+    table = result.save(tmp_path) / "result.csv"
+    table.write_text(table.read_text().replace("0.02,", "0.021,", 1))
+    with pytest.warns(UserWarning, match=r"result\.csv was changed since the run wrote it"):
+        read(tmp_path)
+    with pytest.raises(ValueError, match=r"holds no result\.csv"):
+        read(tmp_path / "nothing")
+
+
+def test_results_are_drawn_over_each_other(result):
+    other = simulate("fig4", {"planner.eta0.z": -3.0}, stop_time=0.1)
+    figure = result.plot("planner.y_d", other, other)
+    lines = figure.axes[0].get_lines()
+    assert len(lines) == 9
+    for place, run in enumerate((result, other, other)):
+        for axis, line in zip("xyz", lines[3 * place :], strict=False):
+            assert np.array_equal(line.get_ydata(), run[f"planner.y_d.{axis}"])
+    labels = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert labels == ["fig4 (1)", "fig4 (2)", "fig4 (3)"]
+    told = result.plot("planner.y_d", other).legends[0].get_texts()
+    assert [text.get_text() for text in told] == ["planner.eta0.z = -2", "planner.eta0.z = -3"]
+
+
+def test_figure_is_the_one_that_the_command_line_draws(result, tmp_path):
+    arguments = ["run", "fig4", "--stop-time", "0.1", "--out", str(tmp_path / "written")]
+    assert main(arguments) == 0
+    for name, file in ((None, "fig4.svg"), ("tracking-velocity", "fig4-velocity.svg")):
+        for one in (result, read(tmp_path / "written")):
+            save(one.figure(name=name), tmp_path / "mine.svg")
+            assert (tmp_path / "mine.svg").read_bytes() == (
+                tmp_path / "written" / file
+            ).read_bytes()
+    assert result.figure()._repr_png_().startswith(b"\x89PNG")
+
+
+def test_figure_that_is_not_there_is_told(result):
+    for asked, complaint in (
+        ({"name": "trackin"}, "no figure 'trackin'; did you mean tracking"),
+        ({"vehicle": "second"}, "no vehicle 'second'"),
+    ):
+        with pytest.raises(ValueError, match=complaint):
+            result.figure(**asked)
+
+
+class _Page(HTMLParser):
+    """The elements, texts and addresses of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.texts: list[str] = []
+        self.attributes: list[str] = []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):
+        self.attributes += [name for name, _ in attrs]
+        if tag != "br":
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.texts.append(data)
+
+
+@given(title=st.text(st.characters(codec="utf-8", exclude_characters="\r\0"), min_size=1))
+@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+def test_notebook_shows_the_indices_with_all_texts_escaped(title):
+    result = simulate({"title": title, "stop_time": 0.02})
+    page = _Page(result._repr_html_())
+    assert page.open == []
+    assert set(page.attributes) <= {"style"}
+    assert "".join(page.texts).startswith(f"{title}{result!r}")
+    assert any(text.startswith("final error x, y, z") for text in page.texts)
 
 
 def test_unknown_names_are_key_errors_with_a_suggestion(result):

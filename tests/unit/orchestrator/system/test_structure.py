@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import read_component
@@ -21,6 +23,15 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> System:
         variable("y", "output"),
     )  # fmt: skip
     return System("s", {name: read_component(name, path) for name in ("a", "a.b", "c d")}, ())
+
+
+@pytest.fixture(scope="module")
+def several(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """A component with groups, whose members are not declared in the order of their names."""
+    variables = [variable(f"v[{i}]", "parameter") for i in (3, 1, 2)]
+    variables += [variable(f"y[{i}]", "output") for i in (1, 2)]
+    path = fmu(tmp_path_factory.mktemp("b") / "b.fmu", *variables, variable("w", "parameter"))
+    return System("s", {"a.b": read_component("a.b", path)}, ())
 
 
 @pytest.mark.parametrize(
@@ -58,3 +69,37 @@ def test_name_of_no_port_is_refused(system):
 def test_output_that_is_calculated_cannot_be_set(system):
     with pytest.raises(InputError, match=r"a\.y is of causality output and cannot be set"):
         system.with_parameters({port_name("a.y"): 1.0}).check()
+
+
+@given(st.lists(st.integers(-9, 9), min_size=1, max_size=6), st.booleans())
+def test_list_for_a_group_has_a_value_for_each_member(several, values, as_text):
+    """In the order in which they are declared; of any other length, it is refused."""
+    given = ", ".join(map(str, values)) if as_text else values
+    name = port_name("a.b.v")
+    if len(values) == 3:
+        members = [PortName("a.b", f"v[{i}]") for i in (3, 1, 2)]
+        changed = several.with_parameters({port_name("a.b.w"): 1.0, name: given})
+        assert changed.parameters == dict(zip(members, map(float, values), strict=True)) | {
+            PortName("a.b", "w"): 1.0
+        }
+    else:
+        # One number as text is no list.
+        is_one = as_text and len(values) == 1
+        what = "no component" if is_one else rf"a\.b\.v: takes 3 values, not {len(values)}"
+        with pytest.raises(InputError, match=what):
+            several.with_parameters({name: given})
+
+
+def test_last_value_of_a_port_wins(several):
+    group, member = port_name("a.b.v"), port_name("a.b.v[1]")
+    for values, wanted in (
+        ({group: [1, 2, 3], member: 9}, 9.0),
+        ({member: 9, group: [1, 2, 3]}, 2.0),
+    ):
+        assert several.with_parameters(values).value(member) == wanted
+
+
+def test_outputs_and_single_ports_take_no_list(several):
+    for name in ("a.b.y", "a.b.w", "a.b.none", "c.v"):
+        with pytest.raises(InputError):
+            several.with_parameters({port_name(name): [1.0, 2.0]})

@@ -1,0 +1,124 @@
+"""The module of the live page: the native FMUs of the bundle, compiled to WebAssembly.
+
+All of them are in one module with one C library. The sources are the ones in the FMUs; FMI 2.0 has
+a prefix for the names of their functions, and there it is the name of the component.
+"""
+
+from __future__ import annotations
+
+import sys
+import zipfile
+from collections.abc import Iterator, Mapping
+from hashlib import sha256
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from fmus.compilers import LIMIT_OF_ZIG, run_compiler
+from fmus.discovery import components
+from fmus.kinds import NATIVE
+from orchestrator.machine.cache import made_once
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.runs.bundle import current_fmus
+
+#: What the module is among what is kept.
+CATEGORY = "live-module"
+
+_FILE = "loop.wasm"
+_HOST = Path(__file__).with_name("host.c")
+
+#: As the native FMUs are compiled, but for another machine.
+_TARGET = ("-target", "wasm32-wasi")
+_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
+_LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
+
+#: The file of an FMU that includes all others.
+_MAIN = "fmi2.c"
+
+#: What the page calls, and nothing else is in the module.
+_FUNCTIONS = (
+    "Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode",
+    "ExitInitializationMode", "Reset", "DoStep",
+    *(f"{way}{of}" for way in ("Get", "Set") for of in ("Real", "Integer", "Boolean", "String")),
+)  # fmt: skip
+_OTHERS = ("malloc", "free", "host_callbacks")
+
+
+def live_module() -> bytes:
+    """The module, compiled if that has not been done yet.
+
+    Raises:
+        InputError: it cannot be compiled.
+
+    """
+    try:
+        [place] = made_once(CATEGORY, key_of(), compiled).values()
+    except OSError as error:
+        raise InputError(f"the live page has no module: {reason(error)}") from error
+    return place.read_bytes()
+
+
+def key_of() -> str:
+    """Of the sources and the flags."""
+    digest = sha256("\0".join((*_TARGET, *_FLAGS, *_LINKED, *_exports())).encode())
+    digest.update(_HOST.read_bytes())
+    for name, files in _sources().items():
+        for file, content in files.items():
+            digest.update(f"{name}/{file}\0".encode())
+            digest.update(content)
+    return digest.hexdigest()[:16]
+
+
+def compiled() -> dict[str, bytes]:
+    """Compile the module.
+
+    Raises:
+        InputError: there is no ziglang.
+        OSError: it fails.
+
+    """
+    if find_spec("ziglang") is None:
+        raise InputError(
+            "the live page needs ziglang, which compiles C to WebAssembly: "
+            "pip install 'auv-fmu[native]'"
+        )
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        folder = Path(temporary)
+        objects = []
+        for name, files in _sources().items():
+            (folder / name).mkdir()
+            for file, content in files.items():
+                (folder / name / file).write_bytes(content)
+            prefix = f"-DFMI2_FUNCTION_PREFIX={name}_"
+            _zig(folder, *_FLAGS, prefix, "-c", f"{name}/{_MAIN}", "-o", f"{name}.o")
+            objects.append(f"{name}.o")
+        _zig(folder, *_FLAGS, "-c", str(_HOST), "-o", "host.o")
+        exports = [f"-Wl,--export={name}" for name in _exports()]
+        _zig(folder, *_LINKED, *exports, "host.o", *objects, "-o", _FILE)
+        return {_FILE: (folder / _FILE).read_bytes()}
+
+
+def _zig(folder: Path, *arguments: str) -> None:
+    command = [sys.executable, "-m", "ziglang", "cc", *_TARGET, *arguments]
+    process = run_compiler(command, folder, LIMIT_OF_ZIG)
+    if process.returncode != 0:
+        lines = [line for line in process.stderr.splitlines() if "error" in line]
+        raise OSError(f"ziglang makes none: {(lines or [last_line(process.stderr)])[0]}")
+
+
+def _exports() -> Iterator[str]:
+    yield from _OTHERS
+    for name in components():
+        for function in _FUNCTIONS:
+            yield f"{name}_fmi2{function}"
+
+
+def _sources() -> Mapping[str, Mapping[str, bytes]]:
+    """The sources in the FMUs, by the names of the components."""
+    folder, found = current_fmus(NATIVE), {}
+    for name in components():
+        with zipfile.ZipFile(folder / f"{name}.fmu") as archive:
+            files = [path for path in archive.namelist() if path.startswith("sources/")]
+            found[name] = {Path(path).name: archive.read(path) for path in sorted(files)}
+    return found

@@ -1,0 +1,300 @@
+"""What the page of a loop holds as plain data: FMUs, scenarios beside their comparisons, events.
+
+Names and meanings are the ones of `web/src/types.ts`. What a plan decides is decided here: which
+stages a step has, which parameters a comparison shares, and to which inputs an event gets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache
+from operator import itemgetter
+from typing import Any
+
+from fmpy.model_description import ModelVariable
+
+from auv_fmu import __version__
+from fmus.discovery import components, ports_of
+from fmus.kinds import NATIVE
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR
+from orchestrator.master.hooks.events import (
+    Action,
+    Alter,
+    Event,
+    Freeze,
+    Release,
+    Reset,
+    Set,
+    Stop,
+)
+from orchestrator.master.plan import gathered_connections, stages
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import Prepared, prepare, with_companion
+from orchestrator.runs.request import Request
+from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario_events import read_events, shared_events
+from orchestrator.system.component import Component, read_component
+from orchestrator.system.graph import rings
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import Connection, System
+from orchestrator.system.values import Value
+from orchestrator.vehicle.indices import metrics
+from orchestrator.vehicle.signals import STANDARD
+
+#: A scenario with nothing of its own for each controller: it is the other one of a comparison where
+#: a scenario names none.
+_OTHERS = {"ObserverController": "path-pd", "PdController": "path"}
+
+#: Where a scenario names no label.
+_LABELS = {"ObserverController": "proposed", "PdController": "PD"}
+
+Plain = dict[str, Any]
+
+
+def page_data(opened: str) -> Plain:
+    """All presets, the opened one among them.
+
+    Args:
+        opened: a scenario of the bundle, or the path of a file.
+
+    Raises:
+        InputError: there is no such scenario, or the page cannot run it.
+
+    """
+    first = preset(opened)
+    others = [preset(name) for name in names() if name != first["name"]]
+    return {
+        "version": __version__,
+        "opened": first["name"],
+        "fmus": {name: _fmu(component) for name, component in bundle().items()},
+        "presets": sorted([first, *others], key=itemgetter("name")),
+        "indices": [
+            {"name": one.name, "label": one.label, "meaning": one.meaning}
+            | {"units": {str(member): unit for member, unit in one.units.items()}}
+            for one in metrics()
+        ],
+    }
+
+
+def preset(name: str) -> Plain:
+    """A scenario, and what it is compared with.
+
+    Raises:
+        InputError: there is no such scenario, or the page cannot run it.
+
+    """
+    both = runs_of(name)
+    scenario, experiment = both[0].scenario, both[0].plan.experiment
+    return {
+        "name": scenario.name,
+        "title": scenario.title or scenario.name,
+        "remark": scenario.remark.strip(),
+        "zUp": scenario.z_up,
+        "stopTime": experiment.stop_time,
+        "step": experiment.step,
+        "events": scenario.name if scenario.events else "",
+        "comparing": bool(read_scenario(name).compare),
+        "loops": [
+            _loop(one, scenario.name) | ({"scenario": name} if one is both[0] else {})
+            for one in both
+        ],
+    }
+
+
+def runs_of(name: str) -> list[Prepared]:
+    """The run of a scenario, and the one that it is compared with, if there is one.
+
+    Raises:
+        InputError: there is no such scenario, or the page cannot run it.
+
+    """
+    request = Request(name, kind=NATIVE)
+    scenario, system = load_scenario(name, NATIVE)
+    own = prepare(scenario, system, request)
+    compare = scenario.compare or _other(system)
+    both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
+    for one in both:
+        _check(one)
+    return both
+
+
+def _other(system: System) -> str:
+    """The scenario with the controller that a system does not have; empty: it has neither."""
+    controller = system.components.get(STANDARD.controller)
+    return "" if controller is None else _OTHERS.get(_type(controller), "")
+
+
+def _type(component: Component) -> str:
+    return str(component.description.modelName)
+
+
+def _check(prepared: Prepared) -> None:
+    """Check that the page can run a scenario.
+
+    Raises:
+        InputError: it cannot.
+
+    """
+    plan = prepared.plan
+    system, experiment = plan.system, plan.experiment
+    ours = {part.digest for part in bundle().values()}
+    foreign = [name for name, part in system.components.items() if part.digest not in ours]
+    lacking = {
+        f"third-party FMUs ({', '.join(foreign)})": foreign,
+        "rings of direct feedthroughs": rings(system),
+        "linear inputs": experiment.coupling == LINEAR,
+        "components with longer steps": any(n > 1 for n in plan.decimations.values()),
+        "changes of values on their way": any(c.transformation for c in system.connections),
+        "a table of inputs": prepared.input_table is not None,
+        "a start time": experiment.start_time != 0.0,
+    }
+    for what, is_there in lacking.items():
+        if is_there:
+            raise InputError(f"{prepared.scenario.name}: the live page cannot run {what}")
+
+
+def _loop(prepared: Prepared, owner: str) -> Plain:
+    scenario, plan = prepared.scenario, prepared.plan
+    system, order = plan.system, plan.experiment.order
+    sequence = stages(system, order)
+    gathered = gathered_connections(system, sequence, order=order)
+    controller = system.components.get(STANDARD.controller)
+    label = _LABELS.get(_type(controller)) if controller else None
+    return {
+        "label": scenario.label or label or scenario.name,
+        "components": {name: _type(part) for name, part in system.components.items()},
+        "initial": [
+            _stage([name], system.feeding[name])
+            for names in stages(system, GAUSS_SEIDEL)
+            for name in names
+        ],
+        "stages": list(map(_stage, sequence, gathered)),
+        "parameters": list(_parameters(system)),
+        "events": _events(prepared, owner),
+    }
+
+
+def _stage(names: Sequence[str], connections: Iterable[Connection]) -> Plain:
+    return {
+        "connections": [[str(one.target), str(one.source)] for one in connections],
+        "components": list(names),
+    }
+
+
+def _parameters(system: System) -> Iterator[Plain]:
+    """What a user may change: parameters, and inputs that nothing feeds."""
+    for name, component in system.components.items():
+        fed = {connection.target.port for connection in system.feeding[name]}
+        ports = {port.name: port for port in ports_of(_type(component))}
+        for variable in component.variables.values():
+            is_input = variable.causality == "input" and variable.name not in fed
+            if variable.causality != "parameter" and not is_input:
+                continue
+            start = component.start(variable.name)
+            value = system.parameters.get(PortName(name, variable.name), start)
+            found = {
+                **_described(variable),
+                "name": f"{name}.{variable.name}",
+                "default": start,
+                "value": value,
+                "tunable": is_input or variable.variability == "tunable",
+            }
+            if choices := ports[variable.name].choices:
+                found["choices"] = list(choices)
+            yield found
+
+
+def _described(variable: ModelVariable) -> Plain:
+    """What is the same of a variable wherever it is."""
+    found: Plain = {"type": variable.type, "description": variable.description or ""}
+    if variable.unit:
+        found["unit"] = variable.unit
+    for end in ("min", "max"):
+        if (text := getattr(variable, end)) is not None:
+            found[end] = float(text)
+    return found
+
+
+def _fmu(component: Component) -> Plain:
+    return {
+        "guid": component.description.guid,
+        "description": component.description.description or "",
+        "variables": [_variable(component, one) for one in component.variables.values()],
+    }
+
+
+def _variable(component: Component, variable: ModelVariable) -> Plain:
+    start = component.start(variable.name)
+    return {
+        **_described(variable),
+        "name": variable.name,
+        "reference": variable.valueReference,
+        "causality": variable.causality,
+        "variability": variable.variability,
+        **({} if start is None else {"start": start}),
+    }
+
+
+@cache
+def bundle() -> Mapping[str, Component]:
+    """The FMUs that the module is made of, by their names."""
+    folder = current_fmus(NATIVE)
+    return {name: read_component(name, folder / f"{name}.fmu") for name in components()}
+
+
+def _events(prepared: Prepared, owner: str) -> dict[str, list[Plain]]:
+    """All events that can happen to a system, by the scenario that has them.
+
+    Args:
+        prepared: run of the system.
+        owner: the scenario of the preset: its events may be the comparison's own.
+
+    """
+    system = replace(prepared.system, step=prepared.experiment.step)
+    tables = {name: read_scenario(name).events for name in names()}
+    tables[owner] = prepared.scenario.events
+    return {
+        name: [_event(one) for one in read_events(name, shared_events(some, system), system)]
+        for name, some in tables.items()
+        if some
+    }
+
+
+def _event(event: Event) -> Plain:
+    found = {
+        "text": event.text,
+        "label": event.label,
+        "at": event.at,
+        "lasts": event.lasts,
+        "repeat": event.repeat or None,
+        "action": _action(event.action),
+    }
+    if (when := event.when) is not None:
+        signal = {"signal": str(when.signal)}
+        found["when"] = signal | {"comparison": when.comparison, "value": when.value}
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def _action(action: Action) -> Plain:
+    match action:
+        case Alter(effect, values):
+            return {"kind": "alter", "effect": effect, "values": _assigned(values)}
+        case Freeze(targets):
+            return {"kind": "freeze", "targets": list(map(str, targets))}
+        case Release(targets):
+            return {"kind": "release", "targets": list(map(str, targets))}
+        case Set(parameters, inputs):
+            given = {"parameters": _assigned(parameters), "inputs": _assigned(inputs)}
+            return {"kind": "set", **given}
+        case Reset(components):
+            return {"kind": "reset", "components": list(components)}
+        case Stop(why):
+            return {"kind": "stop", "why": why}
+    raise TypeError(f"the page does not know the event {action!r}")
+
+
+def _assigned(values: Sequence[tuple[PortName, Value]]) -> list[list[Value]]:
+    return [[str(target), value] for target, value in values]

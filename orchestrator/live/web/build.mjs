@@ -1,0 +1,38 @@
+// Bundles the page: `node build.mjs FOLDER` writes page.js, page.css, engine.mjs and licences.txt.
+import { readdirSync, readFileSync, writeFileSync } from "node:fs";
+import { build } from "esbuild";
+
+const [folder] = process.argv.slice(2);
+
+/** Bundles an entry, and names the packages that are in it. */
+async function bundle(entry, outfile, more) {
+  const { metafile } = await build({
+    entryPoints: [`src/${entry}`],
+    outfile: `${folder}/${outfile}`,
+    bundle: true,
+    target: "es2022",
+    legalComments: "none",
+    metafile: true,
+    logLevel: "warning",
+    ...more,
+  });
+  const found = Object.keys(metafile.inputs).map(
+    (path) => path.match(/node_modules\/((@[^/]+\/)?[^/]+)/)?.[1],
+  );
+  return found.filter((name) => name !== undefined);
+}
+
+const names = [
+  ...(await bundle("main.ts", "page.js", { format: "iife", minify: true })),
+  ...(await bundle("style.css", "page.css", { minify: true })),
+];
+await bundle("engine.ts", "engine.mjs", { format: "esm", platform: "node" });
+
+const licences = [...new Set(names)].sort().map((name) => {
+  const place = `node_modules/${name}`;
+  const { version, license } = JSON.parse(readFileSync(`${place}/package.json`, "utf8"));
+  const file = readdirSync(place).find((one) => /^licen[cs]e/i.test(one));
+  const text = file ? readFileSync(`${place}/${file}`, "utf8").trim() : "";
+  return `${name} ${version}, ${license}\n\n${text}\n`;
+});
+writeFileSync(`${folder}/licences.txt`, licences.join("\n\n"));

@@ -1,0 +1,315 @@
+// The charts: one small uPlot for each signal, with one cursor in all of them.
+
+import uPlot from "uplot";
+import type { Lines, Panel, Section, Style } from "./panels";
+import { property } from "./theme";
+
+/** Something that happens: from, until [s], and what. */
+export interface Mark {
+  readonly from: number;
+  readonly until: number;
+  readonly label: string;
+}
+
+const HEIGHT = 132;
+const TIME_AXIS = 22;
+const VALUE_AXIS = 46;
+
+const DASHES: Record<Style, number[]> = { first: [], second: [6, 3], reference: [] };
+const WIDTHS: Record<Style, number> = { first: 1.5, second: 1.5, reference: 1.5 };
+
+/** Share of a limit from which on it is in sight. */
+const NEAR = 0.5;
+
+const PROPERTIES: Record<Style, string> = {
+  first: "--first",
+  second: "--second",
+  reference: "--reference",
+};
+
+/** A number in few characters. */
+export function short(value: number): string {
+  if (!Number.isFinite(value)) return "–";
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(1).replace("-", "−");
+  const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
+  return value.toFixed(digits).replace("-", "−");
+}
+
+class Chart {
+  readonly root: HTMLElement;
+  readonly #panel: Panel;
+  readonly #values: HTMLElement[] = [];
+  readonly #plot: uPlot;
+  #lines: Lines = { time: new Float64Array(0), values: [] };
+  #marks: readonly Mark[] = [];
+  #named = false;
+  #stale = false;
+  #visible = false;
+  #time = 0;
+
+  constructor(panel: Panel, scrub: (time: number) => void) {
+    this.#panel = panel;
+    this.root = document.createElement("figure");
+    this.root.className = "chart";
+    const caption = document.createElement("figcaption");
+    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">[${panel.unit}]</span></span>`;
+    const readout = document.createElement("span");
+    readout.className = "readout";
+    readout.setAttribute("aria-hidden", "true");
+    panel.styles.forEach((style, k) => {
+      const value = document.createElement("span");
+      value.className = `value ${style}`;
+      value.title = panel.names[k];
+      readout.append(value);
+      this.#values.push(value);
+    });
+    caption.append(readout);
+    const host = document.createElement("div");
+    host.className = "plot";
+    this.root.append(caption, host);
+    this.#plot = new uPlot(this.#options(), [new Float64Array(0)], host);
+    const point = (event: PointerEvent) => {
+      const { left } = this.#plot.over.getBoundingClientRect();
+      scrub(this.#plot.posToVal(event.clientX - left, "x"));
+    };
+    this.#plot.over.addEventListener("pointermove", point);
+    this.#plot.over.addEventListener("pointerdown", point);
+    new ResizeObserver(([{ contentRect }]) => {
+      const width = Math.floor(contentRect.width);
+      if (width > 0 && width !== this.#plot.width) this.#plot.setSize({ width, height: HEIGHT });
+    }).observe(host);
+    new IntersectionObserver(
+      ([{ isIntersecting }]) => {
+        this.#visible = isIntersecting;
+        if (isIntersecting && this.#stale) this.#redraw();
+      },
+      { rootMargin: "60px" },
+    ).observe(this.root);
+  }
+
+  #options(): uPlot.Options {
+    const stroke = (name: string) => () => property(name);
+    const axis = {
+      stroke: stroke("--muted"),
+      font: "11px system-ui, sans-serif",
+      grid: { stroke: stroke("--grid"), width: 1 },
+      ticks: { show: false },
+      gap: 4,
+    };
+    return {
+      width: 280,
+      height: HEIGHT,
+      padding: [8, 13, 0, 0],
+      legend: { show: false },
+      cursor: { y: false, drag: { x: false, y: false }, bind: silent(), points: { size: 6 } },
+      scales: {
+        x: { time: false, range: (_, low, high) => [low ?? 0, high ?? 1] },
+        y: { range: (_, low, high) => this.#range(low ?? 0, high ?? 0) },
+      },
+      axes: [
+        { ...axis, size: TIME_AXIS, space: 55 },
+        {
+          ...axis,
+          size: VALUE_AXIS,
+          space: 26,
+          values: (_, found) =>
+            found.map((value) => Number(value.toPrecision(6)).toString().replace("-", "−")),
+        },
+      ],
+      series: [
+        {},
+        ...this.#panel.styles.map(
+          (style, k): uPlot.Series => ({
+            label: this.#panel.names[k],
+            stroke: stroke(PROPERTIES[style]),
+            width: WIDTHS[style],
+            dash: DASHES[style],
+            points: { show: false },
+          }),
+        ),
+      ],
+      hooks: { drawClear: [() => this.#underlay()], draw: [() => this.#overlay()] },
+    };
+  }
+
+  /** Where the values are; a limit is in sight when they are near it. */
+  #range(low: number, high: number): [number, number] {
+    for (const limit of this.#lines.limits ?? []) {
+      if (Math.max(high, -low) > NEAR * Math.abs(limit)) {
+        low = Math.min(low, limit);
+        high = Math.max(high, limit);
+      }
+    }
+    const margin = 0.07 * (high - low) || Math.max(0.1 * Math.abs(high), 1e-6);
+    return [low - margin, high + margin];
+  }
+
+  #underlay(): void {
+    const { ctx, bbox } = this.#plot;
+    const at = (time: number) =>
+      Math.min(bbox.left + bbox.width, Math.max(bbox.left, this.#plot.valToPos(time, "x", true)));
+    ctx.save();
+    ctx.fillStyle = property("--mark");
+    for (const { from, until } of this.#marks) {
+      ctx.fillRect(at(from), bbox.top, Math.max(1, at(until) - at(from)), bbox.height);
+    }
+    ctx.restore();
+  }
+
+  #overlay(): void {
+    const { ctx, bbox } = this.#plot;
+    const ratio = uPlot.pxRatio;
+    ctx.save();
+    ctx.lineWidth = ratio;
+    ctx.strokeStyle = property("--muted");
+    for (const limit of this.#lines.limits ?? []) {
+      const y = Math.round(this.#plot.valToPos(limit, "y", true)) + 0.5;
+      if (!(y >= bbox.top && y <= bbox.top + bbox.height)) continue;
+      ctx.setLineDash([2 * ratio, 2 * ratio]);
+      ctx.beginPath();
+      ctx.moveTo(bbox.left, y);
+      ctx.lineTo(bbox.left + bbox.width, y);
+      ctx.stroke();
+    }
+    ctx.setLineDash([]);
+    for (const { from, label } of this.#marks) {
+      const x = Math.round(this.#plot.valToPos(from, "x", true)) + 0.5;
+      if (!(x >= bbox.left && x <= bbox.left + bbox.width)) continue;
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + bbox.height);
+      ctx.stroke();
+      if (this.#named) this.#name(label, x);
+    }
+    ctx.restore();
+  }
+
+  /** Writes the name of an event beside its line. */
+  #name(label: string, x: number): void {
+    const { ctx, bbox } = this.#plot;
+    const ratio = uPlot.pxRatio;
+    ctx.save();
+    ctx.font = `${11 * ratio}px system-ui, sans-serif`;
+    ctx.fillStyle = property("--text");
+    ctx.strokeStyle = property("--surface");
+    ctx.lineWidth = 3 * ratio;
+    const isRight = x + ctx.measureText(label).width + 8 * ratio > bbox.left + bbox.width;
+    ctx.textAlign = isRight ? "right" : "left";
+    const [left, top] = [x + (isRight ? -4 : 4) * ratio, bbox.top + bbox.height - 6 * ratio];
+    ctx.strokeText(label, left, top);
+    ctx.fillText(label, left, top);
+    ctx.restore();
+  }
+
+  set(lines: Lines, marks: readonly Mark[], named: boolean): void {
+    this.#lines = lines;
+    this.#marks = marks;
+    this.#named = named;
+    const isThere = lines.values.some((values) => values);
+    this.root.hidden = !isThere;
+    if (isThere && this.#visible) this.#redraw();
+    else this.#stale = true;
+  }
+
+  #redraw(): void {
+    this.#stale = false;
+    const empty = new Float64Array(0);
+    this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
+    this.show(this.#time);
+  }
+
+  /** Colours have changed. */
+  repaint(): void {
+    this.#plot.redraw(false);
+  }
+
+  show(time: number): void {
+    this.#time = time;
+    if (!this.#visible || this.root.hidden || this.#stale) return;
+    const left = this.#plot.valToPos(time, "x");
+    this.#plot.setCursor({ left: Number.isFinite(left) ? left : -10, top: 0 }, false);
+    const row = rowAt(this.#lines.time, time);
+    this.#lines.values.forEach((values, k) => {
+      this.#values[k].textContent = values?.length
+        ? short(values[Math.min(row, values.length - 1)])
+        : "";
+    });
+  }
+}
+
+/** uPlot follows the player, not the mouse by itself. */
+function silent(): uPlot.Cursor.Bind {
+  const off = () => null;
+  return {
+    mousedown: off,
+    mouseup: off,
+    click: off,
+    dblclick: off,
+    mousemove: off,
+    mouseleave: off,
+    mouseenter: off,
+  };
+}
+
+/** The last row that is not after a time. */
+export function rowAt(times: Float64Array, time: number): number {
+  let [low, high] = [0, times.length - 1];
+  while (low < high) {
+    const middle = (low + high + 1) >> 1;
+    if (times[middle] <= time + 1e-9) low = middle;
+    else high = middle - 1;
+  }
+  return Math.max(low, 0);
+}
+
+/** All sections of charts. */
+export class Charts {
+  #charts: Chart[][] = [];
+  readonly #host: HTMLElement;
+  readonly #scrub: (time: number) => void;
+
+  constructor(host: HTMLElement, scrub: (time: number) => void) {
+    this.#host = host;
+    this.#scrub = scrub;
+  }
+
+  /** Makes the charts anew. */
+  build(sections: readonly Section[]): void {
+    this.#host.replaceChildren();
+    this.#charts = sections.map(({ title, note, panels }) => {
+      const section = document.createElement("section");
+      const heading = document.createElement("h2");
+      heading.textContent = title;
+      const aside = document.createElement("span");
+      aside.className = "note";
+      aside.textContent = note;
+      heading.append(aside);
+      const row = document.createElement("div");
+      row.className = `charts of-${panels.length}`;
+      const charts = panels.map((panel) => new Chart(panel, this.#scrub));
+      row.append(...charts.map(({ root }) => root));
+      section.append(heading, row);
+      this.#host.append(section);
+      return charts;
+    });
+  }
+
+  set(lines: readonly (readonly Lines[])[], marks: readonly Mark[]): void {
+    this.#charts.forEach((charts, section) => {
+      charts.forEach((chart, k) => {
+        chart.set(lines[section][k], marks, section === 0 && k === 0);
+      });
+      const parent = charts[0].root.closest("section");
+      if (parent) parent.hidden = charts.every(({ root }) => root.hidden);
+    });
+  }
+
+  show(time: number): void {
+    for (const chart of this.#charts.flat()) chart.show(time);
+  }
+
+  repaint(): void {
+    for (const chart of this.#charts.flat()) chart.repaint();
+  }
+}

@@ -1,0 +1,103 @@
+// Settings as what a user types: `auv-fmu run`, and the files that it needs.
+
+import { eventsOf, hasOtherEvents, type Settings } from "./settings";
+import type { Action, EventData, LoopData, Preset, Value } from "./types";
+
+/** Marks the end of a file in the shell. */
+const END = "END";
+
+/** A command that makes the rows of a loop. */
+export function commandLine(settings: Settings, preset: Preset, loop: LoopData): string {
+  if (loop.scenario === undefined) return ownScenario(settings, preset, loop);
+  const names = new Set(loop.parameters.map(({ name }) => name));
+  const words = ["auv-fmu", "run", loop.scenario];
+  for (const [name, value] of Object.entries(settings.values)) {
+    if (names.has(name)) words.push("--set", quoted(`${name}=${value}`));
+  }
+  if (settings.stopTime !== preset.stopTime) words.push("--stop-time", String(settings.stopTime));
+  if (settings.step !== preset.step) words.push("--step", String(settings.step));
+  if (!hasOtherEvents(settings, preset)) return words.join(" ");
+  const file = `${preset.name}-events.toml`;
+  const events = toToml(eventsOf(settings, loop));
+  return written(file, events || "events = []\n", [...words, "--events", file]);
+}
+
+/** The same for a loop that is only there to be compared: a scenario file of its own. */
+function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string {
+  const file = `${preset.name}-${loop.label}.toml`;
+  const components = Object.entries(loop.components).map(
+    ([name, type]) => `${name} = ${literal(type)}\n`,
+  );
+  const isPd = loop.components.controller === "PdController";
+  const parameters = loop.parameters.flatMap(({ name, value, default: own }) => {
+    const wanted = settings.values[name] ?? value;
+    return wanted === own ? [] : [`"${name}" = ${literal(wanted)}\n`];
+  });
+  const text = [
+    `title = ${literal(`${preset.name} with the ${loop.label} controller`)}\n`,
+    `stop_time = ${literal(settings.stopTime)}\n`,
+    `step = ${literal(settings.step)}\n`,
+    `\n[components]\n${components.join("")}`,
+    isPd ? '\n[wires]\n"controller.dy" = "plant.dy"\n' : "",
+    `\n[parameters]\n${parameters.join("")}`,
+    `\n${toToml(eventsOf(settings, loop))}`,
+  ].join("");
+  return written(file, text.trimEnd().concat("\n"), ["auv-fmu", "run", file]);
+}
+
+/** Writes a file in the shell, and then runs a command. */
+function written(file: string, text: string, command: readonly string[]): string {
+  return `cat > ${file} <<'${END}'\n${text}${END}\n${command.join(" ")}`;
+}
+
+/** A word of a shell's command line. */
+function quoted(word: string): string {
+  return /^[\w.=+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+}
+
+/** Events as a scenario file has them. */
+export function toToml(events: readonly EventData[]): string {
+  return events.map(toTable).join("\n");
+}
+
+function toTable(event: EventData): string {
+  const entries: [string, string][] = [];
+  if (event.at !== undefined) entries.push(["at", literal(event.at)]);
+  if (event.when) {
+    const { signal, comparison, value } = event.when;
+    entries.push(["when", literal(`${signal} ${comparison} ${value}`)]);
+  }
+  if (event.repeat) entries.push(["repeat", "true"]);
+  if (event.lasts !== undefined) entries.push(["for", literal(event.lasts)]);
+  entries.push(acting(event.action), ["label", literal(event.label)]);
+  return `[[events]]\n${entries.map(([key, value]) => `${key} = ${value}\n`).join("")}`;
+}
+
+function acting(action: Action): [string, string] {
+  switch (action.kind) {
+    case "alter":
+      return [action.effect, table(action.values)];
+    case "set":
+      return ["set", table([...action.parameters, ...action.inputs])];
+    case "freeze":
+    case "release":
+      return [action.kind, list(action.targets)];
+    case "reset":
+      return ["reset", list(action.components)];
+    case "stop":
+      return ["stop", "true"];
+  }
+}
+
+function table(values: readonly (readonly [string, Value])[]): string {
+  return `{ ${values.map(([name, value]) => `"${name}" = ${literal(value)}`).join(", ")} }`;
+}
+
+function list(names: readonly string[]): string {
+  return `[${names.map((name) => literal(name)).join(", ")}]`;
+}
+
+/** A value of TOML; JSON writes texts and truth values as TOML does. */
+function literal(value: Value): string {
+  return typeof value === "number" && value === 0 ? "0" : JSON.stringify(value);
+}

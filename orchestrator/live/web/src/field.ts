@@ -1,0 +1,205 @@
+// A number, choice or switch for one parameter, and a row of them with a slider.
+
+import { parsed } from "./link";
+import type { Row } from "./rows";
+import { POSITIONS, positionOf, valueAt } from "./scales";
+import type { Parameter, Value } from "./types";
+
+export type Changed = (values: Record<string, Value>) => void;
+
+/** A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s². */
+export function printedUnit(unit: string): string {
+  const raised = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+  return unit.replaceAll(".", "·").replace(/(?<=[A-Za-z])\d/g, (digit) => raised[Number(digit)]);
+}
+
+/** What a parameter means, where it may lie and what it is without a change. */
+export function explained(parameter: Parameter): string {
+  const { name, description, unit, min, max, value, choices } = parameter;
+  const range = [
+    min === undefined ? "" : `at least ${min}`,
+    max === undefined ? "" : `at most ${max}`,
+    choices ? `one of ${choices.join(", ")}` : "",
+  ].filter(Boolean);
+  const lines = [
+    name,
+    description,
+    [unit ? `in ${printedUnit(unit)}` : "", ...range].filter(Boolean).join(", "),
+    `preset: ${value}`,
+  ];
+  return lines.filter(Boolean).join("\n");
+}
+
+/** A field for one parameter. */
+export class Field {
+  readonly element: HTMLInputElement | HTMLSelectElement;
+  readonly parameter: Parameter;
+  #shown: Value | undefined;
+  #wrong = "";
+
+  constructor(parameter: Parameter, label: string, changed: Changed) {
+    this.parameter = parameter;
+    const { name, type, choices } = parameter;
+    if (choices) {
+      const select = document.createElement("select");
+      select.append(...choices.map((choice) => new Option(choice, choice)));
+      this.element = select;
+    } else {
+      const input = document.createElement("input");
+      input.type = type === "Boolean" ? "checkbox" : "text";
+      if (type !== "Boolean") input.inputMode = "decimal";
+      input.autocomplete = "off";
+      input.spellcheck = false;
+      this.element = input;
+    }
+    this.element.title = explained(parameter);
+    this.element.setAttribute("aria-label", label);
+    this.element.dataset.name = name;
+    this.element.addEventListener("change", () => {
+      const value = this.#entered();
+      this.invalid = value === undefined ? `${name}: not a number` : "";
+      this.#shown = undefined;
+      if (value !== undefined) changed({ [name]: value });
+    });
+  }
+
+  #entered(): Value | undefined {
+    const { element } = this;
+    if (element instanceof HTMLInputElement && element.type === "checkbox") return element.checked;
+    return parsed(this.parameter, element.value);
+  }
+
+  set value(value: Value) {
+    const { element } = this;
+    // Nearly all of them stay as they are while a slider moves.
+    if (value === this.#shown && !this.#wrong) return;
+    this.#shown = value;
+    if (element instanceof HTMLInputElement && element.type === "checkbox") {
+      element.checked = value === true;
+    } else if (document.activeElement !== element || this.#entered() !== value) {
+      element.value = String(value);
+    }
+    element.classList.toggle("changed", value !== this.parameter.value);
+  }
+
+  /** Marks it where a message names its parameter. */
+  refuse(message: string): boolean {
+    const isNamed = names(message, this.parameter.name);
+    this.invalid = isNamed ? message : "";
+    return isNamed;
+  }
+
+  /** Why the value cannot be used; empty: it can. */
+  set invalid(why: string) {
+    if (why === this.#wrong) return;
+    this.#wrong = why;
+    this.element.setAttribute("aria-invalid", String(why !== ""));
+    this.element.title = why || explained(this.parameter);
+  }
+}
+
+/** A slider that sets one or several parameters together, and a field for each. */
+export class SliderRow {
+  readonly root: HTMLElement;
+  readonly fields: readonly Field[];
+  readonly #row: Row;
+  readonly #slider: HTMLInputElement;
+  readonly #reset: HTMLButtonElement;
+  readonly #error: HTMLElement;
+
+  constructor(row: Row, parameters: readonly Parameter[], only: string, changed: Changed) {
+    this.#row = row;
+    this.root = document.createElement("div");
+    this.root.className = "row";
+    const [parameter] = parameters;
+    const spoken = parameters.length > 1 ? shared(row.names) : parameter.name;
+    const label = document.createElement("span");
+    label.className = "label";
+    label.innerHTML = `${row.label}${only ? ` <span class="only">${only}</span>` : ""}`;
+    label.title = explained(parameter);
+    const unit = document.createElement("span");
+    unit.className = "unit";
+    unit.textContent = parameter.unit && parameter.unit !== "1" ? printedUnit(parameter.unit) : "";
+    this.#reset = document.createElement("button");
+    this.#reset.type = "button";
+    this.#reset.className = "reset";
+    this.#reset.textContent = "reset";
+    this.#reset.title = `back to ${parameters.map(({ value }) => value).join(", ")}`;
+    this.#reset.setAttribute("aria-label", `Reset ${spoken}`);
+    this.#reset.addEventListener("click", () => {
+      changed(Object.fromEntries(parameters.map(({ name, value }) => [name, value])));
+      this.#slider.focus();
+    });
+    this.#slider = document.createElement("input");
+    this.#slider.type = "range";
+    this.#slider.max = String(POSITIONS);
+    this.#slider.step = String(stepOf(row));
+    this.#slider.setAttribute("aria-label", spoken);
+    this.#slider.title = explained(parameter);
+    this.#slider.dataset.names = row.names.join(" ");
+    this.#slider.addEventListener("input", () => {
+      const value = valueAt(row.scale, this.#slider.valueAsNumber);
+      changed(
+        Object.fromEntries(row.names.map((name, k) => [name, (row.signs?.[k] ?? 1) * value + 0])),
+      );
+    });
+    this.fields = parameters.map((one) => new Field(one, one.name, changed));
+    const fields = document.createElement("span");
+    fields.className = "fields";
+    fields.append(...this.fields.map(({ element }) => element));
+    this.#error = document.createElement("p");
+    this.#error.className = "error";
+    this.#error.hidden = true;
+    const head = document.createElement("div");
+    head.className = "head";
+    head.append(label, this.#reset, ...(parameters.length > 1 ? [unit] : [fields, unit]));
+    this.root.append(head, this.#slider, ...(parameters.length > 1 ? [fields] : []), this.#error);
+  }
+
+  show(current: (parameter: Parameter) => Value): void {
+    const values = this.fields.map(({ parameter }) => current(parameter));
+    this.fields.forEach((field, k) => {
+      field.value = values[k];
+    });
+    const last = values.length - 1;
+    const value = Number(values[last]) * (this.#row.signs?.[last] ?? 1);
+    this.#slider.step = "any";
+    this.#slider.value = String(positionOf(this.#row.scale, value));
+    this.#slider.step = String(stepOf(this.#row));
+    this.#slider.setAttribute("aria-valuetext", [...new Set(values)].join(", "));
+    const isChanged = this.fields.some(({ parameter }, k) => values[k] !== parameter.value);
+    this.#reset.hidden = !isChanged;
+    this.root.classList.toggle("changed", isChanged);
+  }
+
+  /** Marks it where a message names one of its parameters. */
+  refuse(message: string): void {
+    const isNamed = this.fields.map((field) => field.refuse(message)).includes(true);
+    this.#error.hidden = !isNamed;
+    this.#error.textContent = isNamed ? message : "";
+  }
+}
+
+/** Positions from one press of an arrow key to the next. */
+function stepOf({ scale }: Row): number {
+  return scale.whole ? POSITIONS / (scale.high - scale.low) : 10;
+}
+
+/** `controller.K1` of its members. */
+function shared(all: readonly string[]): string {
+  const [first] = all;
+  let length = first.length;
+  for (const name of all) while (!name.startsWith(first.slice(0, length))) length--;
+  const [, head, tail] = /^(.*?)[.[_]?(?:(?<=min|max)(\.\w))?$/.exec(first.slice(0, length)) ?? [];
+  return `${head ?? first}${tail ?? ""}`;
+}
+
+/** Whether a message says `component.parameter` or `component: parameter`. */
+export function names(message: string, name: string): boolean {
+  const [component, ...rest] = name.split(".");
+  const port = rest.join(".");
+  return [name, `${component}: ${port}`].some((text) => {
+    const at = message.indexOf(text);
+    return at >= 0 && !/[\w[.]/.test(message[at + text.length] ?? "");
+  });
+}

@@ -1,0 +1,84 @@
+// Settings in the address of the page: after `#`, the preset and what differs from it.
+
+import { type Edit, parametersOf, presetOf, type Settings, untouched } from "./settings";
+import type { Data, Parameter, Value } from "./types";
+
+const PRESET = "preset";
+const STOP_TIME = "stop_time";
+const STEP = "step";
+const EVENTS = "events";
+const HIDDEN = "hide";
+
+/** What stands in a link for a duration without an end. */
+const FOR_GOOD = "always";
+
+/** An edited time of an event: `events.1.at`, counted from 1. */
+const EDIT = /^events\.([1-9]\d*)\.(at|for)$/;
+
+export function toHash(settings: Settings, data: Data): string {
+  const preset = presetOf(data, settings.preset);
+  if (!preset) return "";
+  const fields: [string, string][] = [[PRESET, settings.preset]];
+  for (const [name, value] of Object.entries(settings.values)) fields.push([name, String(value)]);
+  if (settings.stopTime !== preset.stopTime) fields.push([STOP_TIME, String(settings.stopTime)]);
+  if (settings.step !== preset.step) fields.push([STEP, String(settings.step)]);
+  if (settings.events !== preset.events) fields.push([EVENTS, settings.events]);
+  for (const [number, { at, lasts }] of Object.entries(settings.edits)) {
+    const name = `${EVENTS}.${Number(number) + 1}`;
+    if (at !== undefined) fields.push([`${name}.at`, String(at)]);
+    if (lasts !== undefined) fields.push([`${name}.for`, lasts === null ? FOR_GOOD : `${lasts}`]);
+  }
+  for (const label of settings.hidden) fields.push([HIDDEN, label]);
+  return `#${fields.map(([key, value]) => `${encode(key)}=${encode(value)}`).join("&")}`;
+}
+
+/** Settings of a link, and what of it is not understood. */
+export function fromHash(hash: string, data: Data): { settings: Settings; unknown: string[] } {
+  const fields = [...new URLSearchParams(hash.replace(/^#/, ""))];
+  const wanted = fields.find(([key]) => key === PRESET)?.[1] ?? data.opened;
+  const preset = presetOf(data, wanted) ?? presetOf(data, data.opened) ?? data.presets[0];
+  const parameters = parametersOf(preset);
+  const unknown = wanted === preset.name ? [] : [`${PRESET}=${wanted}`];
+  const values: Record<string, Value> = {};
+  const edits: Record<number, Edit> = {};
+  const hidden: string[] = [];
+  let { stopTime, step, events } = untouched(preset);
+  for (const [key, text] of fields) {
+    const parameter = parameters.get(key);
+    const edit = EDIT.exec(key);
+    const number = text.trim() === "" ? Number.NaN : Number(text);
+    const value = parameter && parsed(parameter, text);
+    if (key === PRESET) continue;
+    if (parameter && value !== undefined) values[key] = value;
+    else if (key === STOP_TIME && Number.isFinite(number)) stopTime = number;
+    else if (key === STEP && Number.isFinite(number)) step = number;
+    else if (key === EVENTS && (text === "" || preset.loops[0].events[text])) events = text;
+    else if (edit?.[2] === "at" && Number.isFinite(number)) put(edits, edit[1], { at: number });
+    else if (edit?.[2] === "for" && text === FOR_GOOD) put(edits, edit[1], { lasts: null });
+    else if (edit?.[2] === "for" && Number.isFinite(number)) put(edits, edit[1], { lasts: number });
+    else if (key === HIDDEN && preset.loops.some(({ label }) => label === text)) hidden.push(text);
+    else unknown.push(`${key}=${text}`);
+  }
+  const settings = { preset: preset.name, values, stopTime, step, events, edits, hidden };
+  return { settings, unknown };
+}
+
+function put(edits: Record<number, Edit>, counted: string, edit: Edit): void {
+  const number = Number(counted) - 1;
+  edits[number] = { ...edits[number], ...edit };
+}
+
+/** A text in the type of a parameter; undefined: it is not of this type. */
+export function parsed(parameter: Parameter, text: string): Value | undefined {
+  if (parameter.type === "String") return text;
+  if (parameter.type === "Boolean") {
+    return text === "true" ? true : text === "false" ? false : undefined;
+  }
+  const number = text.trim() === "" ? Number.NaN : Number(text);
+  return Number.isFinite(number) ? number : undefined;
+}
+
+/** Brackets and dots stay as they are, so that people can read a link. */
+function encode(text: string): string {
+  return encodeURIComponent(text).replaceAll("%5B", "[").replaceAll("%5D", "]");
+}

@@ -1,0 +1,114 @@
+// Plays a run: one time for the scene and all charts.
+
+import type { Mark } from "./charts";
+
+/** Elements of the bar below the scene. */
+export interface Bar {
+  toggle: HTMLButtonElement;
+  slider: HTMLInputElement;
+  output: HTMLOutputElement;
+  speed: HTMLSelectElement;
+  marks: HTMLElement;
+}
+
+/** A run is played within about as many seconds, if one of the speeds allows it. */
+const PATIENCE = 25;
+
+/** Positions of the slider in a second: arrow keys move by one, with shift by ten. */
+const FINE = 10;
+
+export class Player {
+  readonly #bar: Bar;
+  readonly #show: (time: number) => void;
+  #end = 0;
+  #time = 0;
+  #started: { time: number; now: number } | undefined;
+
+  constructor(bar: Bar, show: (time: number) => void) {
+    this.#bar = bar;
+    this.#show = show;
+    bar.toggle.addEventListener("click", () => this.toggle());
+    bar.slider.addEventListener("input", () => this.seek(bar.slider.valueAsNumber / FINE));
+    bar.speed.addEventListener("change", () => this.#restart());
+    document.addEventListener("keydown", (event) => {
+      const { target } = event;
+      if (event.key !== " " || !(target instanceof Element)) return;
+      if (target.closest("input:not([type=range]), button, select, summary, textarea, a")) return;
+      event.preventDefault();
+      this.toggle();
+    });
+  }
+
+  get time(): number {
+    return this.#time;
+  }
+
+  get isPlaying(): boolean {
+    return this.#started !== undefined;
+  }
+
+  /** Another run: its end [s], and what happens in it. */
+  set(end: number, marks: readonly Mark[]): void {
+    const isOther = end !== this.#end;
+    // At rest a run is shown as a whole.
+    const isAtEnd = this.#time >= this.#end && !this.isPlaying;
+    this.#end = end;
+    this.#bar.slider.max = String(Math.round(end * FINE));
+    this.#bar.marks.replaceChildren(
+      ...marks.map(({ from, until, label }) => {
+        const mark = document.createElement("span");
+        mark.style.left = `${(100 * from) / end}%`;
+        mark.style.width = `${(100 * (Math.min(until, end) - from)) / end}%`;
+        mark.title = `${label}, at ${from} s`;
+        return mark;
+      }),
+    );
+    if (isOther) {
+      const speeds = [...this.#bar.speed.options].map(({ value }) => Number(value));
+      const speed = speeds.find((s) => end / s <= PATIENCE) ?? speeds.at(-1);
+      this.#bar.speed.value = String(speed);
+    }
+    if (isAtEnd || this.#time > end) this.#time = end;
+    this.#restart();
+    this.#tell();
+  }
+
+  /** Goes to a time; what plays goes on from there. */
+  seek(time: number): void {
+    this.#time = Math.min(this.#end, Math.max(0, time));
+    this.#restart();
+    this.#tell();
+  }
+
+  toggle(): void {
+    if (this.#started) {
+      this.#started = undefined;
+    } else {
+      if (this.#time >= this.#end) this.#time = 0;
+      this.#started = { time: this.#time, now: performance.now() };
+      requestAnimationFrame((now) => this.#tick(now));
+    }
+    this.#bar.toggle.dataset.playing = String(this.isPlaying);
+    this.#bar.toggle.setAttribute("aria-label", this.isPlaying ? "Pause" : "Play");
+  }
+
+  #restart(): void {
+    if (this.#started) this.#started = { time: this.#time, now: performance.now() };
+  }
+
+  #tick(now: number): void {
+    if (!this.#started) return;
+    const passed = Math.max(0, now - this.#started.now) / 1000;
+    this.#time = Math.min(this.#end, this.#started.time + Number(this.#bar.speed.value) * passed);
+    this.#tell();
+    if (this.#time >= this.#end) this.toggle();
+    else requestAnimationFrame((next) => this.#tick(next));
+  }
+
+  #tell(): void {
+    this.#bar.slider.value = String(Math.round(this.#time * FINE));
+    this.#bar.slider.setAttribute("aria-valuetext", `${this.#time.toFixed(1)} seconds`);
+    this.#bar.output.textContent = `${this.#time.toFixed(1)} s`;
+    this.#show(this.#time);
+  }
+}

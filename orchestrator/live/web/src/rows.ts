@@ -1,0 +1,112 @@
+// Which parameters have sliders, under which headings, and between which values.
+
+import type { Scale } from "./scales";
+
+export interface Row {
+  /** HTML. */
+  readonly label: string;
+  /** What the slider sets together; each also has a field. */
+  readonly names: readonly string[];
+  /** What the slider's value is multiplied by, for each of them. */
+  readonly signs?: readonly number[];
+  readonly scale: Scale;
+}
+
+export interface Group {
+  readonly title: string;
+  readonly open?: boolean;
+  readonly rows: readonly Row[];
+}
+
+const by = (low: number, high: number): Scale => ({ low, high, log: true });
+const from = (low: number, high: number): Scale => ({ low, high });
+
+function row(label: string, name: string, scale: Scale): Row {
+  return { label, names: [name], scale };
+}
+
+function diagonal(label: string, name: string): Row {
+  return { label, names: [1, 2, 3].map((k) => `controller.${name}[${k}]`), scale: by(0.1, 1000) };
+}
+
+function limit(member: string): Row {
+  return {
+    label: `&tau;<sub>${member}</sub>`,
+    names: [`plant.tau_min.${member}`, `plant.tau_max.${member}`],
+    signs: [-1, 1],
+    scale: from(0, 200),
+  };
+}
+
+const EULER = { theta: "&theta;", psi: "&psi;" };
+
+const posture = (component: string, low: number, high: number): Row[] => [
+  ...["x", "y", "z"].map((axis) =>
+    row(`<i>${axis}</i>`, `${component}.eta0.${axis}`, from(low, high)),
+  ),
+  ...Object.entries(EULER).map(([angle, letter]) =>
+    row(
+      letter,
+      `${component}.eta0.${angle}`,
+      from(angle === "psi" ? -3.14 : -1.5, angle === "psi" ? 3.14 : 1.5),
+    ),
+  ),
+];
+
+const members = (letter: string, name: string, names: string, scale: Scale): Row[] =>
+  [...names].map((member) => row(`${letter}<sub>${member}</sub>`, `${name}.${member}`, scale));
+
+export const GROUPS: readonly Group[] = [
+  {
+    title: "Gains",
+    open: true,
+    rows: [
+      diagonal("<i>K</i><sub>1</sub>", "K1"),
+      diagonal("<i>K</i><sub>2</sub>", "K2"),
+      row("&lambda;", "controller.lambda", by(0.01, 100)),
+      row("<i>k<sub>d</sub></i>", "controller.k_d", by(1, 1000)),
+      row("&gamma;", "controller.gamma", { low: 0.001, high: 100, log: true, zero: true }),
+      row("&sigma;", "controller.sigma", { low: 1e-5, high: 1, log: true, zero: true }),
+      row("&epsilon;<sub><i>t</i></sub>", "controller.eps_t", by(0.01, 100)),
+    ],
+  },
+  { title: "Limits of the actuators", rows: ["u", "q", "r"].map(limit) },
+  { title: "Start of the vehicle", rows: posture("plant", -20, 20) },
+  {
+    title: "Reference",
+    rows: [
+      ...posture("planner", -100, 100),
+      ...members("&tau;", "planner.tau_d", "u", from(0, 50)),
+      ...members("&tau;", "planner.tau_d", "qr", from(-10, 10)),
+      row("cruising speed", "planner.cruise", from(0.1, 2)),
+      row("rounding", "planner.rounding", from(0.5, 15)),
+    ],
+  },
+  {
+    title: "Commands",
+    rows: [
+      ...members("&tau;", "plant.tau", "u", from(-100, 100)),
+      ...members("&tau;", "plant.tau", "qr", from(-20, 20)),
+    ],
+  },
+  {
+    title: "Noise",
+    rows: [
+      row("standard deviation", "plant.noise.std", { low: 1e-5, high: 1, log: true, zero: true }),
+      row("seed", "plant.noise.seed", { low: 1, high: 100, whole: true }),
+    ],
+  },
+  {
+    title: "Disturbance and current",
+    rows: [
+      row("<i>A<sub>f</sub></i>", "disturbance.A_f", from(0, 20)),
+      row("<i>A<sub>d</sub></i>", "disturbance.A_d", from(0, 40)),
+      row("&omega;<sub><i>d</i></sub>", "disturbance.omega_d", from(0, 2)),
+      ...[
+        ["x", "north"],
+        ["y", "east"],
+        ["z", "down"],
+      ].map(([axis, way]) => row(`current ${way}`, `plant.current.${axis}`, from(-1, 1))),
+    ],
+  },
+];

@@ -1,0 +1,288 @@
+// The path in space, with the vehicles on it at their attitudes.
+
+import { Camera, type Mesh, Renderer, Transform } from "ogl";
+import { axesOf, grid, type Label } from "./axes";
+import { type Colour, Marks, PathLine, POINTS } from "./lines";
+import {
+  type Box,
+  boxOf,
+  distanceFor,
+  drawn,
+  extents,
+  eyeAxes,
+  rotation,
+  type Vector,
+} from "./space";
+import type { Palette } from "./theme";
+import { Turning } from "./turning";
+import { paintVehicle, vehicleMesh } from "./vehicle_mesh";
+
+/** Of a run: three numbers for each row. */
+export interface Track {
+  /** The control point [m], earth frame. */
+  path: Float64Array;
+  /** Roll, pitch and yaw [rad]. */
+  attitude: Float64Array;
+}
+
+/** What a scene shows. */
+export interface Shown {
+  /** In the order of the controllers; absent: hidden, or not there. */
+  tracks: readonly (Track | undefined)[];
+  reference: Float64Array | undefined;
+  /** Distance of the control point from the centre of mass [m]. */
+  ell: number;
+  zUp: boolean;
+}
+
+/** Half of the angle of view [rad]. */
+const HALF = 0.3;
+
+/** Least length of the drawn vehicle: shares of the extents of the paths, and times ell. */
+const OF_LARGEST = 0.06;
+const OF_SECOND = 0.18;
+const LENGTH = 2;
+
+/** Room for the numbers around the box [px]. */
+const MARGIN = 25;
+
+/** Numbers along an axis that are closer together than this are left out [px]. */
+const CROWDED = 24;
+
+function mixed(a: Colour, b: Colour, share: number): Colour {
+  return a.map((value, k) => value + (b[k] - value) * share) as unknown as Colour;
+}
+
+export class Scene {
+  readonly #host: HTMLElement;
+  readonly #renderer: Renderer;
+  readonly #camera: Camera;
+  readonly #root = new Transform();
+  readonly #paths: PathLine[];
+  readonly #vehicles: Mesh[];
+  readonly #reference: PathLine;
+  readonly #target: Marks;
+  readonly #grid: Marks;
+  readonly #labels: HTMLElement;
+  readonly #turning: Turning;
+  #shown: Shown = { tracks: [], reference: undefined, ell: 0.35, zUp: false };
+  #box: Box = { low: [-1, -1, -1], high: [1, 1, 1] };
+  /** The scene is drawn with its largest extent as 1. */
+  #scale = 1;
+  #middle: Vector = [0, 0, 0];
+  #length = 1;
+  #row = 0;
+  #rows = 1;
+  #asked = false;
+  #lost = false;
+
+  /** Throws if there is no WebGL. */
+  constructor(host: HTMLElement, canvas: HTMLCanvasElement) {
+    this.#host = host;
+    if (!(canvas.getContext("webgl2", { antialias: true, alpha: true }) as unknown)) {
+      throw new Error("no WebGL");
+    }
+    this.#renderer = new Renderer({
+      canvas,
+      alpha: true,
+      antialias: true,
+      premultipliedAlpha: true,
+      dpr: Math.min(window.devicePixelRatio, 2),
+    });
+    const gl = this.#renderer.gl;
+    this.#camera = new Camera(gl, { fov: (HALF * 360) / Math.PI, near: 0.05, far: 50 });
+    this.#grid = new Marks(gl, 400, gl.LINES);
+    this.#reference = new PathLine(gl, 1.6, false);
+    this.#target = new Marks(gl, 1, gl.POINTS, 7 * this.#renderer.dpr);
+    this.#paths = [new PathLine(gl, 2.6, false), new PathLine(gl, 2.6, true)];
+    this.#vehicles = [vehicleMesh(gl), vehicleMesh(gl)];
+    const lines = [this.#reference, ...this.#paths];
+    for (const mesh of [this.#grid.mesh, this.#target.mesh, ...lines.map((line) => line.mesh)]) {
+      mesh.setParent(this.#root);
+    }
+    for (const vehicle of this.#vehicles) {
+      vehicle.matrixAutoUpdate = false;
+      vehicle.setParent(this.#root);
+    }
+    this.#labels = document.createElement("div");
+    this.#labels.className = "scene-labels";
+    this.#labels.setAttribute("aria-hidden", "true");
+    host.append(this.#labels);
+    this.#turning = new Turning(canvas, () => this.draw());
+    canvas.addEventListener("webglcontextlost", () => {
+      this.#lost = true;
+    });
+    new ResizeObserver(() => this.#resize()).observe(host);
+    this.#resize();
+  }
+
+  #resize(): void {
+    const { clientWidth: width, clientHeight: height } = this.#host;
+    if (!width || !height) return;
+    this.#renderer.setSize(width, height);
+    this.#camera.perspective({ aspect: width / height });
+    for (const line of [this.#reference, ...this.#paths]) line.resize();
+    this.draw();
+  }
+
+  paint(palette: Palette): void {
+    const { background, controllers, reference, highlight, grid } = palette;
+    controllers.forEach((colour, k) => {
+      this.#paths[k].paint(colour, mixed(colour, background, 0.68));
+      paintVehicle(this.#vehicles[k], colour, highlight, reference);
+    });
+    this.#reference.paint(reference, mixed(reference, background, 0.3));
+    this.#target.paint(reference);
+    this.#grid.paint(grid);
+    this.draw();
+  }
+
+  /** Other runs, or others of them. */
+  set(shown: Shown): void {
+    this.#shown = shown;
+    const seen = shown.tracks.flatMap((track) => (track ? [track.path] : []));
+    const held = shown.reference ? [...seen, shown.reference] : seen;
+    const tight = boxOf(held, 0);
+    const [largest, second] = extents(tight);
+    this.#length = Math.max(OF_LARGEST * largest, OF_SECOND * second, LENGTH * shown.ell);
+    const box = boxOf(held, 0.6 * this.#length);
+    this.#box = this.#drawnBox(box);
+    this.#scale = 1 / extents(this.#box)[0];
+    this.#middle = this.#box.low.map((low, k) => (low + this.#box.high[k]) / 2) as Vector;
+    this.#rows = 1;
+    this.#paths.forEach((line, k) => {
+      const track = shown.tracks[k];
+      line.mesh.visible = this.#vehicles[k].visible = track !== undefined;
+      if (track) {
+        line.place(this.#sampled(track.path));
+        this.#rows = Math.max(this.#rows, track.path.length / 3);
+      }
+    });
+    this.#reference.mesh.visible = this.#target.mesh.visible = shown.reference !== undefined;
+    if (shown.reference) this.#reference.place(this.#sampled(shown.reference));
+    this.show(this.#row);
+  }
+
+  /** The vehicles as they are in a row. */
+  show(row: number): void {
+    this.#row = Math.max(0, Math.min(row, this.#rows - 1));
+    const { tracks, reference } = this.#shown;
+    tracks.forEach((track, k) => {
+      if (!track) return;
+      // A run that failed has fewer rows.
+      const last = track.path.length / 3 - 1;
+      this.#paths[k].progress = last > 0 ? this.#row / last : 1;
+      this.#pose(this.#vehicles[k], track, Math.min(this.#row, last));
+    });
+    if (reference) {
+      const at = 3 * Math.min(this.#row, reference.length / 3 - 1);
+      this.#target.place(this.#placed(reference[at], reference[at + 1], reference[at + 2]));
+    }
+    this.draw();
+  }
+
+  #pose(mesh: Mesh, { path, attitude }: Track, row: number): void {
+    const r = rotation(attitude[3 * row], attitude[3 * row + 1], attitude[3 * row + 2]);
+    const at = this.#placed(path[3 * row], path[3 * row + 1], path[3 * row + 2]);
+    // With z up, y is to port and z up in the body, too.
+    const sign = this.#shown.zUp ? -1 : 1;
+    const size = this.#length * this.#scale;
+    const columns = [0, 1, 2].map((k) =>
+      drawn(r[k], r[3 + k], r[6 + k], this.#shown.zUp).map(
+        (value) => value * size * (k === 0 ? 1 : sign),
+      ),
+    );
+    mesh.matrix.set(
+      columns[0][0], columns[0][1], columns[0][2], 0,
+      columns[1][0], columns[1][1], columns[1][2], 0,
+      columns[2][0], columns[2][1], columns[2][2], 0,
+      at[0], at[1], at[2], 1,
+    ); // biome-ignore format: a matrix
+    mesh.worldMatrixNeedsUpdate = true;
+  }
+
+  #drawnBox({ low, high }: Box): Box {
+    const a = drawn(...low, this.#shown.zUp);
+    const b = drawn(...high, this.#shown.zUp);
+    return {
+      low: a.map((value, k) => Math.min(value, b[k])) as Vector,
+      high: a.map((value, k) => Math.max(value, b[k])) as Vector,
+    };
+  }
+
+  #placed(x: number, y: number, z: number): Vector {
+    const at = drawn(x, y, z, this.#shown.zUp);
+    return at.map((value, k) => (value - this.#middle[k]) * this.#scale) as Vector;
+  }
+
+  #sampled(points: Float64Array): Float32Array {
+    const sampled = new Float32Array(3 * POINTS);
+    const last = points.length / 3 - 1;
+    for (let i = 0; i < POINTS; i++) {
+      const from = 3 * Math.round((i * last) / (POINTS - 1));
+      sampled.set(this.#placed(points[from], points[from + 1], points[from + 2]), 3 * i);
+    }
+    return sampled;
+  }
+
+  /** Draws once before the next picture of the screen, however often it is asked for. */
+  draw(): void {
+    if (this.#asked) return;
+    this.#asked = true;
+    requestAnimationFrame(() => {
+      this.#asked = false;
+      this.drawNow();
+    });
+  }
+
+  drawNow(): void {
+    const { clientWidth: width, clientHeight: height } = this.#host;
+    if (this.#lost || !width || !height) return;
+    const { low, high } = this.#box;
+    const unit: Box = {
+      low: low.map((value, k) => (value - this.#middle[k]) * this.#scale) as Vector,
+      high: high.map((value, k) => (value - this.#middle[k]) * this.#scale) as Vector,
+    };
+    const { view, zoom } = this.#turning;
+    const [right, up, back] = eyeAxes(view);
+    const aspect = width / height;
+    const share = Math.max(0.5, 1 - (2 * MARGIN) / height);
+    const distance = distanceFor(unit, view, HALF, aspect) / share / zoom;
+    this.#camera.position.set(back[0] * distance, back[1] * distance, back[2] * distance);
+    this.#camera.lookAt([0, 0, 0]);
+    const onScreen = (place: Vector): [number, number] => {
+      const at = place.map((value, k) => (value - this.#middle[k]) * this.#scale);
+      const along = (axis: Vector) => at[0] * axis[0] + at[1] * axis[1] + at[2] * axis[2];
+      const reach = (distance - along(back)) * Math.tan(HALF);
+      return [
+        (0.5 + (0.5 * along(right)) / (reach * aspect)) * width,
+        (0.5 - (0.5 * along(up)) / reach) * height,
+      ];
+    };
+    const pixel = (2 * distance * Math.tan(HALF)) / height / this.#scale;
+    const { lines, labels } = grid(this.#box, axesOf(this.#shown.zUp), back, pixel, (a, b) =>
+      onScreen(a)[0] <= onScreen(b)[0] ? a : b,
+    );
+    this.#grid.place(lines.map((value, i) => (value - this.#middle[i % 3]) * this.#scale));
+    this.#write(labels, onScreen);
+    this.#renderer.render({ scene: this.#root, camera: this.#camera });
+  }
+
+  #write(labels: readonly Label[], onScreen: (place: Vector) => [number, number]): void {
+    const spans = this.#labels.children as HTMLCollectionOf<HTMLElement>;
+    const before: [number, number][][] = [[], [], []];
+    let used = 0;
+    for (const { at, text, axis, isTitle } of labels) {
+      const [x, y] = onScreen(at);
+      const crowded = before[axis].some(([a, b]) => Math.hypot(a - x, b - y) < CROWDED);
+      if (crowded && !isTitle) continue;
+      before[axis].push([x, y]);
+      if (!spans[used]) this.#labels.append(document.createElement("span"));
+      const span = spans[used++];
+      if (span.textContent !== text) span.textContent = text;
+      span.className = `${isTitle ? "title" : "number"} axis-${axis}`;
+      span.style.transform = `translate(${x.toFixed(1)}px, ${y.toFixed(1)}px)`;
+    }
+    while (spans.length > used) spans[used].remove();
+  }
+}

@@ -1,0 +1,314 @@
+// A run of a loop, from the first exchange of values to the last step.
+import { Ended, Events, parted, type Run } from "./events";
+import { Experiment, Refusal } from "./experiment";
+import { ComponentFailed, Instance, Machine } from "./fmi";
+import { Gathering, Overrides, Row } from "./row";
+import { general } from "./text";
+import type {
+  Data,
+  Engine as EngineType,
+  LoopData,
+  Occurrence,
+  Options,
+  Parameter,
+  Result,
+  Stage,
+  Value,
+  Values,
+} from "./types";
+
+/** Values go along all connections so often, until they rest. */
+const MOST_ROUNDS = 1000;
+
+/** Messages that are kept: an FMU may have something to say in every step. */
+const MOST_MESSAGES = 100;
+
+/** FMI's status of a value that was not taken. */
+const DISCARD = 2;
+
+/** A stage of every step. */
+interface Step {
+  readonly gathering: Gathering;
+  readonly members: readonly Instance[];
+}
+
+/** Runs loops in the compiled module. */
+export class Engine implements EngineType {
+  private constructor(
+    private readonly machine: Machine,
+    private readonly data: Data,
+  ) {}
+
+  /** Make one of the compiled module and what Python has written. */
+  static async load(bytes: BufferSource, data: Data): Promise<Engine> {
+    return new Engine(await Machine.load(bytes), data);
+  }
+
+  run(loop: LoopData, values: Values, options: Options): Result {
+    const experiment = new Experiment(options.stopTime, options.step);
+    const simulation = new Simulation(this.machine, this.data, loop, values, experiment);
+    try {
+      return simulation.result(options.events ?? []);
+    } finally {
+      simulation.free();
+    }
+  }
+}
+
+/** One run. */
+class Simulation {
+  private readonly parameters: Record<string, Value> = {};
+  private readonly set = new Map<string, Map<string, Value>>();
+  private readonly messages: string[] = [];
+  private readonly refusals: string[] = [];
+  private readonly instances = new Map<string, Instance>();
+  private readonly row: Row;
+
+  constructor(
+    machine: Machine,
+    private readonly data: Data,
+    private readonly loop: LoopData,
+    values: Values,
+    private readonly experiment: Experiment,
+  ) {
+    for (const parameter of loop.parameters) this.take(parameter, values[parameter.name]);
+    this.row = new Row(machine, loop, data.fmus);
+    for (const [name, value] of Object.entries(this.parameters)) {
+      const column = this.row.columns.get(name);
+      if (column !== undefined) this.row.values[column] = Number(value);
+    }
+    const hear = (status: number, text: string) => {
+      if (this.messages.length < MOST_MESSAGES) this.messages.push(text);
+      if (status === DISCARD) this.refusals.push(text);
+    };
+    for (const [name, type] of Object.entries(loop.components)) {
+      const instance = new Instance(machine, name, type, data.fmus[type], hear);
+      this.instances.set(name, instance);
+      instance.tie(data.fmus[type], this.row.address, this.row.firsts.get(name) ?? 0);
+    }
+  }
+
+  free(): void {
+    for (const instance of this.instances.values()) instance.free();
+    this.row.free();
+  }
+
+  result(events: Options["events"] & object): Result {
+    try {
+      this.initialise();
+    } catch (error) {
+      if (error instanceof ComponentFailed) throw new Refusal(error.message);
+      throw error;
+    }
+    return this.advance(new Events(events));
+  }
+
+  /** Take the value of a parameter: the user's, or the loop's. */
+  private take(parameter: Parameter, given: Value | undefined): void {
+    const { name, type } = parameter;
+    const value = given ?? parameter.value;
+    const wanted = { Real: "number", Integer: "number", Boolean: "boolean", String: "string" }[
+      type
+    ];
+    const fits = typeof value === wanted && (type !== "Integer" || Number.isInteger(value));
+    if (!fits) throw new Refusal(`${name} = ${value}: not a value of type ${type}`);
+    this.parameters[name] = value;
+    if (Object.is(value, parameter.default)) return;
+    const [component, port] = parted(name);
+    const values = this.set.get(component) ?? new Map<string, Value>();
+    this.set.set(component, values.set(port, value));
+  }
+
+  /** Set parameters, exchange values in initialisation mode until they rest, leave that mode. */
+  private initialise(): void {
+    const { instances, loop } = this;
+    for (const [name, instance] of instances) {
+      instance.enterInitialization(this.set.get(name) ?? new Map(), 0);
+    }
+    const units = loop.initial.map((stage) => this.step(stage));
+    this.readAhead();
+    const handOn = (everything: boolean): boolean => {
+      let changed = false;
+      for (const { gathering, members } of units) {
+        const moved = gathering.gather();
+        if (!moved && !everything) continue;
+        for (const instance of members) instance.exchange();
+        changed = true;
+      }
+      return changed;
+    };
+    handOn(true);
+    let rounds = 0;
+    while (handOn(false)) {
+      rounds += 1;
+      if (rounds === MOST_ROUNDS) throw new Refusal("values do not come to rest");
+    }
+    this.checkFinite();
+    for (const instance of instances.values()) instance.exitInitialization();
+    handOn(true);
+    this.checkFinite();
+    if (this.refusals.length > 0) throw new Refusal(this.refusals.join("; "));
+  }
+
+  /** Read outputs that feed a component before it is their own component's turn. */
+  private readAhead(): void {
+    const turn = new Map(
+      this.loop.initial.flatMap(({ components }, i) => components.map((c) => [c, i])),
+    );
+    for (const { connections } of this.loop.initial) {
+      for (const [target, source] of connections) {
+        const [component, port] = parted(source);
+        if ((turn.get(component) ?? 0) < (turn.get(parted(target)[0]) ?? 0)) continue;
+        const value = Number(this.instances.get(component)?.read(port));
+        if (Number.isFinite(value)) this.row.values[this.row.column(source)] = value;
+      }
+    }
+  }
+
+  private checkFinite(): void {
+    const wrong = this.wrong(Object.keys(this.loop.components));
+    if (wrong !== undefined) throw new Refusal(`stopped at t = 0 s: ${wrong}`);
+  }
+
+  private step({ connections, components }: Stage): Step {
+    const members = components
+      .map((name) => this.instances.get(name))
+      .filter((one) => one !== undefined);
+    return { gathering: new Gathering(this.row, connections), members };
+  }
+
+  /** Step to the end, or to the first failure. */
+  private advance(events: Events): Result {
+    const { experiment, instances, row } = this;
+    const stages = this.loop.stages.map((stage) => this.step(stage));
+    const overrides = new Overrides(
+      row,
+      stages.map(({ gathering }) => gathering),
+    );
+    const run: Run = { experiment, instances, row, overrides, values: this.set, made: 0 };
+    const width = 1 + row.names.length;
+    const table = new Float64Array((experiment.steps + 1) * width);
+    /** Keep the row of now, unless a value is not finite. */
+    const append = (): boolean => {
+      const { values } = row;
+      const first = run.made * width;
+      table[first] = experiment.time(run.made);
+      // Times zero, what is finite is zero and what is not is nan.
+      let sum = 0;
+      for (let i = 0; i < values.length; i++) {
+        table[first + 1 + i] = values[i];
+        sum += values[i] * 0;
+      }
+      return sum === 0;
+    };
+    append();
+    let [failure, remark]: [string | undefined, string | undefined] = [undefined, undefined];
+    const now = () => `t = ${general(experiment.time(run.made), 12)} s`;
+    try {
+      let due = events.act(run);
+      while (run.made < experiment.steps) {
+        const [time, length] = [experiment.time(run.made), experiment.length(run.made)];
+        for (const { gathering, members } of stages) {
+          gathering.gather();
+          for (const instance of members) {
+            instance.setInputs();
+            instance.doStep(time, length);
+          }
+          for (const instance of members) instance.getOutputs();
+        }
+        run.made += 1;
+        if (!append()) {
+          run.made -= 1;
+          break;
+        }
+        if (run.made >= due) due = events.act(run);
+      }
+    } catch (error) {
+      if (error instanceof Ended) remark = `ended at ${now()}: ${error.message}`;
+      else if (error instanceof ComponentFailed) failure = `stopped at ${now()}: ${error.message}`;
+      else throw error;
+    }
+    if (remark === undefined) {
+      // Also where another component has refused it in the same step.
+      const wrong = this.wrong(this.loop.stages.flatMap(({ components }) => components));
+      const time = experiment.time(Math.min(run.made + 1, experiment.steps));
+      if (wrong !== undefined) failure = `stopped at t = ${general(time, 12)} s: ${wrong}`;
+    }
+    const whole = table.subarray(0, (run.made + 1) * width);
+    return new Table(
+      row.names,
+      whole,
+      this.parameters,
+      events.happened,
+      this.messages,
+      failure,
+      remark,
+    );
+  }
+
+  /** The first value that is not finite, and where it comes from, in words. */
+  private wrong(components: readonly string[]): string | undefined {
+    const { row, loop, data } = this;
+    if (row.values.every(Number.isFinite)) return undefined;
+    const sources = new Map(loop.stages.flatMap(({ connections }) => connections));
+    let passedOn: string | undefined;
+    for (const component of components) {
+      const variables = data.fmus[loop.components[component]].variables;
+      const ports = variables.filter(({ causality }) => causality !== "parameter");
+      const inputsFirst = [...ports].sort((a, b) => a.causality.localeCompare(b.causality));
+      for (const { name, causality } of inputsFirst) {
+        const port = `${component}.${name}`;
+        if (Number.isFinite(row.value(port))) continue;
+        const text = `${port} is ${general(row.value(port))}`;
+        if (causality === "output") return text;
+        const source = sources.get(port);
+        const fed = `${text}, ${source ? `fed by ${source}` : "from a table or an event"}`;
+        if (source === undefined || Number.isFinite(row.value(source))) return fed;
+        passedOn ??= fed;
+      }
+    }
+    return passedOn;
+  }
+}
+
+/** The rows of a run. */
+class Table implements Result {
+  readonly rows: number;
+  private readonly places: ReadonlyMap<string, number>;
+  private readonly made = new Map<string, Float64Array>();
+  readonly failure?: string;
+  readonly remark?: string;
+
+  constructor(
+    readonly columns: readonly string[],
+    readonly table: Float64Array,
+    readonly parameters: Values,
+    readonly happened: readonly Occurrence[],
+    readonly messages: readonly string[],
+    failure: string | undefined,
+    remark: string | undefined,
+  ) {
+    this.rows = table.length / (1 + columns.length);
+    this.places = new Map([["time", 0], ...columns.map((name, i) => [name, i + 1] as const)]);
+    if (failure !== undefined) this.failure = failure;
+    if (remark !== undefined) this.remark = remark;
+  }
+
+  get time(): Float64Array {
+    return this.column("time");
+  }
+
+  has(name: string): boolean {
+    return this.places.has(name);
+  }
+
+  column(name: string): Float64Array {
+    const [place, known] = [this.places.get(name), this.made.get(name)];
+    if (known !== undefined) return known;
+    if (place === undefined) throw new Error(`there is no column ${name}`);
+    const [width, column] = [1 + this.columns.length, new Float64Array(this.rows)];
+    for (let k = 0; k < this.rows; k++) column[k] = this.table[k * width + place];
+    this.made.set(name, column);
+    return column;
+  }
+}

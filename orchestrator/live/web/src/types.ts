@@ -1,0 +1,203 @@
+// What Python hands to the page, and what the engine hands to those who draw.
+
+/** A value of a port or parameter. */
+export type Value = number | boolean | string;
+
+/** Values by `component.parameter`. */
+export type Values = Readonly<Record<string, Value>>;
+
+export type FmiType = "Real" | "Integer" | "Boolean" | "String";
+
+/** A variable of an FMU, as its modelDescription.xml has it. */
+export interface Variable {
+  readonly name: string;
+  readonly reference: number;
+  readonly type: FmiType;
+  readonly causality: "input" | "output" | "parameter";
+  readonly variability: string;
+  readonly start?: Value;
+  readonly unit?: string;
+  readonly min?: number;
+  readonly max?: number;
+  readonly description: string;
+}
+
+/** A component type; its functions in the module have its name as their prefix. */
+export interface Fmu {
+  readonly guid: string;
+  readonly description: string;
+  readonly variables: readonly Variable[];
+}
+
+/** A parameter that a user may change. */
+export interface Parameter {
+  /** `component.parameter` */
+  readonly name: string;
+  readonly type: FmiType;
+  readonly unit?: string;
+  readonly min?: number;
+  readonly max?: number;
+  /** The texts that a String may be. */
+  readonly choices?: readonly string[];
+  /** The FMU's own value. */
+  readonly default: Value;
+  /** The value in this preset. */
+  readonly value: Value;
+  readonly description: string;
+  /** Whether an event may change it while the loop runs. */
+  readonly tunable: boolean;
+}
+
+/** Names of ports with values. */
+export type Assignments = readonly (readonly [string, Value])[];
+
+/** What an event does; names are `component.port`. */
+export type Action =
+  | { readonly kind: "alter"; readonly effect: "override" | "bias"; readonly values: Assignments }
+  | { readonly kind: "freeze"; readonly targets: readonly string[] }
+  | { readonly kind: "release"; readonly targets: readonly string[] }
+  | { readonly kind: "set"; readonly parameters: Assignments; readonly inputs: Assignments }
+  | { readonly kind: "reset"; readonly components: readonly string[] }
+  | { readonly kind: "stop"; readonly why: string };
+
+/** A signal compared with a number. */
+export interface Condition {
+  readonly signal: string;
+  readonly comparison: "<" | "<=" | ">" | ">=";
+  readonly value: number;
+}
+
+/** Something that happens from outside, at a time or when a condition becomes true. */
+export interface EventData {
+  /** What happens, in words. */
+  readonly text: string;
+  /** Its name in figures. */
+  readonly label: string;
+  readonly action: Action;
+  /** [s] */
+  readonly at?: number;
+  readonly when?: Condition;
+  /** Whether it happens each time that the condition becomes true. */
+  readonly repeat?: boolean;
+  /** For how long [s]; absent: for good. */
+  readonly lasts?: number;
+}
+
+/** Components that are stepped after their inputs have been gathered. */
+export interface Stage {
+  /** `[target, source]`, names of ports. */
+  readonly connections: readonly (readonly [string, string])[];
+  readonly components: readonly string[];
+}
+
+/** A vehicle with its controller, ready to be run. */
+export interface LoopData {
+  /** For legends: `proposed`, `PD`, ... */
+  readonly label: string;
+  /** The scenario that `auv-fmu run` knows it by; absent: it has none of its own. */
+  readonly scenario?: string;
+  /** FMUs by the names of the components, in the order of the table's columns. */
+  readonly components: Readonly<Record<string, string>>;
+  /** In the order in which they hand on values before the first step. */
+  readonly initial: readonly Stage[];
+  readonly stages: readonly Stage[];
+  /** All parameters, and inputs that nothing feeds. */
+  readonly parameters: readonly Parameter[];
+  /** Events by the name of the scenario that has them; `""`: none. */
+  readonly events: Readonly<Record<string, readonly EventData[]>>;
+}
+
+/** A scenario of `auv-fmu list`, with its comparison beside it. */
+export interface Preset {
+  readonly name: string;
+  readonly title: string;
+  readonly remark: string;
+  /** Whether z is drawn upwards. */
+  readonly zUp: boolean;
+  /** [s] */
+  readonly stopTime: number;
+  /** Communication step [s]. */
+  readonly step: number;
+  /** The scenario whose events happen; `""`: none. */
+  readonly events: string;
+  /** Whether `auv-fmu run NAME` runs the second loop, too. */
+  readonly comparing: boolean;
+  /** The scenario's own loop, and the one that it is compared with, if there is one. */
+  readonly loops: readonly LoopData[];
+}
+
+/** An index of metrics.json. */
+export interface IndexData {
+  readonly name: string;
+  readonly label: string;
+  /** Units by member; a single number has the member `""`. */
+  readonly units: Readonly<Record<string, string>>;
+  readonly meaning: string;
+}
+
+/** All that Python writes into the page, besides script and module. */
+export interface Data {
+  /** Of auv-fmu. */
+  readonly version: string;
+  /** The preset that is shown first. */
+  readonly opened: string;
+  readonly fmus: Readonly<Record<string, Fmu>>;
+  readonly presets: readonly Preset[];
+  readonly indices: readonly IndexData[];
+}
+
+/** Something that has happened in a run. */
+export interface Occurrence {
+  /** [s] */
+  readonly time: number;
+  readonly text: string;
+  /** Empty: it is only the end of an event. */
+  readonly label: string;
+  /** The number of the event. */
+  readonly event: number;
+}
+
+/** A run: rows at t = 0 and after each step. */
+export interface Result {
+  /** Names of all ports, as in result.csv after `time`. */
+  readonly columns: readonly string[];
+  /** How many rows there are. */
+  readonly rows: number;
+  /** Row by row: the time, then the columns. */
+  readonly table: Float64Array;
+  readonly time: Float64Array;
+  /** A column by its name; made once. */
+  column(name: string): Float64Array;
+  has(name: string): boolean;
+  /** Values of all parameters as the FMUs hold them. */
+  readonly parameters: Values;
+  readonly happened: readonly Occurrence[];
+  /** What FMUs have said, once each: `plant: ...`. */
+  readonly messages: readonly string[];
+  /** Why the run has not come to its end; the rows before that are there. */
+  readonly failure?: string;
+  /** Why it has ended early without a failure. */
+  readonly remark?: string;
+}
+
+/** What a run is asked for besides its values. */
+export interface Options {
+  /** [s] */
+  readonly stopTime: number;
+  /** [s] */
+  readonly step: number;
+  readonly events?: readonly EventData[];
+}
+
+/** Runs loops. `Engine.load(bytes, data)` of engine.ts makes one. */
+export interface Engine {
+  /**
+   * Runs a loop with its own values except for `values`; names that it lacks are left out.
+   *
+   * Throws `Refusal`, whose message is the FMU's own line, if a value or a time is not usable.
+   */
+  run(loop: LoopData, values: Values, options: Options): Result;
+}
+
+/** Members of each index by its name, in the order of `IndexData.units`. */
+export type Metrics = Readonly<Record<string, readonly number[]>>;

@@ -1,0 +1,19 @@
+// Writes the rows of presets: `node rows.mjs ENGINE MODULE DATA FOLDER`, a file of doubles for each
+// loop, and what else there is to say of the runs on the output.
+import { readFileSync, writeFileSync } from "node:fs";
+import { pathToFileURL } from "node:url";
+
+const [engine, module, data, folder] = process.argv.slice(2);
+const { Engine, metrics } = await import(pathToFileURL(engine).href);
+const content = JSON.parse(readFileSync(data, "utf8"));
+const made = await Engine.load(readFileSync(module), content);
+const found = {};
+for (const { name, stopTime, step, events, loops } of content.presets) {
+  for (const [i, loop] of loops.entries()) {
+    const result = made.run(loop, {}, { stopTime, step, events: loop.events[events] ?? [] });
+    writeFileSync(`${folder}/${name}.${i}`, result.table);
+    const { columns, happened, failure, messages } = result;
+    found[`${name}.${i}`] = { columns, happened, failure, messages, metrics: metrics(result) };
+  }
+}
+console.log(JSON.stringify(found));

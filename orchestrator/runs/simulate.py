@@ -1,0 +1,200 @@
+"""Runs from Python: `simulate`."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from fmus.kinds import AUTO, KindName
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.master.experiment import CouplingName, Order
+from orchestrator.master.hooks.checkpoint import Checkpoints
+from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.observers.observer import Observer, Progress
+from orchestrator.runs.folder import lock_folder, make_folder
+from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
+from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.record import (
+    Stopwatch,
+    checkpoints_of,
+    leave_checkpoints,
+    write_metrics,
+    write_record,
+)
+from orchestrator.runs.request import Request
+from orchestrator.runs.result import Result
+from orchestrator.runs.scenario import Scenario
+from orchestrator.system.structure import System
+from orchestrator.vehicle.indices import metrics_of
+from orchestrator.vehicle.signals import Loop
+
+
+class _Made:
+    """Where a result comes from that was computed in this process."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        self._prepared, self._clock = prepared, Stopwatch()
+
+    @property
+    def scenario(self) -> Scenario:
+        """What was run."""
+        return self._prepared.scenario
+
+    @property
+    def loops(self) -> Sequence[Loop]:
+        """Of its vehicles."""
+        return self._prepared.loops
+
+    @property
+    def system(self) -> System:
+        """What was run."""
+        return self._prepared.system
+
+    def metrics(self, result: Result) -> dict[str, Any]:
+        """The indices of its rows."""
+        return metrics_of(result, self.loops).content(self.scenario.name, self.system)
+
+    def write_ends(self, folder: Path, result: Result) -> None:
+        """Write metrics.json and run.json."""
+        write_metrics(folder, self.metrics(result))
+        write_record(folder, self._prepared, result.header, result.ending, sys.argv, self._clock)
+
+
+def simulate(
+    system: str | Path | Mapping[str, Any] | System,
+    parameters: Mapping[str, object] | None = None,
+    *,
+    stop_time: float | None = None,
+    step: float | None = None,
+    order: Order | None = None,
+    kind: KindName = AUTO,
+    progress: bool = False,
+    isolate: bool = False,
+    step_timeout: float | None = None,
+    loop: LoopName = LOOPS[0],
+    variant: str | None = None,
+    strict: bool = False,
+    steps: Mapping[str, float] | None = None,
+    events: Sequence[Mapping[str, Any]] | None = None,
+    inputs: str | Path | None = None,
+    coupling: CouplingName | None = None,
+    checkpoint: str | Path | None = None,
+    checkpoint_every: float | None = None,
+    resume: bool = False,
+) -> Result:
+    """Run a scenario, an SSP or a system.
+
+        result = simulate("fig4", {"controller.eps_t": 10.0}, stop_time=50.0)
+        result["plant.eta.x"], result.metrics(), result.plot("plant.tau.*")
+
+    Args:
+        system: name of a scenario, path of a .toml or .ssp file, what a scenario file would hold,
+            as a dictionary, or what :func:`load` has given.
+        parameters: values that win over the scenario's, by `component.parameter`: numbers, truth
+            values, names, or text as it stands on the command line; for a group, such as
+            `plant.eta0`, a list with a value for each member.
+        stop_time: end of the run [s]; None: the scenario's own.
+        step: communication step [s]; None: the scenario's own, else the longest that fits into
+            the steps that the FMUs were made for, else 0.02.
+        order: `gauss-seidel`, as the paper's scheme has it, `jacobi`, as most tools step, or the
+            names of all components, one stepped after the other; None: the scenario's own, else
+            `gauss-seidel`.
+        kind: of the bundle's FMUs, `python`, `native`: translated to C, with the same numbers, or
+            `auto`, native where available.
+        progress: show a bar on runs that take longer than some seconds.
+        isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
+            a failure of the run.
+        step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
+        loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
+            to be had; the rows are the same.
+        variant: which of the descriptions in an SSP; None: the default.
+        strict: refuse what otherwise is a warning.
+        steps: of components that take longer ones of their own [s], multiples of the communication
+            step; they win over the scenario's.
+        events: what happens during the run, instead of the scenario's own: tables as a
+            scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
+        inputs: a table of inputs over time, instead of the scenario's own: a .csv or .parquet
+            file.
+        coupling: how rings of direct feedthroughs are closed: `solve`, at every communication
+            point, `delay`, by a delay of one step, or `linear`, solved, with inputs that change
+            linearly during a step; None: the scenario's own, else `solve` where the FMUs allow it.
+        checkpoint: folder for what it takes to go on after the process has ended, whatever ended
+            it; removed when the run has come to its end.
+        checkpoint_every: how often that is written, in simulated seconds; None: as often as
+            before, if the run is resumed.
+        resume: go on from there. The result has all rows, as if nothing had happened, and says in
+            `resumed_at` where it went on.
+
+    Returns:
+        The rows that were computed: all of them, or those before a failure, which
+        `Result.failure` then describes.
+
+    Raises:
+        ValueError: a name, a value or a file is not usable; the text says what to change.
+        KeyboardInterrupt: Ctrl-C, when the step has ended that it came in.
+
+    """
+    is_named = not isinstance(system, System)
+    if isinstance(system, System):
+        check_brings_its_own(str(system), kind)
+        if variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
+        scenario = Scenario(system.name)
+    else:
+        with notes_as_warnings(strict) as findings:
+            scenario, system = load_scenario(system, kind, variant=variant, findings=findings)
+    if not isinstance(parameters, Mapping | None):
+        raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
+    request = Request(
+        parameters=parameters or {},
+        stop_time=stop_time,
+        step=step,
+        order=order,
+        coupling=coupling,
+        kind=kind,
+        events=events,
+        inputs=inputs,
+        loop=loop,
+        isolate=isolate,
+        step_timeout=step_timeout,
+        strict=strict,
+        steps=steps or {},
+    )
+    prepared = prepare(scenario, system, request)
+    if is_named:
+        with notes_as_warnings(strict) as findings:
+            for doubt in prepared.doubts():
+                findings.note(doubt)
+            findings.refuse()
+    result = Result(_Made(prepared))
+    observers: list[Observer] = [result, *([Progress(scenario.name)] * progress)]
+    with _checkpoints(prepared, checkpoint, checkpoint_every, resume) as kept:
+        result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
+        ending = prepared.run([*observers, *kept], kept)
+        leave_checkpoints(kept, ending.failure is None)
+    for number in ending.interrupts:
+        # Held back while the FMUs computed; now it acts as usual.
+        signal.raise_signal(number)
+    return result
+
+
+@contextmanager
+def _checkpoints(
+    prepared: Prepared, folder: str | Path | None, every: float | None, resume: bool
+) -> Iterator[Sequence[Checkpoints]]:
+    """The checkpoints of a run in a folder that is kept from others; none, if none are wanted."""
+    if folder is None and every is None and not resume:
+        yield ()
+        return
+    if folder is None or (every is None and not resume):
+        raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
+    place = Path(folder)
+    try:
+        with make_folder(place), lock_folder(place):
+            yield checkpoints_of([prepared], [place], every, resume)
+    except OSError as error:
+        raise InputError(f"cannot write into {place}: {reason(error)}") from error
