@@ -177,7 +177,8 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     silent = [one for one in lost if one["changed"]["silent"]]
     yield (
         f"\n## Parameters\n\n{len(changed)} of the FMUs that run have Real parameters. All "
-        "parameters of an FMU were changed at once, by a hundredth, and read back after initialisation.\n\n"
+        "parameters of an FMU were changed at once, by a hundredth, and read back after "
+        "initialisation.\n\n"
         "| FMUs | how many |\n| --- | --: |\n"
         f"| that keep all new values | {len(ran) - len(lost)} |\n"
         f"| that do not, with a message | {len(lost) - len(silent)} |\n"
