@@ -16,10 +16,9 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
-    describe,
     read_system,
 )
-from orchestrator.commands.streams import FAILED, OK, say, show
+from orchestrator.commands.streams import FAILED, OK, describe, say, show
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
@@ -255,7 +254,7 @@ def _verify_carried(options: argparse.Namespace) -> int:
             say(f"warning: {judgement.name}: {note}")
         judged += [] if judgement.agrees is None else [judgement.agrees]
     if not judged:
-        raise InputError(f"{options.table}: carries no results to verify it with")
+        raise InputError(f"{options.table}: carries no reference results")
     counted = f"{sum(judged)} of {len(judged)} experiments with results agree"
     if not all(judged):
         raise InputError(f"{options.table}: {counted}")

@@ -6,8 +6,8 @@ import argparse
 import os
 from pathlib import Path
 
-from orchestrator.commands.options import add_options, add_out, describe, from_options
-from orchestrator.commands.streams import INTERRUPTED, OK, say, show
+from orchestrator.commands.options import add_options, add_out, from_options
+from orchestrator.commands.streams import INTERRUPTED, OK, describe, say, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
 from orchestrator.runs.request import Files, Request
@@ -87,7 +87,9 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    scenarios = [*names(), *options.scenarios]
+    # The paper's figures come first, in its order.
+    scenarios = sorted(names(), key=lambda name: not name.startswith("fig"))
+    scenarios += options.scenarios
     ready = ready_studies() if options.studies else ()
     for path in write_report(
         options.out,

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from orchestrator.figures.style import Drawn
+from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.ledger import locate
 from orchestrator.machine.user_files import explain_errors, read_text
@@ -274,7 +274,8 @@ def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
     for vehicle, found in of_vehicles(values).items():
         for index in metrics():
             if index.name in found:
-                title = f"{index.label} {index.members}" + f" [{index.unit}]" * bool(index.unit)
+                unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
+                title = f"{index.label} {index.members}{unit}"
                 yield vehicle, title, [*map(_number, np.atleast_1d(found[index.name]).tolist())]
 
 
@@ -285,7 +286,7 @@ def _number(value: float) -> str:
     return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
 
 
-class _Stored:
+class _OnDisk:
     """Where a result comes from that was read from files."""
 
     def __init__(self, file: Path, record: dict[str, Any]) -> None:
@@ -331,7 +332,7 @@ def read(path: str | Path) -> Result:
     record = read_record(file)
     for changed in changed_files(file) if record else ():
         warnings.warn(f"{changed} was changed since the run wrote it", stacklevel=2)
-    result = Result(_Stored(file, record))
+    result = Result(_OnDisk(file, record))
     header, blocks = stored_rows(file, record)
     result.hold(header, np.concatenate(list(blocks)), ending_in(record))
     return result
