@@ -14,6 +14,7 @@ from markdown_it import MarkdownIt
 
 from fmus.discovery import components, package_folder, ports_of, related_files
 from fmus.kinds import NATIVE, PYTHON
+from fmus.ports.description import PAPER
 from fmus.ports.description_fmi3 import TYPES
 from fmus.ports.port import FAULT, Port
 
@@ -170,4 +171,6 @@ def component_html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
     body = MarkdownIt("commonmark").enable("table").render(component_page(name, kind, fmi))
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
-    return Template(_HTML.read_text(encoding="utf-8")).substitute(title=name, body=body)
+    return Template(_HTML.read_text(encoding="utf-8")).substitute(
+        title=name, paper=PAPER, body=body
+    )

@@ -4,10 +4,11 @@
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
 `<!-- / -->`, which this replaces. `docs/reference/components` and `docs/schemas` are written whole.
 
-The other tools compute what takes minutes: `accuracy.py` prints the tables of
-docs/explanation/accuracy.md, `study_numbers.py` and `best_gains.py` the numbers below the figures
-of docs/explanation/ready-studies.md. `study_pictures.py` draws those figures, `benchmarks_page.py`
-fills in docs/reference/benchmarks.md, and `reference.py` writes `reference`.
+`command_line.py` and `gallery.py` have the long texts. The other tools compute what takes minutes:
+`accuracy.py` prints the tables of docs/explanation/accuracy.md, `study_numbers.py` and
+`best_gains.py` the numbers below the figures of docs/explanation/ready-studies.md. `pictures.py`
+draws those figures and the ones of the scenarios, `benchmarks_page.py` fills in
+docs/reference/benchmarks.md, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
+from importlib import import_module
 from math import cbrt, radians, sqrt, tan
 from pathlib import Path
 from typing import Any
@@ -29,8 +31,10 @@ from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.gain_conditions import at_least, coupling
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
+from command_line import command_line
 from fmus.discovery import components
 from fmus.documentation import component_page
+from gallery import PICTURES, figures, gallery, picture, seen
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
 from orchestrator.formats.schema import TomlTable, entries
@@ -39,15 +43,12 @@ from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.studies.study import Study, ready_studies
-from orchestrator.studies.study_file import LABELS, FigureTable, StudyFile, read_study
+from orchestrator.studies.study_file import FigureTable, StudyFile, read_study
 from orchestrator.vehicle.indices import INDICES, Index
 from orchestrator.vehicle.proof import stated
 
 DOCS = Path(__file__).parents[1] / "docs"
 COMPONENTS = DOCS / "reference" / "components"
-
-#: The pictures of the ready studies, below the folder of the pages, small.
-PICTURES = Path("images", "studies")
 
 _PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)
 
@@ -56,6 +57,9 @@ def files() -> dict[Path, str]:
     """The text of every file that this writes, as it is to be."""
     filled = {
         "explanation/paper.md": paper(),
+        "gallery.md": gallery(),
+        "reference/command-line.md": {"commands": command_line()},
+        "reference/components/README.md": {"components": bundle()},
         "explanation/ready-studies.md": {
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },
@@ -113,6 +117,15 @@ def scenarios() -> dict[str, str]:
     }
 
 
+def bundle() -> str:
+    """The table of docs/reference/components/README.md."""
+    rows = (
+        (f"[`{name}`]({name}.md)", import_module(f"{package}.ports").DESCRIPTION)
+        for name, package in components().items()
+    )
+    return _table("FMU", "what it is", rows=rows)
+
+
 def ready() -> str:
     """The table of docs/how-to/studies.md."""
     studies = ((f"`{name}`", read_study(name).title) for name in ready_studies())
@@ -137,9 +150,8 @@ def _index(index: Index) -> tuple[str, str]:
 
 def _section(study: Study) -> str:
     pictures = (
-        f"![{study.title}: {figure}]({('..' / PICTURES / f'{study.name}-{figure}.png').as_posix()})"
-        for figure in study.figures
-        if figure != LABELS
+        f"![{seen(study, figure)}](../{PICTURES}/{picture(study, figure)})"
+        for figure in figures(study)
     )
     command = f"`auv-fmu sweep {study.name}`"
     return "\n\n".join([f"## {study.title}", command, *pictures, study.remark.strip()])

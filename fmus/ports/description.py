@@ -17,6 +17,12 @@ from fmus.ports.port import FAULT, Port, Value
 #: About every component, by the names of the attributes.
 ABOUT = {"author": "auv-fmu", "license": "MIT", "version": __version__}
 
+#: The paper that the components implement.
+PAPER = (
+    "Three-dimensional tracking control of autonomous underwater vehicles with limited torque and "
+    "without velocity sensors"
+)
+
 #: Start, end and step of an experiment when the host names none [s].
 EXPERIMENT = (0.0, 100.0, STEP)
 
@@ -81,13 +87,18 @@ def _literal(value: Value) -> str:
     return f"{value:.16g}" if isinstance(value, float) else str(value)
 
 
+def with_paper(description: str) -> str:
+    """A component's description, and where the numbers of equations come from."""
+    return f'{description}. Equation numbers are from the paper "{PAPER}"'
+
+
 def root_of(version: str, name: str, description: str, **identity: str) -> Element:
     """The root of a description that no other tool has written, with guid or token."""
     said = {
         "fmiVersion": version,
         "modelName": name,
         **identity,
-        "description": description,
+        "description": with_paper(description),
         **ABOUT,
         "generationTool": f"auv-fmu {__version__}",
         "variableNamingConvention": "structured",

@@ -26,6 +26,7 @@ from typing import Any
 from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.behaviour import HOOKS, Behaviour, read_behaviour
+from fmus.ports.description import with_paper
 from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
@@ -70,7 +71,7 @@ def slave_of(
     members: dict[str, Any] = {
         "__module__": ports.__package__,
         "__doc__": ports.DESCRIPTION,
-        "description": ports.DESCRIPTION,
+        "description": with_paper(ports.DESCRIPTION),
         "ports": ports.PORTS,
         "parameter_set": ports.PARAMETERS,
         "group_of": getattr(ports, "GROUP_OF", {}),

@@ -1,4 +1,4 @@
-"""`auv-fmu build`, `new`, `list` and `gains`: build FMUs, and answer without a run."""
+"""`auv-fmu build`, `new` and `gains`: build FMUs, and answer without a run."""
 
 from __future__ import annotations
 
@@ -15,14 +15,12 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     assignments,
-    describe,
 )
-from orchestrator.commands.streams import OK, say, show
+from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
 from orchestrator.runs.request import Files
-from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 
@@ -93,12 +91,6 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     controller.set_defaults(action=_controller)
 
 
-def add_list(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu list`."""
-    describe(parser, "List the scenarios with their titles.", "list")
-    parser.set_defaults(action=_list)
-
-
 def add_gains(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu gains`."""
     describe(
@@ -147,13 +139,6 @@ def _controller(options: argparse.Namespace) -> int:
     show(f"change {script}, then build and run it:")
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
-    return OK
-
-
-def _list(_: argparse.Namespace) -> int:
-    width = max(map(len, names()))
-    for name in names():
-        show(f"{name:{width}}  {read_scenario(name).title}")
     return OK
 
 

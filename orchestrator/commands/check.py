@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 from fmpy.validation import validate_fmu
 
-from orchestrator.commands.options import add_variant, describe
-from orchestrator.commands.streams import BAD_INPUT, OK, show
+from orchestrator.commands.options import add_variant
+from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
 from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary

@@ -16,10 +16,9 @@ from orchestrator.commands.options import (
     add_set,
     add_system,
     assignments,
-    describe,
     read_system,
 )
-from orchestrator.commands.streams import FAILED, OK, say, show
+from orchestrator.commands.streams import FAILED, OK, describe, say, show
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of

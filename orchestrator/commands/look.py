@@ -11,12 +11,11 @@ from orchestrator.commands.options import (
     add_options,
     add_set,
     add_system,
-    describe,
     read_system,
     request,
     status,
 )
-from orchestrator.commands.streams import OK, say, show
+from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart, wanted_columns

@@ -24,7 +24,7 @@ from orchestrator.machine.interrupts import orderly_end
 #: The commands: the module that has `add_COMMAND`, and what they are for.
 COMMANDS = {
     "build": ("build", "build every FMU and the bundle auv.ssp, or a component of your own"),
-    "list": ("build", "list the scenarios"),
+    "list": ("listing", "list the scenarios"),
     "gains": ("build", "check the conditions of Theorems 1 and 2"),
     "run": ("run_command", "run a scenario, a scenario file, an SSP or an FMU"),
     "check": ("check", "validate an FMU, an SSP, a scenario or a study without running it"),

@@ -6,8 +6,8 @@ import argparse
 import os
 from pathlib import Path
 
-from orchestrator.commands.options import add_options, add_out, describe, from_options
-from orchestrator.commands.streams import INTERRUPTED, OK, say, show
+from orchestrator.commands.options import add_options, add_out, from_options
+from orchestrator.commands.streams import INTERRUPTED, OK, describe, say, show
 from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
 from orchestrator.runs.request import Files, Request

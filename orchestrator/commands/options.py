@@ -20,11 +20,6 @@ from orchestrator.system.structure import System
 T = TypeVar("T")
 
 
-def describe(parser: argparse.ArgumentParser, text: str, example: str) -> None:
-    """Say above the options what a command does, and give an example below them."""
-    parser.description, parser.epilog = text, f"Example: auv-fmu {example}"
-
-
 def add_system(parser: argparse.ArgumentParser) -> None:
     """What is run."""
     parser.add_argument(

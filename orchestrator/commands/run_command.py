@@ -16,13 +16,12 @@ from orchestrator.commands.options import (
     add_out,
     add_set,
     add_system,
-    describe,
     from_options,
     read_system,
     request,
     status,
 )
-from orchestrator.commands.streams import say, show
+from orchestrator.commands.streams import describe, say, show
 from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.runs.preparation import prepare, with_companion

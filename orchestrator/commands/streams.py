@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
 from contextlib import suppress
@@ -83,3 +84,8 @@ def _give_up(stream: TextIO, error: OSError) -> None:
     # Where a reader has gone, nobody misses the rest.
     if not isinstance(error, BrokenPipeError):
         say(f"cannot write the output: {error.strerror}")
+
+
+def describe(parser: argparse.ArgumentParser, text: str, example: str) -> None:
+    """Say above the options what a command does, and give an example below them."""
+    parser.description, parser.epilog = text, f"Example: auv-fmu {example}"

@@ -285,7 +285,7 @@ def _number(value: float) -> str:
     return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
 
 
-class _Stored:
+class _OnDisk:
     """Where a result comes from that was read from files."""
 
     def __init__(self, file: Path, record: dict[str, Any]) -> None:
@@ -331,7 +331,7 @@ def read(path: str | Path) -> Result:
     record = read_record(file)
     for changed in changed_files(file) if record else ():
         warnings.warn(f"{changed} was changed since the run wrote it", stacklevel=2)
-    result = Result(_Stored(file, record))
+    result = Result(_OnDisk(file, record))
     header, blocks = stored_rows(file, record)
     result.hold(header, np.concatenate(list(blocks)), ending_in(record))
     return result

@@ -21,6 +21,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
+from orchestrator.runs import SCENARIOS_FOLDER
 from orchestrator.system.names import PortName, file_name, flatten, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import EXACT, finite, type_of, typed
@@ -28,9 +29,6 @@ from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
 _NOT_A_SCENARIO = "not a scenario"
-
-#: Scenarios that come with the bundle.
-SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
 
 #: The name of a scenario that has no file.
 _NAMELESS = "scenario"

@@ -151,8 +151,9 @@ class ScenarioFile(TomlTable):
         "none",
     )
     parameters: dict[str, Any] = entry(
-        "Parameters, and inputs that nothing feeds, as `component.parameter = value`. Names with "
-        'brackets are quoted: `"controller.K1[1]" = 12.0`.',
+        "Parameters, and inputs that nothing feeds, as `component.parameter = value`, or as "
+        "`component.group = [values]` with one for each member. Names with brackets are quoted: "
+        '`"controller.K1[1]" = 12.0`.',
         "the FMUs' own",
     )
     path: PathTable = entry("Waypoints of a PathPlanner, from a table: [see below](#path).", "none")

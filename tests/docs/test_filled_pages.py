@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from jsonschema import Draft202012Validator
 
-from orchestrator.runs import scenario
+from orchestrator import runs
 from orchestrator.studies import study
 from pages import files, filled_in
 from support.markdown import DOCS, blocks
@@ -39,7 +39,7 @@ def validator(kind: str) -> Draft202012Validator:
 
 def ready(kind: str) -> list[str]:
     """The files that come with the program, and those of the page."""
-    folder = {"scenario": scenario.SCENARIOS_FOLDER, "study": study.STUDIES_FOLDER}[kind]
+    folder = {"scenario": runs.SCENARIOS_FOLDER, "study": study.STUDIES_FOLDER}[kind]
     page = DOCS / {"scenario": "reference/scenario-files.md", "study": "how-to/studies.md"}[kind]
     files = [file.read_text(encoding="utf-8") for file in folder.glob("*.toml")]
     return [*files, *(block.text for block in blocks(page, "toml"))]

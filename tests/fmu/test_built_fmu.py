@@ -25,6 +25,8 @@ import fmus
 from support.instances import FmuInstance, unpacked
 from support.settings import EACH, NAMES
 
+ROOT = Path(__file__).parents[2]
+
 each = pytest.mark.parametrize("name", NAMES)
 
 
@@ -227,6 +229,16 @@ def test_page_icon_and_licences_are_inside(dist: Path, name: str):
         name = re.sub(r"\[\d+\]\.", "[1].", variable.name)
         assert f"<code>{name}</code>" in shown
     assert licences.count("Permission is hereby granted") == 2
+
+
+@each
+def test_fmu_names_the_paper_as_the_citation_does(dist: Path, native: Path, name: str):
+    words = " ".join((ROOT / "CITATION.cff").read_text(encoding="utf-8").split())
+    [title] = re.findall(r'paper that it implements, "(.+?)"\.', words)
+    for path in (dist / f"{name}.fmu", native / f"{name}.fmu"):
+        assert title in fmpy.read_model_description(path).description
+        with zipfile.ZipFile(path) as archive:
+            assert title in archive.read("documentation/index.html").decode()
 
 
 def test_fmus_are_small(dist: Path):

@@ -225,7 +225,7 @@ CALLS: dict[tuple[str, str], Callable[[Host], Status]] = {
     ("fmi3SetFloat64", "the time"): numbers("fmi3SetFloat64", 1, "time"),
     ("fmi3GetFloat64", "more values than references"): numbers("fmi3GetFloat64", 2),
     ("fmi3SetInt32", "fewer values than references"): numbers("fmi3SetInt32", 0),
-    ("fmi3DoStep", "NULL for what is told"): lambda host: call(
+    ("fmi3DoStep", "NULL for an output argument"): lambda host: call(
         host, "fmi3DoStep", c_double(0.0), c_double(H), c_bool(True), None, None, None, None
     ),
 }

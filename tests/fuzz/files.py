@@ -47,8 +47,8 @@ from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import Plan
+from orchestrator.runs import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.scenario import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 

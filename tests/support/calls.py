@@ -385,7 +385,7 @@ def _odd_boolean(draw: Draw) -> Arguments:
 
 
 for _case_name, _text in (
-    ("a text that is no choice", "sigmoid"),
+    ("a text that is not a choice", "sigmoid"),
     ("a text of 100,000 characters", "x" * MANY),
     ("a text that is not UTF-8", f"ta{NOT_UTF_8}nh"),
     ("a text that is NULL", None),
@@ -510,7 +510,7 @@ _case("fmi2SetFMUstate", "a state that was serialised")(
     lambda draw: {"bytes of": draw.any_of(draw.own), "change": None}
 )
 for _case_name, _change in (
-    ("bytes that are no state", "noise"),
+    ("bytes that are not a state", "noise"),
     ("bytes that were cut off", "cut"),
     ("bytes that were changed", "changed"),
     ("values that no run leads to, checksum and all", "impossible"),
@@ -538,7 +538,7 @@ _case("fmi2GetFMUstate", "NULL")(lambda draw: {"null": True})
 _case("fmi2DeSerializeFMUstate", "bytes of a state")(
     lambda draw: {"bytes of": draw.any_of(draw.own)}
 )
-_case("fmi2DeSerializeFMUstate", "bytes that are none, refused when they are set")(
+_case("fmi2DeSerializeFMUstate", "bytes that are not a state, refused when they are set")(
     lambda draw: {"bytes": draw.random.choice((b"[" * 5000, b"\xff\x00", b"{}", b"null"))}
 )
 _case("fmi2DeSerializeFMUstate", "n = 0")(lambda draw: {"bytes": b""})

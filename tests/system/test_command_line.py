@@ -14,8 +14,8 @@ from fmpy.util import read_csv
 from orchestrator.commands.main import main
 from orchestrator.machine.cache import users_folder
 from orchestrator.machine.ledger import LEDGER
+from orchestrator.runs import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs import bundle
-from orchestrator.runs.scenario import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.study import STUDIES_FOLDER as STUDIES
 from support.texts import mentions, tells
@@ -214,9 +214,11 @@ def test_command_is_installed(workplace):
 #: Runs the command line and answers which of some modules it has imported.
 _IMPORTED = """
 import sys
+from contextlib import suppress
 from orchestrator.commands.main import main
 *arguments, unwanted = sys.argv[1:]
-main(arguments)
+with suppress(SystemExit):
+    main(arguments)
 print(sorted(sys.modules.keys() & {*unwanted.split(",")}), file=sys.stderr)
 """
 
@@ -228,10 +230,12 @@ print(sorted(sys.modules.keys() & {*unwanted.split(",")}), file=sys.stderr)
         ("check fig4", "matplotlib"),
         ("check PdController.fmu", "matplotlib,pydantic"),
         ("check study.toml", "matplotlib"),
-        ("list", "matplotlib"),
+        ("list", "fmpy,matplotlib,numpy,pydantic"),
+        ("--help", "fmpy,matplotlib,numpy,pydantic"),
+        ("--version", "fmpy,matplotlib,numpy,pydantic"),
     ],
 )
-def test_what_draws_nothing_does_not_wait_for_matplotlib(native, workplace, arguments, unwanted):
+def test_commands_do_not_wait_for_what_they_do_not_need(native, workplace, arguments, unwanted):
     shutil.copy(native / "PdController.fmu", workplace)
     shutil.copy(STUDIES / "attraction.toml", "study.toml")
     process = subprocess.run(

@@ -1,6 +1,6 @@
 // The box around a scene: grid lines on its far walls, and numbers along its near edges.
 
-import { type Box, ticks, type Vector } from "./space";
+import { type Box, extents, ticks, type Vector } from "./space";
 
 /** A number, or the title of an axis, at a place in the scene. */
 export interface Label {
@@ -22,9 +22,9 @@ export interface Axis {
   reversed: boolean;
 }
 
-/** How far outside the box numbers and titles stand, as shares of its largest extent. */
-const NUMBER = 0.055;
-const TITLE = 0.16;
+/** How far outside the box numbers and titles stand [px]. */
+const NUMBER = 18;
+const TITLE = 48;
 
 /** What is written along the axes as they are drawn: to the right, up, and to the viewer. */
 export function axesOf(zUp: boolean): readonly [Axis, Axis, Axis] {
@@ -45,15 +45,17 @@ export function axesOf(zUp: boolean): readonly [Axis, Axis, Axis] {
  * Grid and labels for an eye that looks from above.
  *
  * @param back direction from the middle to the eye.
+ * @param pixel the size of a pixel in the middle of the scene.
  * @param leftmost of two places, the one further to the left on the screen.
  */
 export function grid(
   box: Box,
   axes: readonly [Axis, Axis, Axis],
   back: Vector,
+  pixel: number,
   leftmost: (a: Vector, b: Vector) => Vector,
 ): Grid {
-  const largest = Math.max(...box.high.map((high, k) => high - box.low[k]));
+  const [largest] = extents(box);
   const near = back.map((b, k) => (b > 0 ? box.high[k] : box.low[k])) as Vector;
   const far = back.map((b, k) => (b > 0 ? box.low[k] : box.high[k])) as Vector;
   far[1] = box.low[1];
@@ -74,16 +76,16 @@ export function grid(
         lines.push(...from, ...to);
       }
     }
-    const outward = (share: number): Vector => {
+    const outward = (distance: number): Vector => {
       const at: Vector = [near[0], box.low[1], near[2]];
       if (k === 1) return at;
       const across = 2 - k;
-      at[across] += Math.sign(back[across]) * share * largest;
+      at[across] += Math.sign(back[across]) * distance * pixel;
       return at;
     };
     const corner = leftmost([far[0], box.low[1], near[2]], [near[0], box.low[1], far[2]]);
-    const place = (mark: number, share: number): Vector => {
-      const at: Vector = k === 1 ? [...corner] : outward(share);
+    const place = (mark: number, distance: number): Vector => {
+      const at: Vector = k === 1 ? [...corner] : outward(distance);
       at[k] = mark;
       return at;
     };
@@ -96,7 +98,7 @@ export function grid(
         isTitle: false,
       });
     }
-    const middle = k === 1 ? box.high[1] + NUMBER * largest : (box.low[k] + box.high[k]) / 2;
+    const middle = k === 1 ? box.high[1] + NUMBER * pixel : (box.low[k] + box.high[k]) / 2;
     labels.push({ at: place(middle, TITLE), text: axes[k].title, axis: k, isTitle: true });
   }
   return { lines, labels };

@@ -16,7 +16,7 @@ const TIME_AXIS = 22;
 const VALUE_AXIS = 46;
 
 const DASHES: Record<Style, number[]> = { first: [], second: [6, 3], reference: [] };
-const WIDTHS: Record<Style, number> = { first: 1.5, second: 1.5, reference: 1.2 };
+const WIDTHS: Record<Style, number> = { first: 1.5, second: 1.5, reference: 1.5 };
 
 /** Share of a limit from which on it is in sight. */
 const NEAR = 0.5;
@@ -46,13 +46,14 @@ class Chart {
   #named = false;
   #stale = false;
   #visible = false;
+  #time = 0;
 
   constructor(panel: Panel, scrub: (time: number) => void) {
     this.#panel = panel;
     this.root = document.createElement("figure");
     this.root.className = "chart";
     const caption = document.createElement("figcaption");
-    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">${panel.unit}</span></span>`;
+    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">[${panel.unit}]</span></span>`;
     const readout = document.createElement("span");
     readout.className = "readout";
     readout.setAttribute("aria-hidden", "true");
@@ -99,7 +100,7 @@ class Chart {
     return {
       width: 280,
       height: HEIGHT,
-      padding: [8, 8, 0, 0],
+      padding: [8, 13, 0, 0],
       legend: { show: false },
       cursor: { y: false, drag: { x: false, y: false }, bind: silent(), points: { size: 6 } },
       scales: {
@@ -112,18 +113,21 @@ class Chart {
           ...axis,
           size: VALUE_AXIS,
           space: 26,
-          values: (_, found) => found.map((value) => Number(value.toPrecision(6)).toString().replace("-", "−")),
+          values: (_, found) =>
+            found.map((value) => Number(value.toPrecision(6)).toString().replace("-", "−")),
         },
       ],
       series: [
         {},
-        ...this.#panel.styles.map((style, k): uPlot.Series => ({
-          label: this.#panel.names[k],
-          stroke: stroke(PROPERTIES[style]),
-          width: WIDTHS[style],
-          dash: DASHES[style],
-          points: { show: false },
-        })),
+        ...this.#panel.styles.map(
+          (style, k): uPlot.Series => ({
+            label: this.#panel.names[k],
+            stroke: stroke(PROPERTIES[style]),
+            width: WIDTHS[style],
+            dash: DASHES[style],
+            points: { show: false },
+          }),
+        ),
       ],
       hooks: { drawClear: [() => this.#underlay()], draw: [() => this.#overlay()] },
     };
@@ -169,8 +173,6 @@ class Chart {
       ctx.stroke();
     }
     ctx.setLineDash([]);
-    ctx.font = `${11 * ratio}px system-ui, sans-serif`;
-    ctx.fillStyle = property("--muted");
     for (const { from, label } of this.#marks) {
       const x = Math.round(this.#plot.valToPos(from, "x", true)) + 0.5;
       if (!(x >= bbox.left && x <= bbox.left + bbox.width)) continue;
@@ -178,11 +180,25 @@ class Chart {
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      if (!this.#named) continue;
-      const isRight = x + ctx.measureText(label).width + 6 * ratio > bbox.left + bbox.width;
-      ctx.textAlign = isRight ? "right" : "left";
-      ctx.fillText(label, x + (isRight ? -4 : 4) * ratio, bbox.top + 11 * ratio);
+      if (this.#named) this.#name(label, x);
     }
+    ctx.restore();
+  }
+
+  /** Writes the name of an event beside its line. */
+  #name(label: string, x: number): void {
+    const { ctx, bbox } = this.#plot;
+    const ratio = uPlot.pxRatio;
+    ctx.save();
+    ctx.font = `${11 * ratio}px system-ui, sans-serif`;
+    ctx.fillStyle = property("--text");
+    ctx.strokeStyle = property("--surface");
+    ctx.lineWidth = 3 * ratio;
+    const isRight = x + ctx.measureText(label).width + 8 * ratio > bbox.left + bbox.width;
+    ctx.textAlign = isRight ? "right" : "left";
+    const [left, top] = [x + (isRight ? -4 : 4) * ratio, bbox.top + bbox.height - 6 * ratio];
+    ctx.strokeText(label, left, top);
+    ctx.fillText(label, left, top);
     ctx.restore();
   }
 
@@ -200,6 +216,7 @@ class Chart {
     this.#stale = false;
     const empty = new Float64Array(0);
     this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
+    this.show(this.#time);
   }
 
   /** Colours have changed. */
@@ -208,12 +225,15 @@ class Chart {
   }
 
   show(time: number): void {
+    this.#time = time;
     if (!this.#visible || this.root.hidden || this.#stale) return;
     const left = this.#plot.valToPos(time, "x");
     this.#plot.setCursor({ left: Number.isFinite(left) ? left : -10, top: 0 }, false);
     const row = rowAt(this.#lines.time, time);
     this.#lines.values.forEach((values, k) => {
-      this.#values[k].textContent = values?.length ? short(values[Math.min(row, values.length - 1)]) : "";
+      this.#values[k].textContent = values?.length
+        ? short(values[Math.min(row, values.length - 1)])
+        : "";
     });
   }
 }
@@ -222,8 +242,13 @@ class Chart {
 function silent(): uPlot.Cursor.Bind {
   const off = () => null;
   return {
-    mousedown: off, mouseup: off, click: off, dblclick: off,
-    mousemove: off, mouseleave: off, mouseenter: off,
+    mousedown: off,
+    mouseup: off,
+    click: off,
+    dblclick: off,
+    mousemove: off,
+    mouseleave: off,
+    mouseenter: off,
   };
 }
 
@@ -272,7 +297,9 @@ export class Charts {
 
   set(lines: readonly (readonly Lines[])[], marks: readonly Mark[]): void {
     this.#charts.forEach((charts, section) => {
-      charts.forEach((chart, k) => chart.set(lines[section][k], marks, section === 0 && k === 0));
+      charts.forEach((chart, k) => {
+        chart.set(lines[section][k], marks, section === 0 && k === 0);
+      });
       const parent = charts[0].root.closest("section");
       if (parent) parent.hidden = charts.every(({ root }) => root.hidden);
     });

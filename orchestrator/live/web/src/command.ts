@@ -1,15 +1,16 @@
-// Settings as what a user types: `auv-fmu run`, and a file of events where they are changed.
+// Settings as what a user types: `auv-fmu run`, and the files that it needs.
 
 import { eventsOf, hasOtherEvents, type Settings } from "./settings";
 import type { Action, EventData, LoopData, Preset, Value } from "./types";
 
-/** Marks the end of the file of events in the shell. */
-const END = "EVENTS";
+/** Marks the end of a file in the shell. */
+const END = "END";
 
-/** A command that makes the rows of a loop; a loop without a scenario has none. */
+/** A command that makes the rows of a loop. */
 export function commandLine(settings: Settings, preset: Preset, loop: LoopData): string {
+  if (loop.scenario === undefined) return ownScenario(settings, preset, loop);
   const names = new Set(loop.parameters.map(({ name }) => name));
-  const words = ["auv-fmu", "run", loop.scenario ?? preset.name];
+  const words = ["auv-fmu", "run", loop.scenario];
   for (const [name, value] of Object.entries(settings.values)) {
     if (names.has(name)) words.push("--set", quoted(`${name}=${value}`));
   }
@@ -17,8 +18,36 @@ export function commandLine(settings: Settings, preset: Preset, loop: LoopData):
   if (settings.step !== preset.step) words.push("--step", String(settings.step));
   if (!hasOtherEvents(settings, preset)) return words.join(" ");
   const file = `${preset.name}-events.toml`;
-  const text = toToml(eventsOf(settings, loop));
-  return `cat > ${file} <<'${END}'\n${text}${END}\n${[...words, "--events", file].join(" ")}`;
+  const events = toToml(eventsOf(settings, loop));
+  return written(file, events || "events = []\n", [...words, "--events", file]);
+}
+
+/** The same for a loop that is only there to be compared: a scenario file of its own. */
+function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string {
+  const file = `${preset.name}-${loop.label}.toml`;
+  const components = Object.entries(loop.components).map(
+    ([name, type]) => `${name} = ${literal(type)}\n`,
+  );
+  const isPd = loop.components.controller === "PdController";
+  const parameters = loop.parameters.flatMap(({ name, value, default: own }) => {
+    const wanted = settings.values[name] ?? value;
+    return wanted === own ? [] : [`"${name}" = ${literal(wanted)}\n`];
+  });
+  const text = [
+    `title = ${literal(`${preset.name} with the ${loop.label} controller`)}\n`,
+    `stop_time = ${literal(settings.stopTime)}\n`,
+    `step = ${literal(settings.step)}\n`,
+    `\n[components]\n${components.join("")}`,
+    isPd ? '\n[wires]\n"controller.dy" = "plant.dy"\n' : "",
+    `\n[parameters]\n${parameters.join("")}`,
+    `\n${toToml(eventsOf(settings, loop))}`,
+  ].join("");
+  return written(file, text.trimEnd().concat("\n"), ["auv-fmu", "run", file]);
+}
+
+/** Writes a file in the shell, and then runs a command. */
+function written(file: string, text: string, command: readonly string[]): string {
+  return `cat > ${file} <<'${END}'\n${text}${END}\n${command.join(" ")}`;
 }
 
 /** A word of a shell's command line. */
@@ -26,9 +55,8 @@ function quoted(word: string): string {
   return /^[\w.=+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
-/** A file of events; without any it says so. */
+/** Events as a scenario file has them. */
 export function toToml(events: readonly EventData[]): string {
-  if (events.length === 0) return "events = []\n";
   return events.map(toTable).join("\n");
 }
 

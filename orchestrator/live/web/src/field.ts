@@ -34,6 +34,8 @@ export function explained(parameter: Parameter): string {
 export class Field {
   readonly element: HTMLInputElement | HTMLSelectElement;
   readonly parameter: Parameter;
+  #shown: Value | undefined;
+  #wrong = "";
 
   constructor(parameter: Parameter, label: string, changed: Changed) {
     this.parameter = parameter;
@@ -56,6 +58,7 @@ export class Field {
     this.element.addEventListener("change", () => {
       const value = this.#entered();
       this.invalid = value === undefined ? `${name}: not a number` : "";
+      this.#shown = undefined;
       if (value !== undefined) changed({ [name]: value });
     });
   }
@@ -68,6 +71,9 @@ export class Field {
 
   set value(value: Value) {
     const { element } = this;
+    // Nearly all of them stay as they are while a slider moves.
+    if (value === this.#shown && !this.#wrong) return;
+    this.#shown = value;
     if (element instanceof HTMLInputElement && element.type === "checkbox") {
       element.checked = value === true;
     } else if (document.activeElement !== element || this.#entered() !== value) {
@@ -76,8 +82,17 @@ export class Field {
     element.classList.toggle("changed", value !== this.parameter.value);
   }
 
+  /** Marks it where a message names its parameter. */
+  refuse(message: string): boolean {
+    const isNamed = names(message, this.parameter.name);
+    this.invalid = isNamed ? message : "";
+    return isNamed;
+  }
+
   /** Why the value cannot be used; empty: it can. */
   set invalid(why: string) {
+    if (why === this.#wrong) return;
+    this.#wrong = why;
     this.element.setAttribute("aria-invalid", String(why !== ""));
     this.element.title = why || explained(this.parameter);
   }
@@ -118,7 +133,7 @@ export class SliderRow {
     this.#slider = document.createElement("input");
     this.#slider.type = "range";
     this.#slider.max = String(POSITIONS);
-    this.#slider.step = String(row.scale.whole ? POSITIONS / (row.scale.high - row.scale.low) : 10);
+    this.#slider.step = String(stepOf(row));
     this.#slider.setAttribute("aria-label", spoken);
     this.#slider.title = explained(parameter);
     this.#slider.dataset.names = row.names.join(" ");
@@ -141,8 +156,8 @@ export class SliderRow {
     this.root.append(head, this.#slider, ...(parameters.length > 1 ? [fields] : []), this.#error);
   }
 
-  show(valueOf: (name: string) => Value): void {
-    const values = this.fields.map(({ parameter }) => valueOf(parameter.name));
+  show(current: (parameter: Parameter) => Value): void {
+    const values = this.fields.map(({ parameter }) => current(parameter));
     this.fields.forEach((field, k) => {
       field.value = values[k];
     });
@@ -158,12 +173,10 @@ export class SliderRow {
   }
 
   /** Marks it where a message names one of its parameters. */
-  refuse(message: string): boolean {
-    const named = this.fields.filter(({ parameter }) => names(message, parameter.name));
-    for (const field of this.fields) field.invalid = named.includes(field) ? message : "";
-    this.#error.hidden = named.length === 0;
-    this.#error.textContent = named.length ? message : "";
-    return named.length > 0;
+  refuse(message: string): void {
+    const isNamed = this.fields.map((field) => field.refuse(message)).includes(true);
+    this.#error.hidden = !isNamed;
+    this.#error.textContent = isNamed ? message : "";
   }
 }
 

@@ -7,8 +7,14 @@ const AXES = ["x", "y", "z"];
 /** T_L of section 4.2 [s]. */
 const LAST_SECONDS = 5;
 
+/** What has been made of a run: the page asks more than once. */
+const points = new WeakMap<Result, Float64Array[]>();
+const errors = new WeakMap<Result, Float64Array[]>();
+
 /** The control point without noise, a coordinate each [m]: (9) on the vehicle's posture. */
 export function controlPoint(result: Result): Float64Array[] {
+  const known = points.get(result);
+  if (known !== undefined) return known;
   const [phi, theta, psi] = ["phi", "theta", "psi"].map((name) =>
     result.column(`plant.eta.${name}`),
   );
@@ -20,16 +26,21 @@ export function controlPoint(result: Result): Float64Array[] {
     y[k] += ell * Math.sin(psi[k]) * Math.cos(theta[k]);
     z[k] -= ell * Math.sin(theta[k]);
   }
+  points.set(result, [x, y, z]);
   return [x, y, z];
 }
 
 /** e = y - y_d with the true control point [m]; undefined: the loop has no reference. */
 export function trackingError(result: Result): Float64Array[] | undefined {
   if (!result.has("planner.y_d.x")) return undefined;
-  return controlPoint(result).map((y, i) => {
-    const wanted = result.column(`planner.y_d.${AXES[i]}`);
-    return y.map((value, k) => value - wanted[k]);
-  });
+  const error =
+    errors.get(result) ??
+    controlPoint(result).map((y, i) => {
+      const wanted = result.column(`planner.y_d.${AXES[i]}`);
+      return y.map((value, k) => value - wanted[k]);
+    });
+  errors.set(result, error);
+  return error;
 }
 
 /** Lower and upper limits of an actuator. */

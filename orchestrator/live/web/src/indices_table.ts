@@ -2,6 +2,7 @@
 
 import type { IndexData, Metrics } from "./types";
 
+/** A controller in the table. */
 export interface Measured {
   readonly label: string;
   /** Its place among the controllers, which gives it its colour. */
@@ -14,12 +15,13 @@ function printed(unit: string): string {
   return unit.replace("s^1/2", "√s").replaceAll(".", "·");
 }
 
-function number(value: number | undefined): string {
+/** Four digits, as the terminal has them, and no zeros at the end. */
+export function fourDigits(value: number | undefined): string {
   if (value === undefined || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
-  const text = size >= 1e6 || (size > 0 && size < 1e-4) ? value.toExponential(3) : value.toPrecision(4);
-  // As the terminal prints them: four digits, and no zeros at the end.
-  return String(Number(text)).replace("-", "−");
+  const isShort = size === 0 || (size >= 1e-4 && size < 1e5);
+  const text = isShort ? String(Number(value.toPrecision(4))) : value.toExponential(3);
+  return text.replace("-", "−").replace("e+", "e");
 }
 
 function cell(kind: "td" | "th", html: string, scope?: string): HTMLTableCellElement {
@@ -29,32 +31,52 @@ function cell(kind: "td" | "th", html: string, scope?: string): HTMLTableCellEle
   return made;
 }
 
-export function fillIndices(
-  table: HTMLTableElement,
-  indices: readonly IndexData[],
-  measured: readonly Measured[],
-): void {
-  table.tBodies[0].replaceChildren(
-    ...indices
-      .filter(({ name }) => measured.some(({ metrics }) => metrics[name]))
-      .flatMap(({ name, label, units, meaning }) => {
-        const found = [...new Set(Object.values(units).filter(Boolean))].map(printed).join(", ");
-        const heading = document.createElement("tr");
-        heading.className = "index";
-        heading.title = meaning;
-        heading.append(
-          cell("th", `${label}${found ? ` <span class="unit">${found}</span>` : ""}`, "rowgroup"),
-          ...Object.keys(units).map((member) => cell("th", `<i>${member}</i>`, "col")),
-        );
-        const rows = measured.map(({ label: name_, place, metrics }) => {
-          const row = document.createElement("tr");
-          row.append(
-            cell("th", `<span class="swatch of-${place}"></span>${name_}`, "row"),
-            ...Object.keys(units).map((_, k) => cell("td", number(metrics[name]?.[k]))),
-          );
-          return row;
-        });
-        return [heading, ...rows];
-      }),
-  );
+export class IndicesTable {
+  readonly #body: HTMLTableSectionElement;
+  readonly #indices: readonly IndexData[];
+  #shown = "";
+  #cells: HTMLElement[] = [];
+
+  constructor(table: HTMLTableElement, indices: readonly IndexData[]) {
+    this.#body = table.tBodies[0];
+    this.#indices = indices;
+  }
+
+  show(measured: readonly Measured[]): void {
+    const there = this.#indices.filter(({ name }) => measured.some(({ metrics }) => metrics[name]));
+    const names = [...measured.map(({ label }) => label), ...there.map(({ name }) => name)];
+    // While a slider moves only numbers change.
+    if (names.join() !== this.#shown) this.#build(there, measured);
+    this.#shown = names.join();
+    const values = there.flatMap(({ name, units }) =>
+      measured.flatMap(({ metrics }) => Object.keys(units).map((_, k) => metrics[name]?.[k])),
+    );
+    values.forEach((value, k) => {
+      this.#cells[k].textContent = fourDigits(value);
+    });
+  }
+
+  #build(there: readonly IndexData[], measured: readonly Measured[]): void {
+    this.#cells = [];
+    const rows = there.flatMap(({ label, units, meaning }) => {
+      const found = [...new Set(Object.values(units).filter(Boolean))].map(printed).join(", ");
+      const heading = document.createElement("tr");
+      heading.className = "index";
+      heading.title = meaning;
+      heading.append(
+        cell("th", `${label}${found ? ` <span class="unit">${found}</span>` : ""}`, "rowgroup"),
+        ...Object.keys(units).map((member) => cell("th", `<i>${member}</i>`, "col")),
+      );
+      const values = measured.map(({ label: controller, place }) => {
+        const row = document.createElement("tr");
+        const cells = Object.keys(units).map(() => cell("td", ""));
+        this.#cells.push(...cells);
+        row.append(cell("th", `<span class="swatch of-${place}"></span>`, "row"), ...cells);
+        row.cells[0].append(controller);
+        return row;
+      });
+      return [heading, ...values];
+    });
+    this.#body.replaceChildren(...rows);
+  }
 }

@@ -1,2 +1,27 @@
 // The page: it reads what Python has put into it, runs the preset that is opened, and draws it.
-export {};
+
+import { Engine } from "./engine";
+import { Page } from "./page";
+import type { Data } from "./types";
+
+/** What an element holds: gzip, in base64. */
+async function unpacked(id: string): Promise<ArrayBuffer> {
+  const text = atob(document.getElementById(id)?.textContent?.trim() ?? "");
+  const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  return new Response(stream).arrayBuffer();
+}
+
+async function start(): Promise<void> {
+  const [data, module] = await Promise.all([unpacked("data"), unpacked("module")]);
+  const found: Data = JSON.parse(new TextDecoder().decode(data));
+  new Page(found, await Engine.load(module, found));
+}
+
+start().catch((error: unknown) => {
+  const note = document.getElementById("error");
+  if (!note) throw error;
+  note.hidden = false;
+  note.textContent = `The page cannot start: ${error instanceof Error ? error.message : error}`;
+  throw error;
+});

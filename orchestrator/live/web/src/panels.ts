@@ -1,5 +1,6 @@
 // What the charts show of a run.
 
+import { limits, trackingError } from "./engine";
 import type { LoopData, Result } from "./types";
 
 /** Colour and style of a line: of a controller, or of what is true or wanted. */
@@ -61,8 +62,8 @@ export function sections(labels: readonly string[]): readonly Section[] {
       title: "Velocity of the control point",
       note: "the observer's estimate, and the true one",
       panels: AXES.map((axis) => ({
-        styles: ["reference", "first"],
-        names: ["true", "estimated"],
+        styles: ["first", "reference"],
+        names: ["estimated", "true"],
         title: `velocity in <i>${axis}</i>`,
         unit: "m/s",
       })),
@@ -90,7 +91,7 @@ export function lines(shown: readonly (Shown | undefined)[]): readonly (readonly
   const rows = Math.max(0, (longest?.rows ?? 0) - 1);
   /** Times at which steps begin: the row at whose end they stand has their signals. */
   const starts = time.subarray(0, rows);
-  const errors = shown.map((one) => one && errorsOf(one.result));
+  const errors = shown.map((one) => one && trackingError(one.result));
   const steps = (result: Result | undefined, name: string) =>
     result?.has(name) ? result.column(name).subarray(1) : undefined;
   const observed = shown.find((one) => one?.result.has("controller.dy_hat.x"))?.result;
@@ -98,14 +99,13 @@ export function lines(shown: readonly (Shown | undefined)[]): readonly (readonly
     AXES.map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
     Object.keys(ACTUATORS).map((member) => {
       const values = shown.map((one) => steps(one?.result, `plant.tau.${member}`));
-      const limits = limitsOf(shown, member);
-      return { time: starts, values, ...(limits ? { limits } : {}) };
+      return { time: starts, values, ...(longest ? { limits: limits(longest, member) } : {}) };
     }),
     AXES.map((axis) => ({
       time: starts,
       values: [
-        observed?.column(`plant.dy.${axis}`).subarray(0, rows),
         steps(observed, `controller.dy_hat.${axis}`),
+        observed?.column(`plant.dy.${axis}`).subarray(0, rows),
       ],
     })),
     THETA.map((_, k) => ({
@@ -115,43 +115,12 @@ export function lines(shown: readonly (Shown | undefined)[]): readonly (readonly
   ];
 }
 
-function limitsOf(shown: readonly (Shown | undefined)[], member: string) {
-  const values = shown.find((one) => one)?.result.parameters;
-  const [low, high] = [values?.[`plant.tau_min.${member}`], values?.[`plant.tau_max.${member}`]];
-  return typeof low === "number" && typeof high === "number" ? ([low, high] as const) : undefined;
-}
-
-/** y - y_d with the true control point, along each axis; none without a reference. */
-function errorsOf(result: Result): Float64Array[] | undefined {
-  if (!result.has("planner.y_d.x")) return undefined;
-  const path = controlPoint(result);
-  return AXES.map((axis, k) => {
-    const wanted = result.column(`planner.y_d.${axis}`);
-    return wanted.map((value, row) => path[3 * row + k] - value);
-  });
-}
-
-/** The true control point in each row: three numbers [m]. */
-export function controlPoint(result: Result): Float64Array {
-  const [x, y, z] = AXES.map((axis) => result.column(`plant.eta.${axis}`));
-  const [theta, psi] = ["theta", "psi"].map((angle) => result.column(`plant.eta.${angle}`));
-  const ell = Number(result.parameters["plant.ell"]);
-  const path = new Float64Array(3 * x.length);
-  for (let row = 0; row < x.length; row++) {
-    const ahead = ell * Math.cos(theta[row]);
-    path[3 * row] = x[row] + ahead * Math.cos(psi[row]);
-    path[3 * row + 1] = y[row] + ahead * Math.sin(psi[row]);
-    path[3 * row + 2] = z[row] - ell * Math.sin(theta[row]);
-  }
-  return path;
-}
-
 /** Columns beside each other: as many numbers for each row. */
-export function interleaved(result: Result, names: readonly string[]): Float64Array {
-  const columns = names.map((name) => result.column(name));
-  const values = new Float64Array(names.length * result.rows);
+export function interleaved(columns: readonly Float64Array[]): Float64Array {
+  const width = columns.length;
+  const values = new Float64Array(width * columns[0].length);
   columns.forEach((column, k) => {
-    for (let row = 0; row < column.length; row++) values[names.length * row + k] = column[row];
+    for (let row = 0; row < column.length; row++) values[width * row + k] = column[row];
   });
   return values;
 }

@@ -20,7 +20,7 @@ const FINE = 10;
 export class Player {
   readonly #bar: Bar;
   readonly #show: (time: number) => void;
-  #end = 1;
+  #end = 0;
   #time = 0;
   #started: { time: number; now: number } | undefined;
 
@@ -50,6 +50,8 @@ export class Player {
   /** Another run: its end [s], and what happens in it. */
   set(end: number, marks: readonly Mark[]): void {
     const isOther = end !== this.#end;
+    // At rest a run is shown as a whole.
+    const isAtEnd = this.#time >= this.#end && !this.isPlaying;
     this.#end = end;
     this.#bar.slider.max = String(Math.round(end * FINE));
     this.#bar.marks.replaceChildren(
@@ -66,7 +68,7 @@ export class Player {
       const speed = speeds.find((s) => end / s <= PATIENCE) ?? speeds.at(-1);
       this.#bar.speed.value = String(speed);
     }
-    if (this.#time > end) this.#time = end;
+    if (isAtEnd || this.#time > end) this.#time = end;
     this.#restart();
     this.#tell();
   }

@@ -45,7 +45,11 @@ const posture = (component: string, low: number, high: number): Row[] => [
     row(`<i>${axis}</i>`, `${component}.eta0.${axis}`, from(low, high)),
   ),
   ...Object.entries(EULER).map(([angle, letter]) =>
-    row(letter, `${component}.eta0.${angle}`, from(angle === "psi" ? -3.14 : -1.5, angle === "psi" ? 3.14 : 1.5)),
+    row(
+      letter,
+      `${component}.eta0.${angle}`,
+      from(angle === "psi" ? -3.14 : -1.5, angle === "psi" ? 3.14 : 1.5),
+    ),
   ),
 ];
 
@@ -98,9 +102,11 @@ export const GROUPS: readonly Group[] = [
       row("<i>A<sub>f</sub></i>", "disturbance.A_f", from(0, 20)),
       row("<i>A<sub>d</sub></i>", "disturbance.A_d", from(0, 40)),
       row("&omega;<sub><i>d</i></sub>", "disturbance.omega_d", from(0, 2)),
-      ...[["x", "north"], ["y", "east"], ["z", "down"]].map(([axis, way]) =>
-        row(`current ${way}`, `plant.current.${axis}`, from(-1, 1)),
-      ),
+      ...[
+        ["x", "north"],
+        ["y", "east"],
+        ["z", "down"],
+      ].map(([axis, way]) => row(`current ${way}`, `plant.current.${axis}`, from(-1, 1))),
     ],
   },
 ];

@@ -8,7 +8,7 @@ import {
   boxOf,
   distanceFor,
   drawn,
-  extent,
+  extents,
   eyeAxes,
   rotation,
   type Vector,
@@ -38,9 +38,13 @@ export interface Shown {
 /** Half of the angle of view [rad]. */
 const HALF = 0.3;
 
-/** Length of the drawn vehicle as a share of the largest extent of the paths, and times ell. */
-const SHARE = 0.14;
+/** Least length of the drawn vehicle: shares of the extents of the paths, and times ell. */
+const OF_LARGEST = 0.06;
+const OF_SECOND = 0.18;
 const LENGTH = 2;
+
+/** Room for the numbers around the box [px]. */
+const MARGIN = 25;
 
 /** Numbers along an axis that are closer together than this are left out [px]. */
 const CROWDED = 24;
@@ -139,10 +143,11 @@ export class Scene {
     const seen = shown.tracks.flatMap((track) => (track ? [track.path] : []));
     const held = shown.reference ? [...seen, shown.reference] : seen;
     const tight = boxOf(held, 0);
-    this.#length = Math.max(SHARE * extent(tight), LENGTH * shown.ell);
+    const [largest, second] = extents(tight);
+    this.#length = Math.max(OF_LARGEST * largest, OF_SECOND * second, LENGTH * shown.ell);
     const box = boxOf(held, 0.6 * this.#length);
     this.#box = this.#drawnBox(box);
-    this.#scale = 1 / extent(this.#box);
+    this.#scale = 1 / extents(this.#box)[0];
     this.#middle = this.#box.low.map((low, k) => (low + this.#box.high[k]) / 2) as Vector;
     this.#rows = 1;
     this.#paths.forEach((line, k) => {
@@ -241,8 +246,8 @@ export class Scene {
     const { view, zoom } = this.#turning;
     const [right, up, back] = eyeAxes(view);
     const aspect = width / height;
-    // Room for the numbers around the box.
-    const distance = (1.13 * distanceFor(unit, view, HALF, aspect)) / zoom;
+    const share = Math.max(0.5, 1 - (2 * MARGIN) / height);
+    const distance = distanceFor(unit, view, HALF, aspect) / share / zoom;
     this.#camera.position.set(back[0] * distance, back[1] * distance, back[2] * distance);
     this.#camera.lookAt([0, 0, 0]);
     const onScreen = (place: Vector): [number, number] => {
@@ -254,7 +259,8 @@ export class Scene {
         (0.5 - (0.5 * along(up)) / reach) * height,
       ];
     };
-    const { lines, labels } = grid(this.#box, axesOf(this.#shown.zUp), back, (a, b) =>
+    const pixel = (2 * distance * Math.tan(HALF)) / height / this.#scale;
+    const { lines, labels } = grid(this.#box, axesOf(this.#shown.zUp), back, pixel, (a, b) =>
       onScreen(a)[0] <= onScreen(b)[0] ? a : b,
     );
     this.#grid.place(lines.map((value, i) => (value - this.#middle[i % 3]) * this.#scale));

@@ -56,8 +56,9 @@ export function boxOf(sets: readonly Float64Array[], margin: number): Box {
   return { low, high };
 }
 
-export function extent(box: Box): number {
-  return Math.max(...box.high.map((high, k) => high - box.low[k]));
+/** How far a box reaches along its axes, the farthest first. */
+export function extents({ low, high }: Box): number[] {
+  return high.map((value, k) => value - low[k]).sort((a, b) => b - a);
 }
 
 /** Round numbers within a range, about as many as wanted. */

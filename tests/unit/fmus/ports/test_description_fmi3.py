@@ -23,7 +23,9 @@ PORTS = (
 )
 
 DESCRIPTION = """
-<fmiModelDescription fmiVersion="3.0" modelName="It" instantiationToken="{1}" description="A thing"
+<fmiModelDescription fmiVersion="3.0" modelName="It" instantiationToken="{1}"
+  description="A thing. Equation numbers are from the paper &quot;Three-dimensional tracking \
+control of autonomous underwater vehicles with limited torque and without velocity sensors&quot;"
   author="auv-fmu" version="VERSION" license="MIT" generationTool="auv-fmu VERSION"
   variableNamingConvention="structured">
   <CoSimulation modelIdentifier="It" needsExecutionTool="false"

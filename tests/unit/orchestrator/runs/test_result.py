@@ -1,11 +1,8 @@
-"""`simulate`, `load` and `Result`, as a picky user tries them."""
+"""`Result`, as it was made and as it was read, as a picky user tries it."""
 
 from __future__ import annotations
 
-import inspect
-from copy import deepcopy
 from html.parser import HTMLParser
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import orchestrator
-from orchestrator import Result, load, read, simulate
+from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.figures.drawing import save
 from orchestrator.system.names import PortName
@@ -29,147 +26,6 @@ def test_package_shows_its_names():
     assert set(orchestrator.__all__) == names <= set(dir(orchestrator))
     assert {getattr(orchestrator, name).__name__ for name in names} == names
     assert not hasattr(orchestrator, "nothing")
-
-
-def test_help_explains_every_argument():
-    text = inspect.getdoc(simulate) or ""
-    for name in inspect.signature(simulate).parameters:
-        assert f"{name}:" in text
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "taken"),
-    [
-        ("controller.k_d", 40, 40.0),
-        ("controller.k_d", np.int64(40), 40.0),
-        ("controller.k_d", np.float32(40.0), 40.0),
-        ("controller.k_d", "4e1", 40.0),
-        ("plant.noise.seed", np.int64(7), 7),
-        ("controller.printed_jacobian", True, True),
-        ("controller.printed_jacobian", np.True_, True),
-        ("controller.saturation", "algebraic", "algebraic"),
-    ],
-)
-def test_values_are_taken_as_they_come(name, value, taken):
-    result = simulate("fig4", {name: value}, stop_time=0.02)
-    assert result.parameters[name] == taken
-    assert result.metrics()["parameters"] == {name: taken}
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("controller.kd", 40.0),
-        ("controler.k_d", 40.0),
-        ("k_d", 40.0),
-        ("controller.K1", 12.0),
-        ("controller.k_d", -1.0),
-        ("controller.k_d", "many"),
-        ("controller.k_d", "nan"),
-        ("plant.noise.seed", "4.5"),
-        ("controller.saturation", "none"),
-        ("controller.y.x", 1.0),
-        ("controller.tau.u", 1.0),
-    ],
-)
-def test_mistakes_are_told_in_the_words_of_the_command_line(name, value, tmp_path, capsys):
-    out = str(tmp_path / "out")
-    assert main(["run", "fig4", "--set", f"{name}={value}", "--out", out]) == 2
-    said = capsys.readouterr().err.strip().removeprefix("auv-fmu: ")
-    with pytest.raises(ValueError, match=r".") as mistake:
-        simulate("fig4", {name: str(value)})
-    assert str(mistake.value) == said
-
-
-@pytest.mark.parametrize(
-    ("arguments", "complaint"),
-    [
-        ({"system": "fig44"}, "did you mean fig4"),
-        ({"system": "mine.toml"}, "mine.toml: no such file"),
-        ({"system": Path("mine.ssp")}, "mine.ssp"),
-        ({"system": "fig4", "stop_time": -1.0}, "must be positive"),
-        ({"system": "fig4", "step": 0.0}, "must be positive"),
-        ({"system": "fig4", "order": "random"}, "use one of gauss-seidel, jacobi"),
-    ],
-)
-def test_what_cannot_be_run_is_told(arguments, complaint):
-    with pytest.raises(ValueError, match=complaint):
-        simulate(**arguments)
-
-
-def test_system_has_its_scenarios_experiment_and_can_be_run_again():
-    system = load("fig3a")
-    first, second = simulate(system), simulate(system)
-    assert (first.time[-1], len(first)) == (10.0, 501)
-    assert np.array_equal(first.rows, second.rows)
-    changed = simulate(system, {"plant.tau.u": 20.0}, stop_time=1.0)
-    assert changed["plant.nu.u"][-1] > 1.5 * first["plant.nu.u"][50]
-    assert simulate(system)["plant.nu.u"][-1] == first["plant.nu.u"][-1]
-
-
-def test_scenario_file_is_found_by_text_and_by_path(tmp_path):
-    file = tmp_path / "mine.toml"
-    file.write_text('stop_time = 0.1\n[parameters]\n"controller.K1[1]" = 12.0\n')
-    for system in (file, str(file), load(file)):
-        result = simulate(system)
-        assert (result.time[-1], result.parameters["controller.K1[1]"]) == (0.1, 12.0)
-
-
-def test_dictionary_is_a_scenario_like_its_file(tmp_path):
-    table = {
-        "title": "PD",
-        "stop_time": 0.1,
-        "components": {"controller": "PdController"},
-        "wires": {"controller.dy": "plant.dy"},
-        "parameters": {"plant.noise.std": 0.0, "controller": {"lambda": 2.0}},
-    }
-    file = tmp_path / "scenario.toml"
-    file.write_text(
-        'title = "PD"\nstop_time = 0.1\ncomponents.controller = "PdController"\n'
-        '[wires]\n"controller.dy" = "plant.dy"\n'
-        "[parameters]\nplant.noise.std = 0.0\ncontroller.lambda = 2.0\n"
-    )
-    before = deepcopy(table)
-    made, written = simulate(table), simulate(file)
-    assert np.array_equal(made.rows, written.rows)
-    assert made.metrics() == written.metrics()
-    assert (repr(made), made.parameters["controller.lambda"]) == (repr(written), 2.0)
-    assert table == before
-    assert load(table).parameters == load(file).parameters
-
-
-@pytest.mark.parametrize(
-    ("table", "complaint"),
-    [
-        ({"stop_tim": 1.0}, "unknown entry 'stop_tim'; did you mean stop_time"),
-        ({"components": {"controller": 3}}, "controller': 3}: write a table of names"),
-        ({"components": {"controller": "Nope"}}, "Nope.fmu: no such file"),
-        ({"parameters": {"plant.eta0": [1.0]}}, "plant.eta0: takes 6 values, not 1"),
-    ],
-)
-def test_mistakes_in_a_dictionary_are_told(table, complaint):
-    with pytest.raises(ValueError, match=complaint):
-        simulate(table)
-
-
-@pytest.mark.parametrize(
-    ("given", "pose"),
-    [
-        ({"plant.eta0": [1, 2, -3, 0.1, 0, 0.2]}, (1.0, 2.0, -3.0, 0.1, 0.0, 0.2)),
-        ({"plant.eta0": np.arange(6) / 8}, (0.0, 0.125, 0.25, 0.375, 0.5, 0.625)),
-        ({"plant.eta0": "1, 2,-3,0,0,0"}, (1.0, 2.0, -3.0, 0.0, 0.0, 0.0)),
-        ({"plant.eta0": [0] * 6, "plant.eta0.y": 7}, (0.0, 7.0, 0.0, 0.0, 0.0, 0.0)),
-        ({"plant.eta0.y": 7, "plant.eta0": [0] * 6}, (0.0,) * 6),
-    ],
-)
-def test_list_is_for_the_members_of_a_group(given, pose):
-    members = [f"plant.eta0.{name}" for name in ("x", "y", "z", "phi", "theta", "psi")]
-    for result in (
-        simulate("fig4", given, stop_time=0.02),
-        simulate({"parameters": dict(given)}, stop_time=0.02),
-    ):
-        assert tuple(result.parameters[name] for name in members) == pose
-        assert tuple(result.group("plant.eta.x", "plant.eta.y", "plant.eta.z")[0]) == pose[:3]
 
 
 def test_stored_result_is_the_same_again(result, tmp_path):

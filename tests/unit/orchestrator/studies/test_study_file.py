@@ -258,7 +258,7 @@ def test_study_holds_the_proposed_controller_against_pd_ten_thousand_times(name)
     study = read_study(name)
     assert study.title
     assert study.engine == BATCH
-    assert study.remark.count("\n\n") == 1, "two paragraphs"
+    assert len(study.remark.split()) > 100, "what the runs say"
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
     assert len(space) >= 10_000

@@ -1,0 +1,99 @@
+// Which events happen, when and for how long.
+
+import type { Edit, Settings } from "./settings";
+import type { EventData, Preset } from "./types";
+
+/** What a user does here: take another set of events, or change one of them. */
+export interface Wishes {
+  take(events: string): void;
+  edit(number: number, edit: Edit): void;
+}
+
+export class EventsForm {
+  readonly #select: HTMLSelectElement;
+  readonly #list: HTMLElement;
+  readonly #wishes: Wishes;
+  #built = "";
+
+  constructor(select: HTMLSelectElement, list: HTMLElement, wishes: Wishes) {
+    this.#select = select;
+    this.#list = list;
+    this.#wishes = wishes;
+    select.addEventListener("change", () => wishes.take(select.value));
+  }
+
+  show(settings: Settings, preset: Preset): void {
+    const sets = preset.loops[0].events;
+    const events = sets[settings.events] ?? [];
+    const key = `${preset.name} ${settings.events}`;
+    if (key !== this.#built) {
+      this.#built = key;
+      this.#select.replaceChildren(
+        new Option("none", ""),
+        ...Object.keys(sets)
+          .filter(Boolean)
+          .map((name) => new Option(name, name)),
+      );
+      this.#select.value = settings.events;
+      this.#list.replaceChildren(...events.map((event, number) => this.#row(event, number)));
+    }
+    for (const input of this.#list.querySelectorAll("input")) {
+      const number = Number(input.dataset.number);
+      const { at, lasts } = events[number];
+      const edit = settings.edits[number] ?? {};
+      const isTime = input.dataset.kind === "at";
+      const own = isTime ? at : lasts;
+      const now = isTime ? (edit.at ?? at) : edit.lasts === undefined ? lasts : edit.lasts;
+      if (document.activeElement !== input) input.value = now == null ? "" : String(now);
+      input.classList.toggle("changed", (now ?? null) !== (own ?? null));
+    }
+  }
+
+  #row(event: EventData, number: number): HTMLElement {
+    const item = document.createElement("li");
+    const name = document.createElement("span");
+    name.className = "label";
+    name.textContent = event.label;
+    name.title = event.text;
+    item.append(name);
+    if (event.at === undefined) {
+      const when = document.createElement("small");
+      when.textContent = `when ${event.when?.signal} ${event.when?.comparison} ${event.when?.value}`;
+      item.append(when);
+    } else {
+      item.append(this.#field("at", number, event.label));
+    }
+    // A stop and a reset have no duration.
+    if (!["reset", "stop", "release"].includes(event.action.kind)) {
+      item.append(this.#field("for", number, event.label));
+    }
+    return item;
+  }
+
+  #field(kind: "at" | "for", number: number, label: string): HTMLElement {
+    const whole = document.createElement("label");
+    whole.className = "time";
+    const input = document.createElement("input");
+    input.type = "text";
+    input.inputMode = "decimal";
+    input.dataset.kind = kind;
+    input.dataset.number = String(number);
+    input.setAttribute("aria-label", kind === "at" ? `${label}: time` : `${label}: duration`);
+    if (kind === "for") {
+      input.placeholder = "always";
+      input.title = "how long it lasts; empty: for good";
+    }
+    input.addEventListener("change", () => {
+      const text = input.value.trim();
+      const value = text === "" ? Number.NaN : Number(text);
+      // As of scenario files: no time before the start, and no duration of nothing.
+      const isGood = kind === "at" ? value >= 0 && value < Infinity : value > 0 && value < Infinity;
+      const isForGood = kind === "for" && text === "";
+      input.setAttribute("aria-invalid", String(!isGood && !isForGood));
+      if (isForGood) this.#wishes.edit(number, { lasts: null });
+      else if (isGood) this.#wishes.edit(number, kind === "at" ? { at: value } : { lasts: value });
+    });
+    whole.append(`${kind} `, input, " s");
+    return whole;
+  }
+}

@@ -1,0 +1,372 @@
+// The page: what is set, the runs that follow from it, and what shows them.
+
+import { Charts, type Mark, rowAt } from "./charts";
+import { commandLine } from "./command";
+import { Controls } from "./controls";
+import { controlPoint, csv, metrics, Refusal } from "./engine";
+import { EventsForm } from "./events_form";
+import { IndicesTable } from "./indices_table";
+import { buildSwitches, fillLegend } from "./legend";
+import { fromHash, toHash } from "./link";
+import { interleaved, lines, type Shown, sections } from "./panels";
+import { Player } from "./player";
+import { Scene } from "./scene";
+import { eventsOf, presetOf, type Settings, untouched, withEdit, withValues } from "./settings";
+import { palette, themeButton } from "./theme";
+import type { Data, Engine, LoopData, Preset, Result, Values } from "./types";
+
+/** So long after the last change the link is written [ms]: browsers limit how often it may be. */
+const LINK_AFTER = 300;
+
+/** So long a word on what was done stays [ms]. */
+const SAID = 4000;
+
+function element<T extends HTMLElement>(id: string): T {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`no element ${id}`);
+  return found as T;
+}
+
+function code(text: string): HTMLElement {
+  const made = document.createElement("code");
+  made.textContent = text;
+  return made;
+}
+
+export class Page {
+  readonly #data: Data;
+  readonly #engine: Engine;
+  readonly #charts: Charts;
+  readonly #controls: Controls;
+  readonly #events: EventsForm;
+  readonly #indices: IndicesTable;
+  readonly #player: Player;
+  readonly #scene: Scene | undefined;
+  #settings: Settings;
+  #preset: Preset;
+  /** The preset's loops; their order gives them their colours. */
+  #loops: readonly LoopData[] = [];
+  /** The last runs that could be made, in the order of the loops. */
+  #results: (Result | undefined)[] = [];
+  #asked = false;
+  #link: ReturnType<typeof setTimeout> | undefined;
+  #said: ReturnType<typeof setTimeout> | undefined;
+
+  constructor(data: Data, engine: Engine) {
+    this.#data = data;
+    this.#engine = engine;
+    const { settings, unknown } = fromHash(location.hash, data);
+    this.#settings = settings;
+    this.#preset = presetOf(data, settings.preset) ?? data.presets[0];
+    this.#scene = this.#makeScene();
+    this.#charts = new Charts(element("series"), (time) => {
+      if (!this.#player.isPlaying) this.#player.seek(time);
+    });
+    this.#controls = new Controls(element("groups"), element("all"), element("search"), (values) =>
+      this.set(values),
+    );
+    this.#events = new EventsForm(element("events"), element("event-list"), {
+      take: (events) => this.#take({ ...this.#settings, events, edits: {} }),
+      edit: (number, edit) => this.#take(withEdit(this.#settings, this.#preset, number, edit)),
+    });
+    this.#player = new Player(
+      {
+        toggle: element("play"),
+        slider: element("time"),
+        output: element("now"),
+        speed: element("speed"),
+        marks: element("marks"),
+      },
+      (time) => this.#showTime(time),
+    );
+    this.#indices = new IndicesTable(element("indices"), data.indices);
+    this.#wire();
+    themeButton(element("theme"), () => {
+      this.#scene?.paint(palette());
+      this.#charts.repaint();
+    });
+    this.#open();
+    if (unknown.length) this.#say(`Not understood in the link: ${unknown.join(", ")}`);
+  }
+
+  #makeScene(): Scene | undefined {
+    const host = element("scene");
+    const canvas = host.querySelector("canvas") as HTMLCanvasElement;
+    try {
+      return new Scene(host, canvas);
+    } catch {
+      canvas.remove();
+      const note = document.createElement("p");
+      note.className = "missing";
+      note.textContent = "This browser has no WebGL: the path in space is left out.";
+      host.append(note);
+      return undefined;
+    }
+  }
+
+  #wire(): void {
+    const select = element<HTMLSelectElement>("preset");
+    select.append(
+      ...this.#data.presets.map(({ name, title }) => new Option(`${name}: ${title}`, name)),
+    );
+    select.addEventListener("change", () => this.open(select.value));
+    element("copy-link").addEventListener("click", () => {
+      this.#writeLink();
+      this.#copy(location.href, "Link copied");
+    });
+    element("copy-command").addEventListener("click", () => this.#copyCommand());
+    element("download").addEventListener("click", () => this.#download());
+    element("reset-all").addEventListener("click", () => {
+      const { hidden } = this.#settings;
+      this.#take({ ...untouched(this.#preset), hidden });
+    });
+    for (const [id, key] of [
+      ["stop-time", "stopTime"],
+      ["step", "step"],
+    ] as const) {
+      const input = element<HTMLInputElement>(id);
+      input.addEventListener("change", () => {
+        const value = input.value.trim() === "" ? Number.NaN : Number(input.value);
+        this.#take({ ...this.#settings, [key]: value });
+      });
+    }
+    const slider = element<HTMLInputElement>("stop-slider");
+    slider.addEventListener("input", () =>
+      this.#take({ ...this.#settings, stopTime: slider.valueAsNumber }),
+    );
+    addEventListener("hashchange", () => {
+      if (location.hash === toHash(this.#settings, this.#data)) return;
+      const { settings, unknown } = fromHash(location.hash, this.#data);
+      this.#settings = settings;
+      this.#open();
+      if (unknown.length) this.#say(`Not understood in the link: ${unknown.join(", ")}`);
+    });
+  }
+
+  /** Opens a preset as it is. */
+  open(name: string): void {
+    const preset = presetOf(this.#data, name);
+    if (!preset) return;
+    this.#settings = untouched(preset);
+    this.#open();
+    this.#linkLater();
+  }
+
+  /** Sets parameters by `component.parameter`, and runs. */
+  set(values: Values): void {
+    this.#take(withValues(this.#settings, this.#preset, values));
+  }
+
+  get settings(): Settings {
+    return this.#settings;
+  }
+
+  /** Makes what belongs to a preset, and runs it. */
+  #open(): void {
+    this.#preset = presetOf(this.#data, this.#settings.preset) ?? this.#data.presets[0];
+    this.#loops = inOrder(this.#preset);
+    element<HTMLSelectElement>("preset").value = this.#preset.name;
+    // Names of parameters stand between backquotes.
+    element("remark").replaceChildren(
+      ...this.#preset.remark.split("`").map((text, k) => (k % 2 ? code(text) : text)),
+    );
+    buildSwitches(element("loops"), this.#loops, this.#settings.hidden, (hidden) =>
+      this.#take({ ...this.#settings, hidden }),
+    );
+    this.#controls.build(this.#preset);
+    this.#charts.build(sections(this.#loops.map(({ label }) => label)));
+    this.#results = [];
+    this.run();
+    this.#player.seek(this.#player.time);
+  }
+
+  #take(settings: Settings): void {
+    this.#settings = settings;
+    this.#linkLater();
+    if (this.#asked) return;
+    // However many moves of a slider there are, there is one run for each picture of the screen.
+    this.#asked = true;
+    requestAnimationFrame(() => {
+      this.#asked = false;
+      this.run();
+    });
+  }
+
+  /** Runs what is set, and shows it. */
+  run(): void {
+    const { stopTime, step, hidden } = this.#settings;
+    this.#showSettings();
+    try {
+      this.#results = this.#loops.map((loop) =>
+        hidden.includes(loop.label)
+          ? undefined
+          : this.#engine.run(loop, this.#settings.values, {
+              stopTime,
+              step,
+              events: eventsOf(this.#settings, loop),
+            }),
+      );
+    } catch (error) {
+      if (!(error instanceof Refusal)) throw error;
+      this.#refuse(error.message);
+      return;
+    }
+    const failures = this.#results.flatMap((result, k) => {
+      const why = result?.failure ?? result?.remark;
+      return why ? [`${this.#loops[k].label}: ${why}`] : [];
+    });
+    this.#refuse(failures.join("; "));
+    this.#draw();
+  }
+
+  #refuse(message: string): void {
+    const error = element("error");
+    error.hidden = message === "";
+    error.textContent = message;
+    document.body.classList.toggle("refused", message !== "");
+    this.#controls.refuse(message);
+  }
+
+  #showSettings(): void {
+    const { stopTime, step } = this.#settings;
+    const preset = this.#preset;
+    this.#controls.show(this.#settings);
+    this.#events.show(this.#settings, preset);
+    const fields = [
+      [element<HTMLInputElement>("stop-time"), stopTime, preset.stopTime],
+      [element<HTMLInputElement>("step"), step, preset.step],
+    ] as const;
+    for (const [input, value, own] of fields) {
+      const isEntered = document.activeElement === input && Number(input.value) === value;
+      if (!isEntered && Number.isFinite(value)) input.value = String(value);
+      input.classList.toggle("changed", value !== own);
+      input.setAttribute("aria-invalid", String(!(value > 0)));
+    }
+    const slider = element<HTMLInputElement>("stop-slider");
+    slider.value = String(stopTime);
+    slider.setAttribute("aria-valuetext", `${stopTime} s`);
+    const isTouched = toHash(this.#settings, this.#data) !== toHash(untouched(preset), this.#data);
+    element("reset-all").hidden = !isTouched;
+  }
+
+  #draw(): void {
+    const shown = this.#results.map(
+      (result, k): Shown | undefined => result && { loop: this.#loops[k], result },
+    );
+    const first = this.#results.find((result) => result);
+    const hasReference = first?.has("planner.y_d.x") ?? false;
+    const end = Math.max(
+      ...this.#results.map((result) => result?.time[result.rows - 1] ?? 0),
+      1e-9,
+    );
+    const marks = marksOf(first, end);
+    this.#charts.set(lines(shown), marks);
+    this.#scene?.set({
+      tracks: this.#results.map(
+        (result) =>
+          result && { path: interleaved(controlPoint(result)), attitude: attitudeOf(result) },
+      ),
+      reference:
+        first && hasReference
+          ? interleaved(["x", "y", "z"].map((axis) => first.column(`planner.y_d.${axis}`)))
+          : undefined,
+      ell: Number(first?.parameters["plant.ell"] ?? 0),
+      zUp: this.#preset.zUp,
+    });
+    fillLegend(element("legend"), this.#loops, hasReference);
+    this.#indices.show(
+      shown.flatMap((one, place) =>
+        one ? [{ label: one.loop.label, place, metrics: metrics(one.result) }] : [],
+      ),
+    );
+    this.#player.set(end, marks);
+  }
+
+  #showTime(time: number): void {
+    const longest = this.#results.reduce<Result | undefined>(
+      (best, one) => (one && one.rows > (best?.rows ?? 0) ? one : best),
+      undefined,
+    );
+    if (longest) this.#scene?.show(rowAt(longest.time, time));
+    this.#charts.show(time);
+  }
+
+  #linkLater(): void {
+    clearTimeout(this.#link);
+    this.#link = setTimeout(() => this.#writeLink(), LINK_AFTER);
+  }
+
+  #writeLink(): void {
+    clearTimeout(this.#link);
+    history.replaceState(null, "", toHash(this.#settings, this.#data));
+  }
+
+  /** The loop that is copied and downloaded: the scenario's own, if it is shown. */
+  #meant(): LoopData {
+    const { loops } = this.#preset;
+    return loops.find(({ label }) => !this.#settings.hidden.includes(label)) ?? loops[0];
+  }
+
+  /** The command that makes the rows of the CSV. */
+  command(): string {
+    return commandLine(this.#settings, this.#preset, this.#meant());
+  }
+
+  /** The rows of the first controller that is shown, as result.csv has them. */
+  csv(): string {
+    const result = this.#results[this.#loops.indexOf(this.#meant())];
+    return result ? csv(result) : "";
+  }
+
+  #copyCommand(): void {
+    this.#copy(this.command(), "Command copied");
+  }
+
+  #download(): void {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([this.csv()], { type: "text/csv" }));
+    link.download = `${this.#meant().scenario ?? this.#preset.name}.csv`;
+    link.click();
+    URL.revokeObjectURL(link.href);
+    this.#say(`Saved ${link.download}`);
+  }
+
+  async #copy(text: string, done: string): Promise<void> {
+    try {
+      await navigator.clipboard.writeText(text);
+      this.#say(done);
+    } catch {
+      // Pages from a disk may not be let write to the clipboard.
+      prompt("Copy this:", text);
+    }
+  }
+
+  #say(text: string): void {
+    const said = element("said");
+    said.textContent = text;
+    clearTimeout(this.#said);
+    this.#said = setTimeout(() => {
+      said.textContent = "";
+    }, SAID);
+  }
+}
+
+/** The proposed controller comes before the PD controller, whichever of them a scenario has. */
+function inOrder({ loops }: Preset): readonly LoopData[] {
+  const isPd = ({ components }: LoopData) => Number(components.controller === "PdController");
+  return [...loops].sort((a, b) => isPd(a) - isPd(b));
+}
+
+function attitudeOf(result: Result): Float64Array {
+  return interleaved(["phi", "theta", "psi"].map((angle) => result.column(`plant.eta.${angle}`)));
+}
+
+/** What happens in a run: each event that begins, until its end, if it has one. */
+function marksOf(result: Result | undefined, end: number): Mark[] {
+  const happened = result?.happened ?? [];
+  return happened.flatMap(({ time, label, event }, k) => {
+    if (!label) return [];
+    const over = happened.find((other, n) => n > k && other.event === event && !other.label);
+    return [{ from: time, until: over?.time ?? end, label }];
+  });
+}

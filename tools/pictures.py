@@ -1,0 +1,62 @@
+"""The pictures of the scenarios, `python tools/pictures.py`, and of studies that were made.
+
+`python tools/pictures.py results/noise ...` draws the figures of the ready studies in these folders
+once more. All pictures are smaller than the ones that a run leaves; the studies' keep all their
+colours, because a palette would take colours out of their scales.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from PIL import Image
+
+from gallery import PICTURES
+from orchestrator.commands.main import main as auv_fmu
+from orchestrator.figures.study_figures import draw_figures
+from orchestrator.figures.style import SETTINGS
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.scenario import names
+from orchestrator.studies.space import Space
+from orchestrator.studies.study_file import read_figures, read_study
+from orchestrator.studies.study_result import StudyResult
+from pages import DOCS
+
+#: Pictures are about 1,000 pixels wide.
+_DPI = 140
+
+_COLOURS = 256
+
+
+def main() -> None:
+    """Write the pictures of all scenarios, or of the studies in some folders."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="*", type=Path, help="of a study; none: the scenarios")
+    folders = parser.parse_args().folder
+    SETTINGS["savefig.dpi"] = _DPI
+    with TemporaryDirectory() as drawn:
+        for name in () if folders else names():
+            auv_fmu(["run", name, "--out", f"{drawn}/{name}"])
+            picture = Image.open(Path(drawn, name, f"{name}.png")).convert("RGB")
+            _keep(picture.quantize(_COLOURS), f"{name}.png")
+    for folder in folders:
+        result = StudyResult(folder)
+        study = read_study(result.record["study"])
+        space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
+        entries = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
+        with TemporaryDirectory() as drawn:
+            list(draw_figures(entries, study.title, result, Path(drawn)))
+            for file in sorted(Path(drawn).glob("*.png")):
+                _keep(Image.open(file).convert("RGB"), f"studies/{study.name}-{file.name}")
+
+
+def _keep(picture: Image.Image, name: str) -> None:
+    file = DOCS / PICTURES / name
+    picture.save(file, optimize=True)
+    print(f"{name}: {file.stat().st_size / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()

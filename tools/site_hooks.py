@@ -1,0 +1,148 @@
+"""What the site has beside the pages of docs/: a hook of `mkdocs build`.
+
+- Pages of the repository's root, under `contributing` and `explanation`.
+- The notebook as a page.
+- The live page, where npm and a compiler can make it; otherwise a page that says why it is missing.
+
+Links work in a plain checkout too, so they name files of the repository. Here they become links to
+the site's pages; a link to a file that the site does not have becomes plain text.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import posixpath
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+from orchestrator.live import assembly
+from orchestrator.machine.errors import InputError
+
+ROOT = Path(__file__).parents[1]
+
+#: Where the site has the files of the root.
+PAGES = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing/README.md",
+    "CHANGELOG.md": "contributing/changelog.md",
+    "LICENSE": "contributing/licence.md",
+    "SECURITY.md": "explanation/security.md",
+}
+
+LIVE = "live.html"
+
+#: What the search prefers, and what comes last: the beginning of a page's place.
+BOOSTS = {
+    "tutorials/": 2.0,
+    "how-to/": 2.0,
+    "explanation/kinds.md": 2.0,
+    "contributing/": 0.2,
+    "explanation/architecture.md": 0.5,
+    "reference/fmi-answers.md": 0.5,
+    "reference/promises.md": 0.5,
+}
+
+_LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
+_PRESET = re.compile(r"<!-- live: ([\w-]+) -->")
+
+log = logging.getLogger(f"mkdocs.hooks.{__name__}")
+_why_not = ""
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add what is not in docs/."""
+    for source, place in PAGES.items():
+        if source != "README.md":
+            text = (ROOT / source).read_text(encoding="utf-8")
+            if source == "LICENSE":
+                text = f"# Licence\n\n{text}"
+            files.append(File.generated(config, place, content=linked(text, source, files)))
+    for notebook in [file for file in files if file.src_uri.endswith(".ipynb")]:
+        files.remove(notebook)
+        text = notebook_text(Path(str(notebook.abs_src_path)))
+        files.append(File.generated(config, page_of(notebook.src_uri), content=text))
+    global _why_not
+    page, _why_not = live_page()
+    files.append(File.generated(config, LIVE, content=page))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Point links to the site's pages, and to the live page from where it is announced."""
+    [boost] = [n for place, n in BOOSTS.items() if page.file.src_uri.startswith(place)] or [1.0]
+    page.meta["search"] = {"boost": boost}
+    if page.file.src_uri not in PAGES.values() or page.file.src_uri == PAGES["README.md"]:
+        markdown = linked(markdown, f"docs/{page.file.src_uri}", files)
+    up = posixpath.relpath(LIVE, posixpath.dirname(page.file.src_uri) or ".")
+    if _why_not:
+        note = f"This site was built without the live page: {_why_not}."
+    else:
+        note = f'<iframe class="live" src="{up}" title="The live page" loading="lazy"></iframe>'
+    markdown = markdown.replace("<!-- the live page -->", note)
+    link = "" if _why_not else rf"[Open it on the live page]({up}#preset=\1)"
+    return _PRESET.sub(link, markdown)
+
+
+def linked(text: str, source: str, files: Files) -> str:
+    """A page's text with its links as the site needs them.
+
+    Args:
+        text: in Markdown.
+        source: of the page in the repository; its links start there.
+        files: of the site.
+
+    """
+    here = posixpath.dirname(PAGES.get(source, source.removeprefix("docs/"))) or "."
+
+    def found(link: re.Match[str]) -> str:
+        label, target, anchor = link.group(1), link.group(2), link.group(3) or ""
+        if not target or "://" in target or target.startswith("mailto:"):
+            return link.group()
+        file = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
+        place = PAGES.get(file, page_of(file.removeprefix("docs/")))
+        if file.startswith("docs/") and (ROOT / file).is_dir():
+            place += "/README.md"
+        if place in PAGES.values() or files.get_file_from_path(place):
+            return f"[{label}]({posixpath.relpath(place, here)}{anchor})"
+        if (ROOT / file).exists() and not file.startswith("docs/"):
+            return label if label.startswith("`") else f"{label} (`{file}`)"
+        return link.group()
+
+    return _outside_code(lambda part: _LINK.sub(found, part), text)
+
+
+def page_of(name: str) -> str:
+    """The page that a file of docs/ becomes."""
+    return name.removesuffix(".ipynb") + ".md" if name.endswith(".ipynb") else name
+
+
+def notebook_text(notebook: Path) -> str:
+    """A notebook as a page."""
+    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return "\n\n".join(
+        f"```python\n{''.join(cell['source'])}\n```"
+        if cell["cell_type"] == "code"
+        else re.sub(r"\$(\w+)\$", r"`\1`", "".join(cell["source"]))
+        for cell in cells
+    )
+
+
+def live_page() -> tuple[str, str]:
+    """The live page and, where it cannot be made, why."""
+    try:
+        return assembly.live_page("fig4"), ""
+    except InputError as error:
+        log.info("no live page: %s", error)
+        return f"<!doctype html><title>auv-fmu</title><p>No live page: {error}", str(error)
+
+
+def _outside_code(change: Callable[[str], str], text: str) -> str:
+    """Change what stands outside fenced code."""
+    parts = re.split(r"(^```.*?^```$)", text, flags=re.DOTALL | re.MULTILINE)
+    return "".join(part if part.startswith("```") else change(part) for part in parts)
