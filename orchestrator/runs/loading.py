@@ -48,7 +48,7 @@ def load(
         kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
         fmi: their version of FMI, `2` or `3`.
         variant: which of the descriptions in an SSP; None: the default.
-        strict: refuse what otherwise is a warning.
+        strict: treat warnings as errors.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.

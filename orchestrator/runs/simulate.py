@@ -112,7 +112,7 @@ def simulate(
         loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
             to be had; the rows are the same.
         variant: which of the descriptions in an SSP; None: the default.
-        strict: refuse what otherwise is a warning.
+        strict: treat warnings as errors.
         steps: of components that take longer ones of their own [s], multiples of the communication
             step; they win over the scenario's.
         events: what happens during the run, instead of the scenario's own: tables as a

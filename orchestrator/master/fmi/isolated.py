@@ -67,7 +67,8 @@ def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
         return Isolation() if step_timeout is None else Isolation(step_timeout)
     if step_timeout is not None:
         raise InputError(
-            "a step timeout needs isolation: only an FMU in a separate process can be ended"
+            "a step timeout needs --isolate, or isolate=True in Python: only an FMU in a separate "
+            "process can be ended"
         )
     return None
 
