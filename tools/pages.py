@@ -2,9 +2,9 @@
 
 `python tools/pages.py` writes each file anew that is not as it would be written; a test holds them
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
-`<!-- / -->`, which this replaces. `docs/reference/components` and `docs/schemas` are written whole.
+`<!-- / -->`, which this replaces. The pages of the components and `docs/schemas` are written whole.
 
-`command_line.py` and `gallery.py` have the long texts. The other tools compute what takes minutes:
+`parts` has the long texts. The other tools compute what takes minutes:
 `accuracy.py` prints the tables of docs/explanation/accuracy.md, `study_numbers.py` and
 `best_gains.py` the numbers below the figures of docs/explanation/ready-studies.md. `pictures.py`
 draws those figures and the ones of the scenarios, `benchmarks_page.py` fills in
@@ -31,10 +31,8 @@ from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.gain_conditions import at_least, coupling
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from command_line import command_line
 from fmus.discovery import components
 from fmus.documentation import component_page
-from gallery import PICTURES, figures, gallery, picture, seen
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
 from orchestrator.formats.schema import TomlTable, entries
@@ -46,6 +44,8 @@ from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import FigureTable, StudyFile, read_study
 from orchestrator.vehicle.indices import INDICES, Index
 from orchestrator.vehicle.proof import stated
+from parts.command_line import command_line
+from parts.gallery import PICTURES, figures, gallery, picture, seen
 
 DOCS = Path(__file__).parents[1] / "docs"
 COMPONENTS = DOCS / "reference" / "components"

@@ -13,7 +13,6 @@ from tempfile import TemporaryDirectory
 
 from PIL import Image
 
-from gallery import PICTURES
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
@@ -23,6 +22,7 @@ from orchestrator.studies.space import Space
 from orchestrator.studies.study_file import read_figures, read_study
 from orchestrator.studies.study_result import StudyResult
 from pages import DOCS
+from parts.gallery import PICTURES
 
 #: Pictures are about 1,000 pixels wide.
 _DPI = 140
@@ -47,7 +47,11 @@ def main() -> None:
         space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
         entries = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
-            list(draw_figures(entries, study.title, result, Path(drawn)))
+            list(
+                draw_figures(
+                    entries, study.title, result, Path(drawn), None, space.units, space.logarithmic
+                )
+            )
             for file in sorted(Path(drawn).glob("*.png")):
                 _keep(Image.open(file).convert("RGB"), f"studies/{study.name}-{file.name}")
 

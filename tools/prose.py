@@ -54,7 +54,9 @@ _BETWEEN = "\n\n¶\n\n"
 _MARKDOWN = MarkdownIt("commonmark").enable("table")
 
 #: Where sentences end, the end of an item that is one, and what has a full stop within one.
-_END = re.compile(r"""[.!?]["')\]]*\s+(?=["'(\[]*[A-Z0-9`§λγστε])""")
+_END = re.compile(
+    r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|numba|pip|theta_hat))"""
+)
 _SENTENCE = re.compile(r"""[.!?:]["')\]]*$""")
 _ABBREVIATION = re.compile(
     r"\b(?:e\.g|i\.e|cf|vs|[Ee]qs?|[Ff]igs?|[Ss]ecs?|[Rr]efs?|Nos?|approx|resp|al)$"

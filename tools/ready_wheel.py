@@ -1,7 +1,8 @@
 """Make the wheel that carries the native FMUs and the loop in C for all platforms, and Python's.
 
-`python tools/ready_wheel.py [--out DIR]` needs `pip install -e '.[native,test]'`. Where this wheel
-is installed, runs need no compiler and build nothing. `pip install .` makes a wheel without them.
+It carries the parts of the live page, too. `python tools/ready_wheel.py [--out DIR]` needs npm and
+`pip install -e '.[native,test]'`. Where this wheel is installed, runs need no compiler and build
+nothing. `pip install .` makes a wheel without them.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from tempfile import TemporaryDirectory
 
 from fmus.compilers import COMPILERS, compiler_for, library
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON, TARGETS, platforms
+from orchestrator.live import assembly, module
 from orchestrator.machine.errors import InputError
 from orchestrator.master import stepper
 from orchestrator.runs import bundle
@@ -40,6 +42,14 @@ def write_ready(folder: Path) -> None:
     with loader_for_any_linux():
         place = folder / bundle.CATEGORY / bundle.key_of(PYTHON, FMI_VERSIONS[0])
         bundle.run_fmus("build", place, "--kind", PYTHON, "--loader", "native")
+    for category, key, files in (
+        (module.CATEGORY, module.key_of(), module.compiled()),
+        (assembly.CATEGORY, assembly.key_of(), assembly.bundled()),
+    ):
+        place = folder / category / key
+        place.mkdir(parents=True)
+        for name, content in files.items():
+            (place / name).write_bytes(content)
     machines = platforms(FMI_VERSIONS[-1], "all")
     compiler = compiler_for(machines)
     source = stepper.SOURCE

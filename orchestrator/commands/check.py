@@ -59,13 +59,13 @@ def _check(options: argparse.Namespace) -> int:
     for kind, texts in (
         ("problem", findings.problems),
         ("note", findings.notes),
-        ("to know", to_know),
+        ("info", to_know),
     ):
         for text in texts:
             show(f"{kind}: {text}")
     if findings.problems or findings.notes:
         return BAD_INPUT
-    show(f"{options.file}: nothing is wrong with it")
+    show(f"{options.file}: no problems found")
     return OK
 
 
@@ -106,7 +106,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
             to_know += [f"{name}: {text}" for text in known]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
-            to_know.append("names no stop time: a run needs --stop-time")
+            to_know.append("has no stop time: a run needs --stop-time")
             request = Request(stop_time=(system.start_time or 0.0) + FALLBACK_STOP_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):

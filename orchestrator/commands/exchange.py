@@ -254,7 +254,7 @@ def _verify_carried(options: argparse.Namespace) -> int:
             say(f"warning: {judgement.name}: {note}")
         judged += [] if judgement.agrees is None else [judgement.agrees]
     if not judged:
-        raise InputError(f"{options.table}: carries no results to verify it with")
+        raise InputError(f"{options.table}: carries no reference results")
     counted = f"{sum(judged)} of {len(judged)} experiments with results agree"
     if not all(judged):
         raise InputError(f"{options.table}: {counted}")

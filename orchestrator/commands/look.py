@@ -30,6 +30,9 @@ from orchestrator.runs.record import changed_files, read_record, read_result, ta
 from orchestrator.runs.request import Files, Request
 from orchestrator.vehicle.signals import Loop, loops_of, suffixes
 
+#: The scenario that a live page opens unless another is named.
+_OPENED = "fig4"
+
 #: What a plot can be written as.
 _PLOTS = (".png", ".svg", ".pdf")
 
@@ -65,6 +68,20 @@ def add_view(parser: argparse.ArgumentParser) -> None:
     parser.set_defaults(action=_view)
 
 
+def add_live(parser: argparse.ArgumentParser) -> None:
+    """Declare the options of `auv-fmu live`."""
+    parser.add_argument(
+        "scenario",
+        nargs="?",
+        default=_OPENED,
+        metavar="SCENARIO|FILE.toml",
+        help="the scenario that the page opens, of the bundle's components; it has all scenarios "
+        f"of `auv-fmu list` besides; default: {_OPENED}",
+    )
+    _add_file(parser, "a .html; default: SCENARIO-live.html")
+    parser.set_defaults(action=_live)
+
+
 def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
     describe(
@@ -93,7 +110,7 @@ def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None =
 
 def _plot(options: argparse.Namespace) -> int:
     if options.out.suffix not in _PLOTS:
-        raise InputError(f"{options.out}: write a {', '.join(_PLOTS)}")
+        raise InputError(f"{options.out}: must end with {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}")
     paths = [Path(text) for text in options.what if _is_there(text)]
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
@@ -138,7 +155,7 @@ def _view(options: argparse.Namespace) -> int:
     file = table_in(options.result)
     out = options.out or file.with_name(VIEW)
     if out.suffix != ".html":
-        raise InputError(f"{out}: write a .html")
+        raise InputError(f"{out}: must end with .html")
     _warn(file)
     run = read_result(file)
     record = read_record(file)
@@ -154,6 +171,19 @@ def _view(options: argparse.Namespace) -> int:
     with _written([file for _, file, _ in shown], options.force) as folder:
         for name, text in pages.items():
             (folder / name).write_text(text, encoding="utf-8")
+    return OK
+
+
+def _live(options: argparse.Namespace) -> int:
+    # Only this command needs them.
+    from orchestrator.live.assembly import live_page  # noqa: PLC0415
+
+    out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
+    if out.suffix != ".html":
+        raise InputError(f"{out}: write a .html")
+    text = live_page(options.scenario)
+    with _written([out], options.force) as folder:
+        (folder / out.name).write_text(text, encoding="utf-8")
     return OK
 
 

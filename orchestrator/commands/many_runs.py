@@ -87,7 +87,9 @@ def _sweep(options: argparse.Namespace) -> int:
 
 
 def _report(options: argparse.Namespace) -> int:
-    scenarios = [*names(), *options.scenarios]
+    # The paper's figures come first, in its order.
+    scenarios = sorted(names(), key=lambda name: not name.startswith("fig"))
+    scenarios += options.scenarios
     ready = ready_studies() if options.studies else ()
     for path in write_report(
         options.out,

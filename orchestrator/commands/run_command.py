@@ -68,7 +68,7 @@ def _run(options: argparse.Namespace) -> int:
                 show(f"  {note}")
         show(f"written to {finished[0].folder}{os.sep}")
         if finished[0].folder != folder:
-            say(f"{folder} keeps the complete result from before")
+            say(f"{folder} still holds the earlier, complete result")
     return max(status(run.name, run.ending) for run in finished)
 
 
@@ -81,9 +81,11 @@ def _drawing() -> Callable[..., list[str]]:
 
 def _answer(interrupts: Interrupts) -> None:
     """Tell the user at once what happens now, from within the handler of the signal."""
-    text = "stopping: writing what was computed and drawing it; press again to skip the figures"
+    text = "stopping: writing and drawing the computed rows; interrupt again to skip the figures"
     if interrupts.urgent:
-        text = "stopping at once, without figures; a third time ends an FMU that does not return"
+        text = (
+            "stopping at once, without figures; a third interrupt ends an FMU that does not return"
+        )
     # print could have been interrupted itself, and must not be entered a second time.
     with suppress(OSError):
         os.write(2, f"auv-fmu: {text}\n".encode())

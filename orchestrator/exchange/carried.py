@@ -107,7 +107,7 @@ class Carried:
         manifest = self._place / RELATED_MANIFEST
         if not manifest.is_file():
             raise InputError(
-                f"{fmu}: carries nothing to verify it with: it holds no {RELATED}/{manifest.name}"
+                f"{fmu}: carries no reference results: it holds no {RELATED}/{manifest.name}"
             )
         self._manifest = self._read(manifest, "fmiReferences")
         if (name := self._manifest.get("fmi-ls-name")) != _STANDARD:
@@ -322,5 +322,5 @@ def _interval(times: np.ndarray) -> float:
 def _note_unknown(series: Series, what: str, findings: Findings) -> None:
     if series.others:
         findings.note(
-            f"{what} has columns of other names, which are left out: {listed(series.others)}"
+            f"{what} has columns of other names, which are skipped: {listed(series.others)}"
         )

@@ -120,7 +120,7 @@ def comparison(
             f"its results have no row from t = {ours[0]:g} to {ours[-1]:g} s, where it is made"
         )
     if (new & (times > ours[-1] + slack) & (times <= stop_time + slack)).any():
-        raise InputError(f"ended at t = {ours[-1]:g} s, before its results do")
+        raise InputError(f"ended at t = {ours[-1]:g} s, before its results end")
     times = times[chosen]
     rows = np.searchsorted(ours, times + slack, side="right") - 1
     # Apart from rounding, most times are a row's.

@@ -62,11 +62,11 @@ def check_film(path: Path, fps: int) -> None:
 
     """
     if path.suffix not in (".gif", ".mp4"):
-        raise InputError(f"{path}: write a .gif or an .mp4")
+        raise InputError(f"{path}: must end with .gif or .mp4")
     if path.suffix == ".mp4" and which("ffmpeg") is None:
         raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
     if not 1 <= fps <= 50:
-        raise InputError(f"--fps {fps}: write a number from 1 to 50")
+        raise InputError(f"--fps {fps}: must be from 1 to 50")
 
 
 def animate(text: str, run: Drawn, path: Path, fps: int = FRAMES_PER_SECOND) -> None:

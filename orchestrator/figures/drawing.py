@@ -80,7 +80,7 @@ def save(figure: Figure, *paths: Path) -> None:
             try:
                 engine.execute(figure)
             except (ValueError, OverflowError) as error:
-                raise InputError("values lie too far apart to be drawn") from error
+                raise InputError("values are too far apart to draw") from error
         figure.set_layout_engine(None)
         for path in paths:
             figure.savefig(path, metadata=_NO_DATE[path.suffix])
@@ -125,9 +125,9 @@ def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
     """What a panel does not show, and why."""
     missing = {run.label: run.lacks(panel.needs) for run in runs}
     if all(missing.values()):
-        return [f"{panel.name} left out: no {missing[runs[0].label][0]}"]
+        return [f"{panel.name} skipped: no {missing[runs[0].label][0]}"]
     return [
-        f"{panel.name} of {label} left out: no {names[0]}"
+        f"{panel.name} of {label} skipped: no {names[0]}"
         for label, names in missing.items()
         if names
     ]
@@ -236,9 +236,9 @@ def _drawn(
                 save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
                 notes += left_out
             except InputError as error:
-                notes.append(f"{stem}{suffix} left out: {error}")
+                notes.append(f"{stem}{suffix} skipped: {error}")
         elif not suffix:
             return [f"no figure: the run has no {left_out[0]}"]
         else:
-            notes.append(f"{stem}{suffix} left out: no {left_out[0]}")
+            notes.append(f"{stem}{suffix} skipped: no {left_out[0]}")
     return notes

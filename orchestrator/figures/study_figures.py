@@ -5,16 +5,19 @@ A new one is a function here, which :data:`_DRAW` names, and an entry of :data:`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import cycle, product
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.patches import Patch
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from orchestrator.figures.drawing import save, styled
 from orchestrator.figures.study_values import (
@@ -55,8 +58,9 @@ _MOST_PARTS = 12
 #: Room for a heading, and for a legend or the names of axes [in].
 _HEADING, _NAMES = 0.3, 0.45
 
-#: Numbers along a logarithmic axis; with less powers of ten than that, 3 has one as well.
-_TICKS, _FEW = 6, 2.5
+#: Numbers along a logarithmic axis, and powers of ten up to which there are ticks between them;
+#: with fewer powers of ten than the last, 3 has a number as well, and below one power 2 and 5.
+_TICKS, _SMALL_TICKS, _FEW = 6, 12, 2.5
 
 
 def make_panels(
@@ -90,32 +94,52 @@ def spread(axis: Any, is_wide: bool) -> None:
     axis.axes.autoscale_view()
     low, high = axis.get_view_interval()
     is_short = high < low * 10.0**_FEW
-    axis.set_major_locator(LogLocator(subs=(1.0, 3.0) if is_short else (1.0,), numticks=_TICKS))
-    axis.set_minor_locator(NullLocator())
+    subs = (1.0, 2.0, 5.0) if high < 10.0 * low else (1.0, 3.0) if is_short else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs, numticks=_TICKS))
+    axis.set_minor_locator(LogLocator(subs=range(2, 10), numticks=_SMALL_TICKS))
+    axis.set_minor_formatter(NullFormatter())
     if is_short:
         axis.set_major_formatter("{x:g}")
 
 
-def legend(figure: Figure, axes: Axes) -> None:
-    """Say below all panels what the lines of one mean, if it has several."""
-    handles, labels = axes.get_legend_handles_labels()
-    if len(handles) > 1:
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+def legend(figure: Figure, *more: Artist) -> None:
+    """Say below all panels what their lines mean, and what else there is in them.
+
+    Args:
+        figure: whose panels have lines with labels.
+        more: samples with labels.
+
+    """
+    handles = {
+        label: handle
+        for axes in figure.axes
+        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
+    }
+    handles |= {str(sample.get_label()): sample for sample in more}
+    if len(handles) > 1 or more:
+        figure.legend(
+            handles=list(handles.values()), loc="outside lower center", ncols=min(2, len(handles))
+        )
+
+
+def _sample(colour: str, text: str, alpha: float = 1.0) -> Patch:
+    """A sample of a colour for a legend."""
+    return Patch(facecolor=colour, alpha=alpha, linewidth=0, label=text)
 
 
 def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
     abreast = len(entry.x) if len(entry.x) > 1 else min(_ABREAST, len(entry.show))
     shown = list(product(entry.show, entry.x))
-    share = "row" if len(entry.x) > 1 else False
-    figure, panels = make_panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=share)
+    sharing = "row" if len(entry.x) > 1 else False
+    figure, panels = make_panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=sharing)
     parts = list(runs.parts(entry.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
-        bins = bins_of(runs[x], _BINS, are_full=True)
+        bins = bins_of(runs[x], _BINS, are_full=True, is_wide=x in entry.logarithmic)
         for (name, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
             _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
         if value in entry.limits:
-            axes.axhline(entry.limits[value], color="black", linewidth=0.8)
+            axes.axhline(entry.limits[value], color="black", linewidth=0.8, label="limit")
         axes.margins(x=0)
         spread(axes.xaxis, bins.is_logarithmic)
         spread(axes.yaxis, is_logarithmic(runs[value]))
@@ -124,7 +148,11 @@ def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
             axes.set_title(runs.label(value))
     for axes in panels.flat[len(shown) :]:
         axes.remove()
-    legend(figure, panels.flat[0])
+    has_bands = any(value not in VERDICTS for value in entry.show)
+    share = _UPPER - _LOWER
+    legend(
+        figure, *[_sample("grey", f"band: {share:.0%} of the runs, line: median", 0.3)] * has_bands
+    )
     return figure
 
 
@@ -158,11 +186,14 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     The last column that tells runs apart has its values side by side, the others below each other.
     """
     [x], y = entry.x, entry.y
-    across, down = bins_of(runs[x], _CELLS), bins_of(runs[y], _CELLS)
+    across, down = (
+        bins_of(runs[name], _CELLS, is_wide=name in entry.logarithmic) for name in (x, y)
+    )
     beside = [name for name, _ in runs.parts(entry.by[-1:])]
     below = list(runs.parts(entry.by[:-1]))
     rows = len(entry.show) * len(below)
     figure, panels = make_panels(title, rows, len(beside), _ROW, sharex=True, sharey=True)
+    has_gaps = False
     for value, own in zip(entry.show, np.split(panels, len(entry.show)), strict=True):
         drawn: dict[Axes, np.ndarray] = {}
         for row, (name, part) in zip(own, below, strict=True):
@@ -181,7 +212,11 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
             if value in entry.limits and min(middles.shape) > 1:
                 edge = [entry.limits[value]]
                 axes.contour(across.centres, down.centres, middles, edge, colors="white")
-        figure.colorbar(image, ax=list(own.flat), label=runs.label(value), extend="both")
+        label = runs.label(value)
+        if value in entry.limits:
+            label += f"\n(white line: {entry.limits[value]:g})"
+        has_gaps |= bool(np.isnan(list(drawn.values())).any())
+        figure.colorbar(image, ax=list(own.flat), label=label, extend="both")
     for axes, name in zip(panels[0], beside, strict=True):
         axes.set_title(name)
     for axes in panels[-1]:
@@ -189,6 +224,7 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     # All panels share their axes.
     spread(axes.xaxis, across.is_logarithmic)
     spread(axes.yaxis, down.is_logarithmic)
+    legend(figure, *[_sample(_EMPTY, "no run has a value here")] * has_gaps)
     return figure
 
 
@@ -229,7 +265,7 @@ def front(entry: FigureEntry, title: str, runs: Values) -> Figure:
     spread(axes.xaxis, is_logarithmic(runs[x]))
     spread(axes.yaxis, is_logarithmic(runs[entry.y]))
     axes.set(xlabel=runs.label(x), ylabel=runs.label(entry.y))
-    legend(figure, axes)
+    legend(figure)
     return figure
 
 
@@ -255,6 +291,7 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
     parts = list(runs.parts(entry.by))
     height = _LINE * len(entry.show) + _AROUND
     figure, panels = make_panels(title, len(parts), 1, height, sharex=True)
+    has_gaps = False
     for axes, (name, part) in zip(panels.flat, parts, strict=True):
         found = np.array([[_correlation(part[x], part[y]) for x in entry.x] for y in entry.show])
         image = axes.imshow(found, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
@@ -268,8 +305,11 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
         axes.set_yticks(range(len(entry.show)), [runs.name(value) for value in entry.show])
         axes.set_xticks(range(len(entry.x)), [runs.name(value) for value in entry.x], rotation=90)
         axes.grid(visible=False)
+        axes.set_facecolor(_EMPTY)
         axes.set_title(name)
+        has_gaps |= bool(np.isnan(found).any())
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
+    legend(figure, *[_sample(_EMPTY, "one of the two never changes")] * has_gaps)
     return figure
 
 
@@ -303,6 +343,8 @@ def draw_figures(
     columns: Columns,
     folder: Path,
     legends: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    logarithmic: Collection[str] = (),
 ) -> Iterator[str]:
     """Draw the figures of a study, as PNG and SVG.
 
@@ -312,20 +354,22 @@ def draw_figures(
         columns: of runs.parquet.
         folder: to write into.
         legends: what the lines of scenarios are called.
+        units: of parameters, as FMUs write them.
+        logarithmic: values whose axes are.
 
     Yields:
         What was left out, and why.
 
     """
-    for entry in entries:
-        runs = Values(columns, entry.labels, legends).where(entry.where)
+    for entry in [replace(entry, logarithmic=logarithmic) for entry in entries]:
+        runs = Values(columns, entry.labels, legends, units).where(entry.where)
         values = (*entry.x, *([entry.y] if entry.y else ()), *entry.show)
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]
         if lacking:
-            yield f"figure {entry.name} left out: no run has {lacking[0]}"
+            yield f"figure {entry.name} skipped: no run has {lacking[0]}"
             continue
         if (parts := len(list(runs.parts(entry.by)))) > _MOST_PARTS:
-            yield f"figure {entry.name} left out: by tells {parts} parts of the runs apart"
+            yield f"figure {entry.name} skipped: by tells {parts} parts of the runs apart"
             continue
         with styled():
             figure = _DRAW[entry.chart](entry, title, runs)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from math import isnan
@@ -27,6 +27,9 @@ _GRID = 40
 #: An axis is logarithmic if its values are positive, and a large one, larger than this share of
 #: them, is so many times a small one.
 _LARGE, _WIDE = 0.95, 10.0
+
+#: The ratios of a geometric grid differ by less than this share of what they exceed 1 by.
+_EVEN = 1e-6
 
 _NORM = re.compile(r"\|(.+)\|")
 _UNIT = re.compile(r" \[([^\]]*)\]$")
@@ -54,6 +57,7 @@ class FigureEntry:
 
     Attributes:
         name: of its files.
+        logarithmic: values whose axes are.
 
     """
 
@@ -66,6 +70,7 @@ class FigureEntry:
     where: Mapping[str, Any] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
+    logarithmic: Collection[str] = ()
 
 
 def _failed(columns: Columns) -> np.ndarray:
@@ -125,6 +130,7 @@ class Values:
         columns: Columns,
         labels: Mapping[str, str] | None = None,
         legends: Mapping[str, str] | None = None,
+        units: Mapping[str, str] | None = None,
     ) -> None:
         """Take some columns.
 
@@ -132,9 +138,11 @@ class Values:
             columns: of the same length.
             labels: of values, in place of what they are called otherwise.
             legends: what the lines of scenarios are called.
+            units: of parameters, as FMUs write them.
 
         """
         self._columns, self._labels, self._legends = columns, labels or {}, legends or {}
+        self._units = units or {}
 
     def __getitem__(self, value: str) -> np.ndarray:
         """A value of each run; nan where it has none."""
@@ -159,7 +167,8 @@ class Values:
         if len(factors := _factors(value)) > 1:
             return " · ".join(map(self.label, factors))
         if (parts := _parts(value)) is None:
-            return value
+            unit = printed_unit(self._units.get(value, ""))
+            return f"{value} [{unit}]" if unit else value
         index, member, vehicle = parts
         units = {str(m): printed_unit(unit) for m, unit in index.units.items()}
         # A group may have one unit.
@@ -179,7 +188,7 @@ class Values:
 
     def _rows(self, rows: np.ndarray) -> Values:
         columns = {name: values[rows] for name, values in self._columns.items()}
-        return Values(columns, self._labels, self._legends)
+        return Values(columns, self._labels, self._legends, self._units)
 
     def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
         """The runs that agree in some columns, and what tells them from the others.
@@ -263,17 +272,28 @@ def is_logarithmic(values: np.ndarray) -> bool:
     return bool(large >= _WIDE * small)
 
 
-def bins_of(values: np.ndarray, most: int, *, are_full: bool = False) -> Bins:
+def is_geometric(grid: np.ndarray) -> bool:
+    """Whether the values of a grid, in order, are the same number of times each other."""
+    if len(grid) < 3 or grid[0] <= 0.0:
+        return False
+    times = grid[1:] / grid[:-1]
+    return bool(np.ptp(times) < _EVEN * (times[0] - 1.0))
+
+
+def bins_of(
+    values: np.ndarray, most: int, *, are_full: bool = False, is_wide: bool = False
+) -> Bins:
     """Bins for some values, at least one of which is finite.
 
     Args:
         values: of a grid, or anywhere.
         most: how many bins there are for values that do not form a grid.
         are_full: whether these have as many values each, and not the same width.
+        is_wide: whether the axis is logarithmic, whatever the values are.
 
     """
     values = values[np.isfinite(values)]
-    wide = is_logarithmic(values)
+    wide = is_wide or is_logarithmic(values) or is_geometric(np.unique(values))
     places = np.unique(np.log(values) if wide else values)
     if len(places) > _GRID:
         even = np.linspace(0.0, 1.0, most + 1)

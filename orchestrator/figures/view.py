@@ -161,7 +161,7 @@ def _panels(run: Drawn) -> tuple[list[_Lines], list[str]]:
         ("velocity", Loop.for_velocity_estimates, _velocities),
     ):
         if missing := run.lacks(needs):
-            notes.append(f"{name} left out: no {missing[0]}")
+            notes.append(f"{name} skipped: no {missing[0]}")
         else:
             panels += lines(run.result, run.loop)
     return panels, notes

@@ -1,19 +1,48 @@
-"""One page in which a loop runs: script, module and data in one file that needs no other."""
+"""One page in which a loop runs: script, module and data in one file that needs no other.
+
+Script and style are bundled by npm's esbuild, and kept as the module is.
+"""
 
 from __future__ import annotations
 
 import gzip
 import html
 import json
+import re
+import shutil
+import subprocess
 from base64 import b64encode
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
 from orchestrator.live.module import live_module
 from orchestrator.live.presets import page_data
-from orchestrator.live.script import LICENCES, SCRIPT, STYLE, WEB, live_script
+from orchestrator.machine.cache import made_once
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import InputError, last_line, reason
 
+#: What script and style are among what is kept.
+CATEGORY = "live-script"
+
+#: What is made: the page's script and style, the engine for Node, and what they contain of others.
+SCRIPT, STYLE, ENGINE, LICENCES = FILES = "page.js", "page.css", "engine.mjs", "licences.txt"
+
+WEB = Path(__file__).with_name("web")
+
+#: With the places of all parts.
 _PAGE = WEB / "page.html"
+
+#: Of the sources, what decides what is made.
+_NAMES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
+
+#: The line in which npm or esbuild says what is wrong, not only that something is.
+_COMPLAINT = re.compile(r"npm error (?!code)\S|.*\bERROR\b")
+
+#: How long npm may take [s].
+_LIMIT = 600.0
 
 
 def live_page(opened: str) -> str:
@@ -48,3 +77,75 @@ def live_page(opened: str) -> str:
 def packed(content: bytes) -> str:
     """Bytes as the page has them: gzip, in base64; the same for the same bytes."""
     return b64encode(gzip.compress(content, mtime=0)).decode()
+
+
+def live_script() -> dict[str, Path]:
+    """The files by their names, bundled if that has not been done yet.
+
+    Raises:
+        InputError: they cannot be bundled.
+
+    """
+    try:
+        return made_once(CATEGORY, key_of(), bundled)
+    except OSError as error:
+        raise InputError(f"the live page has no script: {reason(error)}") from error
+
+
+def key_of() -> str:
+    """Of the sources."""
+    digest = sha256()
+    for path in _sources():
+        digest.update(f"{path.relative_to(WEB).as_posix()}\0".encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _sources() -> list[Path]:
+    places = [WEB / name for name in _NAMES]
+    below = (sorted(place.rglob("*")) if place.is_dir() else [place] for place in places)
+    return [path for paths in below for path in paths if path.is_file()]
+
+
+def bundled() -> dict[str, bytes]:
+    """Bundle them.
+
+    Raises:
+        InputError: there is no npm, or it does not get what it needs.
+        OSError: it cannot be started.
+
+    """
+    npm = shutil.which("npm")
+    if npm is None or shutil.which("node") is None:
+        raise InputError(
+            "the live page needs Node.js 20 or later and its npm, which bundle its script: "
+            "https://nodejs.org"
+        )
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        folder = Path(temporary, WEB.name)
+        for path in _sources():
+            target = folder / path.relative_to(WEB)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+        # Its packages bring programs of their own for each machine: none needs a script.
+        _run(folder, npm, "ci", "--omit=dev", "--ignore-scripts", "--prefer-offline")
+        _run(folder, "node", "build.mjs", "build")
+        return {name: (folder / "build" / name).read_bytes() for name in FILES}
+
+
+def _run(folder: Path, *command: str) -> None:
+    try:
+        process = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, errors="replace",
+            timeout=_LIMIT, check=False,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise InputError(f"{command[1]} has not ended after {_LIMIT:g} s") from None
+    if process.returncode != 0:
+        lines = [
+            line
+            for line in process.stderr.splitlines()
+            if line.startswith("npm error ") and "code" not in line
+        ]
+        said = (lines or [last_line(process.stderr)])[0]
+        raise InputError(f"the live page has no script: {' '.join(command[:2])}: {said}")

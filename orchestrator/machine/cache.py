@@ -199,7 +199,7 @@ def _root(category: str) -> Path:
         return path
     # Processes that work for another have nothing to say.
     if parent_process() is None:
-        warnings.warn(f"nothing is kept for later, because {why}", stacklevel=1)
+        warnings.warn(f"nothing is cached, because {why}", stacklevel=1)
     return process_folder() / path.name
 
 

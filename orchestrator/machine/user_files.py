@@ -206,8 +206,7 @@ def unpack(archive: Path) -> Unpacked:
         with _LOCK, archive.open("rb") as file:
             if file.peek(len(_POINTER)).startswith(_POINTER):
                 raise InputError(
-                    f"{archive}: is a pointer of Git LFS, not the file that it stands for: get "
-                    "that with `git lfs pull`"
+                    f"{archive}: is a Git LFS pointer, not the file itself: run `git lfs pull`"
                 )
             return _unpacked(archive, file)
     except InputError:

@@ -143,7 +143,7 @@ def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], lo
         return stepping
     log.remark(
         f"{', '.join(apart)}: runs in a separate process, since the FMU allows one instance "
-        "per process; steps are made in Python"
+        "per process; the Python loop makes the steps"
     )
     return PYTHON_LOOP
 

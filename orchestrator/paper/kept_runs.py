@@ -148,7 +148,7 @@ def _make(request: Request, key: str) -> KeptRun:
     try:
         prepared = prepare_request(request)
         if key_of(prepared) != key:
-            raise InputError("FMUs have changed while the report was made; make it again")
+            raise InputError("FMUs have changed while the report was made; run the command again")
         metrics = Metrics(prepared.loops)
         seen = VisibleRows({name for loop in prepared.loops for name in loop.drawn()})
         prepared.run([metrics, seen])

@@ -39,7 +39,7 @@ _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
 #: The files.
 _NAMES = _PAGE, _MARKDOWN = "report.html", "report.md"
 
-_TITLE = "# The paper's section 4, run again"
+_TITLE = "# Section 4 reproduced"
 
 _INTRODUCTION = """\
 *Three-dimensional tracking control of autonomous underwater vehicles with limited torque and \
@@ -187,10 +187,19 @@ def _text(
 
 
 def _claims(kept_runs: KeptRuns) -> str:
-    rows = []
+    rows, verdicts = [], []
     for claim in CLAIMS:
         finding = claim.finding([kept_runs[request] for request in claim.runs])
+        verdicts.append(finding.verdict)
         cells = [claim.title, claim.published, finding.ours, finding.verdict]
         runs = ", ".join(f"`{kept_runs.label(request)}`" for request in claim.runs)
         rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
-    return table(["claim", "paper", "ours", "verdict", "run"], rows)
+    return f"{counted(verdicts)}\n\n" + table(["claim", "paper", "ours", "verdict", "run"], rows)
+
+
+def counted(verdicts: Sequence[str]) -> str:
+    """How many verdicts there are of each kind, in a sentence."""
+    agree, differ = (sum(v.startswith(kind) for v in verdicts) for kind in ("agrees", "**"))
+    text = f"Of {len(verdicts)} printed numbers and claims, {agree} agree and {differ} do not"
+    rest = len(verdicts) - agree - differ
+    return f"{text}; for the other {rest} the verdict is a ratio, ours to the printed number."

@@ -148,7 +148,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         scenario = replace(scenario, events=request.events)
     stop_time = first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
-        raise InputError(f"{scenario.name}: names no stop time; give one with --stop-time")
+        raise InputError(f"{scenario.name}: has no stop time; set one with --stop-time")
     system = replace(system, steps={**system.steps, **request.steps})
     step = first_given(request.step, scenario.step, system.step)
     if step is None:

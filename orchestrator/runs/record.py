@@ -288,7 +288,7 @@ def _header(
         return header_in(record, columns)
     step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
     if not 0.0 < step < inf:
-        raise InputError(f"{file}: times must grow")
+        raise InputError(f"{file}: times must increase")
     return Header(columns, Experiment(step, step))
 
 
@@ -323,8 +323,8 @@ def checkpoints_of(
         every = interval_in(folders[0])
         if every is None:
             raise InputError(
-                f"there is nothing to resume in {folders[0]}; a run leaves something there with "
-                "--checkpoint-every"
+                f"nothing to resume in {folders[0]}; a run with "
+                "--checkpoint-every writes checkpoints there"
             )
     if every is None:
         return []
@@ -342,7 +342,7 @@ def checkpoints_of(
         if time is not None:
             say(f"{prepared.scenario.name}: continues at t = {time:g} s")
     if resume and not any(times):
-        say(f"there is nothing to resume in {folders[0]}: begins at the start")
+        say(f"nothing to resume in {folders[0]}: starts from the beginning")
     return found
 
 

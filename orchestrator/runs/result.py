@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
-from orchestrator.figures.style import Drawn
+from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.ledger import locate
 from orchestrator.machine.user_files import explain_errors, read_text
@@ -274,7 +274,8 @@ def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
     for vehicle, found in of_vehicles(values).items():
         for index in metrics():
             if index.name in found:
-                title = f"{index.label} {index.members}" + f" [{index.unit}]" * bool(index.unit)
+                unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
+                title = f"{index.label} {index.members}{unit}"
                 yield vehicle, title, [*map(_number, np.atleast_1d(found[index.name]).tolist())]
 
 

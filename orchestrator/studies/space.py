@@ -29,7 +29,7 @@ from orchestrator.studies.study import (
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value, is_finite, type_of, typed
+from orchestrator.system.values import Value, is_finite, type_of, typed, unit_of
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
 
@@ -48,6 +48,8 @@ class Space:
         prepared: the shortest run of each scenario, by its name.
         indices: the columns of what comes out of the runs.
         has_scenarios: whether there are several.
+        units: of what varies, as the FMUs write them; empty where there is none.
+        logarithmic: what is drawn by its logarithm.
 
     """
 
@@ -66,11 +68,15 @@ class Space:
         self._stop_time, self._scenarios = study.stop_time, tuple(study.scenario)
         self.has_scenarios = len(self._scenarios) > 1
         self.columns = {name: known.value_type(name) for name in study.varied}
+        self.units = {name: known.unit(name) for name in study.varied}
         self._grid = {
             name: tuple(known.typed(name, value) for value in values)
             for name, values in study.vary.items()
         }
         self._ranges = study.sample.ranges if study.sample else {}
+        self.logarithmic = {
+            name for name, range_of in self._ranges.items() if range_of.spacing == LOG_SPACING
+        }
         self._limits = {
             name: limits[:2] if key == name else (-max(limits[:2]), max(limits[:2]))
             for key, limits in self._ranges.items()
@@ -80,7 +86,7 @@ class Space:
             if self.columns[name] not in (float, int):
                 raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
             if self.columns[name] is int and name not in self._ranges:
-                raise InputError(f"{name}: a whole number cannot be drawn in a norm")
+                raise InputError(f"{name}: an integer cannot be part of a norm")
             for end in ends:
                 known.typed(name, end)
         samples = study.sample.n if study.sample else 1
@@ -178,6 +184,15 @@ class _Known:
     def value_type(self, name: str) -> type[Value]:
         """The type of a value."""
         return float if name == STEP else _TYPES[type_of(self._variable(name))]
+
+    def unit(self, name: str) -> str:
+        """The unit of a value; empty: it has none, or not the same in all systems."""
+        if name == STEP:
+            return "s"
+        target = port_name(name)
+        having = [one.component(target.component) for one in self._systems if one.has(target)]
+        units = {unit_of(component.variable(target.port)) or "" for component in having}
+        return units.pop() if len(units) == 1 else ""
 
     def typed(self, name: str, value: Any) -> Value:
         """A value in its type."""

@@ -279,11 +279,11 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
             is_norm = key.endswith("|") and len(norm_members(key)) in (2, 3)
             if key.startswith("|") and not (is_norm and min(limits.low, limits.high) >= 0.0):
                 raise InputError(
-                    f"{where}: {key}: a norm is of two or three numbers, and not negative"
+                    f"{where}: {key}: a norm takes two or three values and cannot be negative"
                 )
     findings.refuse()
     if not ranges:
-        raise InputError(f"{where}: draws nothing; name values under [sample.range]")
+        raise InputError(f"{where}: draws no values; name them under [sample.range]")
     return Sample(content["n"], ranges, content.get("method", METHODS[0]), content.get("seed", 0))
 
 
@@ -379,13 +379,15 @@ def _check_figure(
         for value in _listed(table.get(key, ())):
             if not is_known(value, numbers):
                 raise InputError(
-                    f"{where}: {key}: runs have no number {value!r}{did_you_mean(value, numbers)}"
+                    f"{where}: {key}: the runs have no number "
+                    f"{value!r}{did_you_mean(value, numbers)}"
                 )
     for key in ("by", "where"):
         for column in _listed(table.get(key, ())):
             if column not in columns:
                 raise InputError(
-                    f"{where}: {key}: runs have no column {column!r}{did_you_mean(column, columns)}"
+                    f"{where}: {key}: the runs have no column "
+                    f"{column!r}{did_you_mean(column, columns)}"
                 )
 
 

@@ -96,7 +96,8 @@ class Means:
             raise InputError(f"--workers {self.workers}: must be at least 1")
         if self.workers is not None and self.scheduler is not None:
             raise InputError(
-                "--workers is for processes of this machine: a scheduler starts its own"
+                "--workers sets the processes on this machine; workers of a scheduler are started "
+                "with the scheduler"
             )
 
 
@@ -193,7 +194,17 @@ def complete_study(
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(draw_figures(entries, study.title, result, unfinished, legends))
+            notes = list(
+                draw_figures(
+                    entries,
+                    study.title,
+                    result,
+                    unfinished,
+                    legends,
+                    space.units,
+                    space.logarithmic,
+                )
+            )
         for note in notes:
             say(note)
     return result

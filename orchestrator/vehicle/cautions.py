@@ -125,8 +125,8 @@ def _of_the_robust_term(table: Table, loop: Loop) -> list[str]:
         return []
     return [
         f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {eps} = "
-        f"{eps_t:g} W it has h p = {h_p:.3g} and reverses in every step above {_REVERSES:g}; "
-        "raise eps_t or take smaller steps"
+        f"{eps_t:g} W its step gain h p is {h_p:.3g}, and above {_REVERSES:g} its sign "
+        "changes in every step; raise eps_t or reduce --step"
     ]
 
 
@@ -169,8 +169,8 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
     if apart <= _SAME:
         return []
     return [
-        f"its reference {loop.planner}.y_d is up to {apart:.3g} m away from {name}'s: the two "
-        "runs follow different paths"
+        f"its reference {loop.planner}.y_d is up to {apart:.3g} m away from the one of {name}: the "
+        "two runs follow different paths"
     ]
 
 

@@ -8,10 +8,11 @@ from importlib import import_module
 import pytest
 from PIL import Image
 
+from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.indices import index_columns
-from pages import PICTURES
+from parts.gallery import PICTURES
 from support.markdown import DOCS
 
 PAGE = DOCS / "explanation" / "ready-studies.md"
@@ -19,12 +20,18 @@ PAGE = DOCS / "explanation" / "ready-studies.md"
 
 def test_every_picture_is_on_the_page_in_all_its_colours_and_small():
     named = set(re.findall(r"\(../(images/[^)]+)\)", PAGE.read_text(encoding="utf-8")))
-    files = [*(DOCS / PICTURES).iterdir()]
+    files = [*(DOCS / PICTURES / "studies").iterdir()]
     assert named == {file.relative_to(DOCS).as_posix() for file in files}
     assert all(file.stat().st_size < 300_000 for file in files)
     # A palette takes colours out of their scales.
     modes = {Image.open(file).mode for file in files}
-    assert modes == {"RGB"}, "run tools/study_pictures.py"
+    assert modes == {"RGB"}, "run tools/pictures.py"
+
+
+def test_every_scenario_has_a_picture_and_nothing_else_has():
+    files = [*(DOCS / PICTURES).glob("*.*")]
+    assert {file.name for file in files} == {f"{name}.png" for name in names()}
+    assert all(file.stat().st_size < 150_000 for file in files)
 
 
 @pytest.mark.parametrize("name", ready_studies())

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "orchestrator": (
-        "machine", "system", "formats", "master", "vehicle", "figures", "runs", "exchange",
+        "machine", "system", "formats", "master", "vehicle", "figures", "runs", "live", "exchange",
         "studies", "paper", "commands",
     ),
     "fmus": (

@@ -61,7 +61,7 @@ def test_nothing_is_wrong_with_ours(dist, workplace, capsys, name):
     if "." in name:
         shutil.copy(dist / name, workplace)
     assert main(["check", name]) == 0
-    assert lines(capsys) == [f"{name}: nothing is wrong with it"]
+    assert lines(capsys) == [f"{name}: no problems found"]
 
 
 def test_all_mistakes_of_a_scenario_are_said(workplace, capsys):
@@ -116,7 +116,7 @@ _SAID = 'nothing feeds or sets controller.dy.*; wire "controller.dy" = "plant.dy
 def test_a_forgotten_wire_is_named(workplace, capsys):
     Path("pd.toml").write_text(_FORGOTTEN)
     assert main(["check", "pd.toml"]) == 0
-    assert lines(capsys) == [f"to know: {_SAID}", "pd.toml: nothing is wrong with it"]
+    assert lines(capsys) == [f"info: {_SAID}", "pd.toml: no problems found"]
     run = ["run", "pd.toml", "--stop-time", "0.1", "--no-figures"]
     assert main(run) == 0
     assert f"warning: pd: {_SAID}" in capsys.readouterr().err
@@ -136,7 +136,7 @@ def test_a_forgotten_connection_of_an_archive_is_named(workplace, capsys):
     wires = tuple(c for c in system.connections if c.target.port != "dy.z")
     [path] = write_ssp(replace(system, connections=wires), workplace)
     assert main(["check", str(path)]) == 0
-    assert lines(capsys)[0] == "to know: nothing feeds or sets controller.dy.z"
+    assert lines(capsys)[0] == "info: nothing feeds or sets controller.dy.z"
 
 
 def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
@@ -169,7 +169,7 @@ def test_inputs_that_are_set_or_left_open_on_purpose_are_not_named(workplace, ca
     Path("dy.csv").write_text("time,controller.dy.x,controller.dy.y,controller.dy.z\n0,0,0,0\n")
     Path("pd.toml").write_text(_FORGOTTEN + more)
     assert main(["check", "pd.toml"]) == 0
-    assert lines(capsys) == ["pd.toml: nothing is wrong with it"]
+    assert lines(capsys) == ["pd.toml: no problems found"]
 
 
 #: What is set of the vehicle, and what is said then.
@@ -196,8 +196,8 @@ def test_another_vehicle_in_some_components_is_named(workplace, capsys, values):
     said = VEHICLES[values]
     Path("auv.toml").write_text(f"stop_time = 0.1\n[parameters]\n{values}\n")
     assert main(["check", "auv.toml"]) == 0
-    wrong = [] if said is None else [f"to know: {said}"]
-    assert lines(capsys) == [*wrong, "auv.toml: nothing is wrong with it"]
+    wrong = [] if said is None else [f"info: {said}"]
+    assert lines(capsys) == [*wrong, "auv.toml: no problems found"]
     assert main(["run", "auv.toml", "--no-figures"]) == 0
     assert capsys.readouterr().err == ("" if said is None else f"auv-fmu: warning: auv: {said}\n")
     assert main(["run", "auv.toml", "--no-figures", "--strict"]) == (0 if said is None else 2)

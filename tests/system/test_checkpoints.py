@@ -241,7 +241,7 @@ def test_another_run_is_refused(left, capsys, change, words):
     before = contents(Path("r"))
     assert run(*LEFT, *change, "--resume", out="r") == 2
     [line] = capsys.readouterr().err.splitlines()
-    assert line.startswith("auv-fmu: r/checkpoint is of another run: ")
+    assert line.startswith("auv-fmu: r/checkpoint belongs to another run: ")
     assert mentions(line, words)
     assert contents(Path("r/checkpoint")) == {
         name.removeprefix("checkpoint/"): content

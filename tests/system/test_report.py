@@ -96,6 +96,19 @@ def test_every_claim_has_a_row_and_every_effect_a_section(text):
         assert f"](figures/{effect.name}.png)" in text
 
 
+def test_the_verdicts_are_counted(text):
+    """From the table itself: its fourth column."""
+    [line] = re.findall(
+        r"^Of (\d+) printed numbers and claims, (\d+) agree and (\d+) do not", text, re.M
+    )
+    section = text.split("## Every printed number and claim")[1].split("\n## ")[0]
+    rows = [re.split(r"(?<!\\)\|", row) for row in section.splitlines() if row.startswith("|")]
+    verdicts = [row[4].strip() for row in rows[2:]]
+    agree = [verdict for verdict in verdicts if verdict.startswith("agrees")]
+    found = len(verdicts), len(agree), sum(verdict.startswith("**") for verdict in verdicts)
+    assert tuple(map(int, line)) == found
+
+
 def test_the_printed_table_stands_beside_every_reading(text):
     """Ours is twice what is printed."""
     assert "\n## The printed table against every reading\n" in text

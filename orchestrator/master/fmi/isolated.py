@@ -67,8 +67,7 @@ def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
         return Isolation() if step_timeout is None else Isolation(step_timeout)
     if step_timeout is not None:
         raise InputError(
-            "a step timeout needs --isolate, or isolate=True in Python: only an FMU in a separate "
-            "process can be ended"
+            "--step-timeout needs --isolate: only an FMU in a separate process can be ended"
         )
     return None
 

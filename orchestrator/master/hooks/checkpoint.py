@@ -88,8 +88,8 @@ class RowLog:
                 self._digest.update(rows.astype(_NUMBER, copy=False).tobytes())
         if not is_whole or self._digest.hexdigest() != digest:
             raise InputError(
-                f"{path}: missing, damaged, or not of the checkpoint beside it; move both, or let "
-                "--force move them aside"
+                f"{path}: missing, damaged, or of another checkpoint; move it and the checkpoint "
+                "beside it, or let --force move both aside"
             )
         self._file = path.open("r+b")
         there = (path.stat().st_size - _BEGIN) // row
@@ -239,13 +239,13 @@ class Checkpoints:
                 return found
             if not resume:
                 raise InputError(
-                    f"{self.folder} holds a run as it was at t = {found.time:g} s: --resume "
-                    "continues it; --force moves it aside and starts over"
+                    f"{self.folder} holds a checkpoint at t = {found.time:g} s: --resume continues "
+                    "from it; --force moves it aside and starts over"
                 )
             if different := differences(found.of, self._identity):
                 raise InputError(
-                    f"{self.folder} is of another run: {', '.join(different)} differ; run that "
-                    "one, or let --force move it aside and start over"
+                    f"{self.folder} belongs to another run: {', '.join(different)} differ; resume "
+                    "that run, or let --force move it aside and start over"
                 )
         except InputError:
             if not force:

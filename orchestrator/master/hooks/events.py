@@ -367,7 +367,7 @@ class Events:
         progress_of = self._progress[number]
         progress_of.listed += 1
         if progress_of.listed == _MOST_LISTED:
-            text += "; when it happens again is not listed"
+            text += "; later occurrences are not listed"
         if progress_of.listed <= _MOST_LISTED:
             self._happened.append(Occurrence(run.time, text, label, number))
 

@@ -51,7 +51,7 @@ class Chart {
   constructor(panel: Panel, scrub: (time: number) => void) {
     this.#panel = panel;
     this.root = document.createElement("figure");
-    this.root.className = "chart";
+    this.root.className = "chart pending";
     const caption = document.createElement("figcaption");
     caption.innerHTML = `<span class="name">${panel.title} <span class="unit">[${panel.unit}]</span></span>`;
     const readout = document.createElement("span");
@@ -214,6 +214,7 @@ class Chart {
 
   #redraw(): void {
     this.#stale = false;
+    this.root.classList.remove("pending");
     const empty = new Float64Array(0);
     this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
     this.show(this.#time);

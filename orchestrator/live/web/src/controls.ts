@@ -65,10 +65,11 @@ export class Controls {
     for (const field of this.#fields) field.value = current(field.parameter);
   }
 
-  /** Marks what a message names; empty: all is well. */
-  refuse(message: string): void {
-    for (const row of this.#rows) row.refuse(message);
+  /** Marks what a message names; empty: all is well. Returns whether the message can be seen. */
+  refuse(message: string): boolean {
     for (const field of this.#fields) field.refuse(message);
+    const said = this.#rows.filter((row) => row.refuse(message));
+    return said.some(({ root }) => root.closest("details")?.open);
   }
 }
 

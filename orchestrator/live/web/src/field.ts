@@ -149,6 +149,7 @@ export class SliderRow {
     fields.append(...this.fields.map(({ element }) => element));
     this.#error = document.createElement("p");
     this.#error.className = "error";
+    this.#error.setAttribute("role", "alert");
     this.#error.hidden = true;
     const head = document.createElement("div");
     head.className = "head";
@@ -173,10 +174,11 @@ export class SliderRow {
   }
 
   /** Marks it where a message names one of its parameters. */
-  refuse(message: string): void {
+  refuse(message: string): boolean {
     const isNamed = this.fields.map((field) => field.refuse(message)).includes(true);
     this.#error.hidden = !isNamed;
     this.#error.textContent = isNamed ? message : "";
+    return isNamed;
   }
 }
 

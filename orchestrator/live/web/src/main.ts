@@ -1,6 +1,6 @@
 // The page: it reads what Python has put into it, runs the preset that is opened, and draws it.
 
-import { Engine } from "./engine";
+import { type Api, Engine, makeApi } from "./engine";
 import { Page } from "./page";
 import type { Data } from "./types";
 
@@ -12,13 +12,21 @@ async function unpacked(id: string): Promise<ArrayBuffer> {
   return new Response(stream).arrayBuffer();
 }
 
-async function start(): Promise<void> {
+async function start(): Promise<Api> {
   const [data, module] = await Promise.all([unpacked("data"), unpacked("module")]);
   const found: Data = JSON.parse(new TextDecoder().decode(data));
-  new Page(found, await Engine.load(module, found));
+  const engine = await Engine.load(module, found);
+  return makeApi(found, engine, new Page(found, engine));
 }
 
-start().catch((error: unknown) => {
+const started = start();
+const api: Api = {
+  set: async (changes) => (await started).set(changes),
+  csv: async () => (await started).csv(),
+};
+Object.assign(globalThis, { auvfmu: api });
+
+started.catch((error: unknown) => {
   const note = document.getElementById("error");
   if (!note) throw error;
   note.hidden = false;

@@ -157,6 +157,13 @@ export class Page {
     this.#take(withValues(this.#settings, this.#preset, values));
   }
 
+  /** Takes settings as a whole, and runs. */
+  apply(settings: Settings): void {
+    this.#settings = settings;
+    this.#open();
+    this.#linkLater();
+  }
+
   get settings(): Settings {
     return this.#settings;
   }
@@ -194,21 +201,16 @@ export class Page {
 
   /** Runs what is set, and shows it. */
   run(): void {
-    const { stopTime, step, hidden } = this.#settings;
     this.#showSettings();
     try {
-      this.#results = this.#loops.map((loop) =>
-        hidden.includes(loop.label)
-          ? undefined
-          : this.#engine.run(loop, this.#settings.values, {
-              stopTime,
-              step,
-              events: eventsOf(this.#settings, loop),
-            }),
-      );
+      this.#results = this.#runs(this.#settings);
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
       this.#refuse(error.message);
+      // The last good runs stay; a link may have none.
+      if (this.#results.length > 0) return;
+      this.#results = this.#runs(untouched(this.#preset));
+      this.#draw();
       return;
     }
     const failures = this.#results.flatMap((result, k) => {
@@ -219,12 +221,21 @@ export class Page {
     this.#draw();
   }
 
+  #runs(settings: Settings): (Result | undefined)[] {
+    const { values, stopTime, step, hidden } = settings;
+    return this.#loops.map((loop) => {
+      if (hidden.includes(loop.label)) return undefined;
+      const events = eventsOf(settings, loop);
+      return this.#engine.run(loop, values, { stopTime, step, events });
+    });
+  }
+
   #refuse(message: string): void {
+    const isSeen = this.#controls.refuse(message);
     const error = element("error");
-    error.hidden = message === "";
-    error.textContent = message;
+    error.hidden = message === "" || isSeen;
+    error.textContent = isSeen ? "" : message;
     document.body.classList.toggle("refused", message !== "");
-    this.#controls.refuse(message);
   }
 
   #showSettings(): void {

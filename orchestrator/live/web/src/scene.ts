@@ -39,8 +39,8 @@ export interface Shown {
 const HALF = 0.3;
 
 /** Least length of the drawn vehicle: shares of the extents of the paths, and times ell. */
-const OF_LARGEST = 0.06;
-const OF_SECOND = 0.18;
+const OF_LARGEST = 0.09;
+const OF_SECOND = 0.2;
 const LENGTH = 2;
 
 /** Room for the numbers around the box [px]. */

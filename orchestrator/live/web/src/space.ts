@@ -69,7 +69,7 @@ export function ticks(low: number, high: number, wanted: number): number[] {
   const step = power * ([1, 2, 5, 10].find((m) => m * power >= rough * 0.999) ?? 10);
   const found: number[] = [];
   for (let k = Math.ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; k++) {
-    found.push(k * step);
+    found.push(k * step + 0);
   }
   return found;
 }

@@ -12,8 +12,15 @@ for (const { name, stopTime, step, events, loops } of content.presets) {
   for (const [i, loop] of loops.entries()) {
     const result = made.run(loop, {}, { stopTime, step, events: loop.events[events] ?? [] });
     writeFileSync(`${folder}/${name}.${i}`, result.table);
-    const { columns, happened, failure, messages } = result;
-    found[`${name}.${i}`] = { columns, happened, failure, messages, metrics: metrics(result) };
+    const { columns, happened, failure, remark, messages } = result;
+    found[`${name}.${i}`] = {
+      columns,
+      happened,
+      failure,
+      remark,
+      messages,
+      metrics: metrics(result),
+    };
   }
 }
 console.log(JSON.stringify(found));

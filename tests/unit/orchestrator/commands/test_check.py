@@ -52,7 +52,7 @@ def said_of(path: Path) -> list[str]:
     component = examine(path, findings)
     assert (component is None) == bool(findings.problems)
     texts = {"problem": findings.problems, "note": findings.notes}
-    texts["to know"] = [] if component is None else list(surprises(component))
+    texts["info"] = [] if component is None else list(surprises(component))
     return [f"{kind}: {text}" for kind in texts for text in texts[kind]]
 
 
@@ -68,12 +68,12 @@ def test_of_a_good_fmu_nothing_is_said(fmu):
         ("note", ('valueReference="1"', 'valueReference="0"'), "u p one"),
         ("note", ('<Real start="0"/>', '<Real start="0" unit="m"/>'), 'unit "m"'),
         ("note", ('causality="output"', 'causality="output" initial="exact"'), '"y"'),
-        ("to know", ("CommunicationStepSize", "CommunicationStep"), "steps fixed length"),
-        ("to know", ('canSerializeFMUstate="true"', 'needsExecutionTool="true"'), "program"),
-        ("to know", ('canGetAndSetFMUstate="true" canSerializeFMUstate="true"', ""), "no state"),
-        ("to know", (' dependencies="1"', ""), "depend all inputs"),
+        ("info", ("CommunicationStepSize", "CommunicationStep"), "steps fixed length"),
+        ("info", ('canSerializeFMUstate="true"', 'needsExecutionTool="true"'), "program"),
+        ("info", ('canGetAndSetFMUstate="true" canSerializeFMUstate="true"', ""), "no state"),
+        ("info", (' dependencies="1"', ""), "depend all inputs"),
         (
-            "to know",
+            "info",
             ('canSerializeFMUstate="true"', 'canBeInstantiatedOnlyOncePerProcess="true"'),
             "one instance process",
         ),

@@ -68,7 +68,7 @@ def test_film_has_a_frame_for_each_instant(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("name", "fps", "text"), [("a.avi", 20, "write a .gif"), ("a.gif", 0, "--fps 0")]
+    ("name", "fps", "text"), [("a.avi", 20, "must end with .gif"), ("a.gif", 0, "--fps 0")]
 )
 def test_films_that_cannot_be_written_are_refused(tmp_path, name, fps, text):
     with pytest.raises(InputError, match=text):

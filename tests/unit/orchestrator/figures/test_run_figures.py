@@ -75,9 +75,9 @@ def test_panels_end_together():
 @pytest.mark.parametrize(
     ("without", "note"),
     [
-        (STANDARD.theta_hat, "estimated parameters left out: no controller.theta_hat[1]"),
-        (STANDARD.y_d, "tracking errors left out: no planner.y_d.x"),
-        (STANDARD.commanded, "commands left out: no plant.tau.u"),
+        (STANDARD.theta_hat, "estimated parameters skipped: no controller.theta_hat[1]"),
+        (STANDARD.y_d, "tracking errors skipped: no planner.y_d.x"),
+        (STANDARD.commanded, "commands skipped: no plant.tau.u"),
     ],
 )
 def test_what_is_missing_is_left_out_with_a_note(without, note):
@@ -88,7 +88,7 @@ def test_what_is_missing_is_left_out_with_a_note(without, note):
 
 def test_a_figure_that_is_missing_is_left_out_with_a_note(tmp_path):
     notes = notes_of("tracking", loop_table(without=STANDARD.dy_hat), folder=tmp_path)
-    assert notes == ["f-velocity left out: no controller.dy_hat.x"]
+    assert notes == ["f-velocity skipped: no controller.dy_hat.x"]
     assert {path.name for path in tmp_path.iterdir()} == {"f.png", "f.svg"}
 
 
@@ -110,7 +110,7 @@ def test_a_run_without_a_step_is_no_figure(tmp_path):
 def test_a_companion_that_lacks_something_is_named(tmp_path):
     companion = loop_table(without=STANDARD.y_d)
     notes = notes_of("comparison-errors", loop_table(), companion, folder=tmp_path)
-    assert "tracking errors of run 1 left out: no planner.y_d.x" in notes
+    assert "tracking errors of run 1 skipped: no planner.y_d.x" in notes
 
 
 def test_colours_belong_to_runs():

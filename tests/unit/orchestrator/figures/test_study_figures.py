@@ -74,6 +74,29 @@ def test_maps_are_medians_and_grey_where_no_run_has_any():
             np.testing.assert_equal(found, np.median(runs["late_error"][here]))
 
 
+def explained(figure):
+    """What stands in the legend below the panels."""
+    return [text.get_text() for legend in figure.legends for text in legend.texts]
+
+
+def test_limits_bands_and_grey_cells_are_explained():
+    runs = Values(columns(), legends=LEGENDS)
+    shown = entry(
+        kind="bands", x="disturbance.A_f", show=["late_error", "peak_command.u"],
+        limits={"peak_command.u": 80.0},
+    )  # fmt: skip
+    band = "band: 80% of the runs, line: median"
+    assert explained(bands(shown, "", runs)) == ["proposed", "PD", "limit", band]
+    shares = entry(kind="bands", x="disturbance.A_f", show=["lost"])
+    assert explained(bands(shares, "", runs)) == ["proposed", "PD"]
+    cells = {"kind": "maps", "x": "disturbance.A_f", "y": "disturbance.A_d"}
+    with_gaps = entry(**cells, show="late_error", limits={"late_error": 1.0})
+    figure = maps(with_gaps, "", runs)
+    assert explained(figure) == ["no run has a value here"]
+    assert figure.axes[-1].get_ylabel() == "largest late error [m]\n(white line: 1)"
+    assert explained(maps(entry(**cells, show="peak_command.u"), "", runs)) == []
+
+
 def test_front_is_what_nothing_else_beats():
     points = np.random.default_rng(4).integers(0, 30, (200, 2)).astype(float)
     found = {tuple(point) for point in pareto_front(points)}
@@ -104,8 +127,8 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()
         assert list(draw_figures(entries, "A_f and A_d", columns(), folder)) == [
-            "figure drift left out: no run has largest_drift",
-            "figure many left out: by tells 25 parts of the runs apart",
+            "figure drift skipped: no run has largest_drift",
+            "figure many skipped: by tells 25 parts of the runs apart",
         ]
     found = contents(tmp_path / "a")
     assert found.keys() == {"error.png", "error.svg", "effort.png", "effort.svg"}

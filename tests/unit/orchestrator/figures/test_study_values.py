@@ -121,6 +121,20 @@ def test_each_value_of_a_grid_has_a_bin(grid):
     assert all(np.diff(bins.edges) > 0.0)
 
 
+def test_axis_of_a_log_spaced_value_is_logarithmic_however_narrow():
+    narrow = np.random.default_rng(4).uniform(1.0, 3.0, 100)
+    assert bins_of(narrow, 10, is_wide=True).is_logarithmic
+    assert not bins_of(narrow, 10).is_logarithmic
+    assert bins_of(np.geomspace(1.0, 3.0, 5), 10).is_logarithmic
+    assert not bins_of(np.linspace(1.0, 3.0, 5), 10).is_logarithmic
+
+
+def test_parameters_have_the_units_of_their_fmus():
+    values = Values(columns(), units={"controller.k_d": "1/s", "plant.m11": "kg.m2"})
+    assert values.label("controller.k_d") == "controller.k_d [1/s]"
+    assert values.where({}).label("plant.m11") == "plant.m11 [kg·m²]"
+
+
 def test_bins_of_anything_else_are_equally_wide_or_equally_full():
     values = np.random.default_rng(1).lognormal(0.0, 2.0, 1000)
     full = bins_of(values, 10, are_full=True)

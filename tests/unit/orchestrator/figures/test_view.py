@@ -72,7 +72,7 @@ def test_body_is_upright_whichever_way_z_points(z_up):
 
 def test_what_is_missing_is_named_on_the_page():
     text = view_page("run", Drawn("run", loop_table(without=STANDARD.theta_hat)))
-    assert "estimated parameters left out: no controller.theta_hat[1]" in text
+    assert "estimated parameters skipped: no controller.theta_hat[1]" in text
 
 
 def test_a_run_without_a_vehicle_has_no_page():

@@ -98,8 +98,8 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ({"sample": {"n": 10, "range": {"plant.ell": [1, float("inf")]}}}, "write [low, high]"),
         ({"stop_time": float("inf")}, "stop_time = inf: write a number, or table"),
         ({"stop_time": {"base": 1, "per": {"plant.ell": 10**400}}}, "write a table of numbers"),
-        ({"vary": {"ell": [1.0]}}, "'ell': write COMPONENT.PORT"),
-        ({"parameters": {"step": 0.01}}, "'step': write COMPONENT.PORT"),
+        ({"vary": {"ell": [1.0]}}, "'ell': write COMPONENT.PORT, for example plant.m11"),
+        ({"parameters": {"step": 0.01}}, "'step': write COMPONENT.PORT, for example plant.m11"),
         (
             {"parameters": {"plant.ell": 1.0}, "vary": {"plant.ell": [1.0]}},
             "plant.ell is stated twice",
@@ -108,7 +108,7 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ({"sample": {"range": {"plant.ell": [1, 2]}}}, "sample: lacks n"),
         ({"sample": {"n": 3}}, "sample: lacks range"),
         ({"sample": {"n": 0, "range": {"plant.ell": [1, 2]}}}, "sample: n = 0"),
-        ({"sample": {"n": 1, "range": {}}}, "sample: draws nothing"),
+        ({"sample": {"n": 1, "range": {}}}, "sample: draws no values"),
         ({"sample": {"n": 1, "seed": -1, "range": {}}}, "seed = -1: write a whole number from 0"),
         (
             {"sample": {"n": 1, "range": {"plant.ell": [1, 2, 3]}}},
@@ -116,7 +116,7 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ),
         ({"sample": {"n": 1, "method": "halton", "range": {}}}, "sample: method = 'halton'"),
         *(
-            ({"sample": {"n": 1, "range": {norm: ends}}}, "a norm is of two or three numbers")
+            ({"sample": {"n": 1, "range": {norm: ends}}}, "a norm takes two or three values")
             for norm, ends in (
                 ("|plant.nu0.u|", [0, 1]),
                 ("|plant.nu0.u, plant.nu0.v", [0, 1]),
@@ -226,12 +226,12 @@ def test_a_file_that_says_nothing_has_a_figure_of_all_numbers_that_vary():
     [
         (
             {**BANDS, "show": "late_errors"},
-            "show: runs have no number 'late_errors'; did you mean",
+            "show: the runs have no number 'late_errors'; did you mean",
         ),
-        ({**BANDS, "x": "plant.eta0.x"}, "x: runs have no number 'plant.eta0.x'"),
-        ({**BANDS, "x": "controller.observer"}, "x: runs have no number 'controller.observer'"),
-        ({**BANDS, "by": "controller.observe"}, "by: runs have no column 'controller.observe'"),
-        ({**BANDS, "where": {"step": 0.1}}, "where: runs have no column 'step'"),
+        ({**BANDS, "x": "plant.eta0.x"}, "x: the runs have no number 'plant.eta0.x'"),
+        ({**BANDS, "x": "controller.observer"}, "x: the runs have no number 'controller.observer'"),
+        ({**BANDS, "by": "controller.observe"}, "by: the runs have no column 'controller.observe'"),
+        ({**BANDS, "where": {"step": 0.1}}, "where: the runs have no column 'step'"),
     ],
 )
 def test_mistakes_are_told_in_a_line(figure, complaint):

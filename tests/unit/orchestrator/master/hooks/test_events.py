@@ -222,7 +222,7 @@ def test_a_condition_that_chatters_is_not_listed_for_ever():
         run.made, run.row.values[0] = k, k % 2
         events.act(run)
     assert len(run.happened) == 1000
-    assert run.happened[-1].text == "x; when it happens again is not listed"
+    assert run.happened[-1].text == "x; later occurrences are not listed"
 
 
 def test_nothing_is_wanted_where_nothing_can_happen_any_more():

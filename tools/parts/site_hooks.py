@@ -24,7 +24,7 @@ from mkdocs.structure.pages import Page
 from orchestrator.live import assembly
 from orchestrator.machine.errors import InputError
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 #: Where the site has the files of the root.
 PAGES = {
@@ -50,6 +50,7 @@ BOOSTS = {
 
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: ([\w-]+) -->")
+_ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
 
 log = logging.getLogger(f"mkdocs.hooks.{__name__}")
 _why_not = ""
@@ -77,6 +78,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     """Point links to the site's pages, and to the live page from where it is announced."""
     [boost] = [n for place, n in BOOSTS.items() if page.file.src_uri.startswith(place)] or [1.0]
     page.meta["search"] = {"boost": boost}
+    if "/" not in page.file.src_uri:
+        # Nothing stands beside these pages in the tree.
+        page.meta["hide"] = ["navigation"]
     if page.file.src_uri not in PAGES.values() or page.file.src_uri == PAGES["README.md"]:
         markdown = linked(markdown, f"docs/{page.file.src_uri}", files)
     up = posixpath.relpath(LIVE, posixpath.dirname(page.file.src_uri) or ".")
@@ -85,8 +89,14 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     else:
         note = f'<iframe class="live" src="{up}" title="The live page" loading="lazy"></iframe>'
     markdown = markdown.replace("<!-- the live page -->", note)
-    link = "" if _why_not else rf"[Open it on the live page]({up}#preset=\1)"
+    markdown = _ROW.sub(_with_plain_bars, markdown)
+    link = "" if _why_not else rf"[Try it on the live page]({up}#preset=\1)"
     return _PRESET.sub(link, markdown)
+
+
+def _with_plain_bars(row: re.Match[str]) -> str:
+    """A row of a table: GitHub needs a backslash before bars in its code, here it would show."""
+    return _CODE.sub(lambda code: code.group().replace(r"\|", "|"), row.group())
 
 
 def linked(text: str, source: str, files: Files) -> str:

@@ -1,0 +1,76 @@
+// What scripts may ask of the page: `auvfmu.set({"controller.k_d": 30})`, `auvfmu.csv()`.
+
+import { csv } from "./csv";
+import { Refusal } from "./experiment";
+import { fromHash, toHash } from "./link";
+import { eventsOf, presetOf, type Settings, untouched } from "./settings";
+import type { Data, Engine, Result, Value } from "./types";
+
+export interface Api {
+  /**
+   * Changes settings, runs, and draws. The names are the ones of links: `component.parameter`,
+   * `stop_time`, `step`, `events`, `preset`, which begins as it is. Settings that are refused
+   * change nothing.
+   */
+  set(changes: Readonly<Record<string, Value>>): Promise<void>;
+  /** The rows of the scenario's own loop, as result.csv has them. */
+  csv(): Promise<string>;
+}
+
+/** What keeps the settings: the page, or anything where there is none. */
+export interface Keeper {
+  readonly settings: Settings;
+  apply(settings: Settings): void;
+}
+
+/** Settings with changes. */
+function changed(
+  settings: Settings,
+  data: Data,
+  changes: Readonly<Record<string, Value>>,
+): Settings {
+  // A preset that is named begins as it is.
+  const fields = new URLSearchParams("preset" in changes ? "" : toHash(settings, data).slice(1));
+  for (const [name, value] of Object.entries(changes)) fields.set(name, String(value));
+  const found = fromHash(fields.toString(), data);
+  if (found.unknown.length > 0) throw new Refusal(`not understood: ${found.unknown.join(", ")}`);
+  return found.settings;
+}
+
+/** A run of the scenario's own loop. */
+function run(data: Data, engine: Engine, settings: Settings): Result {
+  const preset = presetOf(data, settings.preset);
+  if (preset === undefined) throw new Refusal(`there is no preset ${settings.preset}`);
+  const { values, stopTime, step } = settings;
+  const [loop] = preset.loops;
+  return engine.run(loop, values, { stopTime, step, events: eventsOf(settings, loop) });
+}
+
+/** The interface for scripts over whatever keeps the settings. */
+export function makeApi(data: Data, engine: Engine, keeper: Keeper): Api {
+  return {
+    async set(changes) {
+      const settings = changed(keeper.settings, data, changes);
+      run(data, engine, settings);
+      keeper.apply(settings);
+    },
+    async csv() {
+      return csv(run(data, engine, keeper.settings));
+    },
+  };
+}
+
+/** The same without a page. */
+export function apiWithoutPage(data: Data, engine: Engine): Api {
+  const opened = presetOf(data, data.opened) ?? data.presets[0];
+  let settings = untouched(opened);
+  const apply = (taken: Settings) => {
+    settings = taken;
+  };
+  return makeApi(data, engine, {
+    get settings() {
+      return settings;
+    },
+    apply,
+  });
+}

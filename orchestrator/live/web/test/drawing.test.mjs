@@ -1,0 +1,90 @@
+// What sliders, axes and readouts compute, against numbers worked out by hand.
+import assert from "node:assert/strict";
+import test from "node:test";
+import { load } from "./load.mjs";
+
+const { valueAt, positionOf, POSITIONS } = await load("scales");
+const { boxOf, distanceFor, drawn, eyeAxes, rotation, ticks } = await load("space");
+
+const near = (found, wanted, tolerance = 1e-12) =>
+  assert.ok(Math.abs(found - wanted) <= tolerance, `${found} is not ${wanted}`);
+
+test("a slider's ends and middle", () => {
+  const scale = { low: -20, high: 20 };
+  assert.deepEqual(
+    [0, 500, 1000].map((p) => valueAt(scale, p)),
+    [-20, 0, 20],
+  );
+  const decades = { low: 0.1, high: 1000, log: true };
+  assert.deepEqual(
+    [0, 250, 500, 750, 1000].map((p) => valueAt(decades, p)),
+    [0.1, 1, 10, 100, 1000],
+  );
+  assert.deepEqual(
+    [0, 1000].map((p) => valueAt({ low: 1e-5, high: 1, log: true, zero: true }, p)),
+    [0, 1],
+  );
+  assert.equal(valueAt({ low: 1, high: 100, whole: true }, 505), 51);
+});
+
+test("positions follow values, and stay on the slider", () => {
+  const scale = { low: 0.1, high: 1000, log: true };
+  assert.deepEqual(
+    [0, 0.1, 10, 1000, 1e9].map((v) => positionOf(scale, v)),
+    [0, 0, 500, POSITIONS, POSITIONS],
+  );
+});
+
+test("a turn by a quarter takes x to y, and pitch lifts the nose", () => {
+  const yaw = rotation(0, 0, Math.PI / 2);
+  for (const [row, wanted] of [0, 1, 0].entries()) near(yaw[3 * row], wanted);
+  const pitch = rotation(0, Math.PI / 2, 0);
+  // z is down: a nose that points up has z = -1.
+  for (const [row, wanted] of [0, 0, -1].entries()) near(pitch[3 * row], wanted);
+});
+
+test("axes are right-handed as they are drawn", () => {
+  for (const zUp of [true, false]) {
+    const [x, y, z] = [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ].map((p) => drawn(...p, zUp));
+    const cross = [x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0]];
+    assert.deepEqual(
+      cross.map((v) => v + 0),
+      z.map((v) => v + 0),
+    );
+    assert.equal(z[1], zUp ? 1 : -1);
+  }
+});
+
+test("round numbers between the ends", () => {
+  assert.deepEqual(ticks(-2.1, 6.2, 5), [-2, 0, 2, 4, 6]);
+  assert.deepEqual(ticks(0, 100, 5), [0, 20, 40, 60, 80, 100]);
+  assert.deepEqual(ticks(1, 1, 5), []);
+});
+
+test("a box holds all points, and something where there are none", () => {
+  assert.deepEqual(boxOf([Float64Array.of(0, 1, 2, 4, -3, 2)], 1), {
+    low: [-1, -4, 1],
+    high: [5, 2, 3],
+  });
+  assert.deepEqual(boxOf([], 0), { low: [-1, -1, -1], high: [1, 1, 1] });
+});
+
+test("the eye stands so far away that a cube just fits", () => {
+  const box = { low: [-1, -1, -1], high: [1, 1, 1] };
+  // From the front: the near face is one in front of the middle, and one high.
+  near(distanceFor(box, { azimuth: 0, elevation: 0 }, Math.PI / 4, 1), 2);
+  near(distanceFor(box, { azimuth: 0, elevation: 0 }, Math.PI / 4, 0.5), 3);
+  const [right, up, back] = eyeAxes({ azimuth: 0, elevation: 0 });
+  assert.deepEqual(
+    [right, up, back].map((axis) => axis.map((v) => v + 0)),
+    [
+      [1, 0, 0],
+      [0, 1, 0],
+      [0, 0, 1],
+    ],
+  );
+});

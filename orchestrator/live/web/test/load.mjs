@@ -1,0 +1,87 @@
+// Loads a module of the page into Node.
+import { build } from "esbuild";
+
+export async function load(name) {
+  const { outputFiles } = await build({
+    entryPoints: [new URL(`../src/${name}.ts`, import.meta.url).pathname],
+    bundle: true,
+    format: "esm",
+    platform: "node",
+    write: false,
+  });
+  return import(
+    `data:text/javascript;base64,${Buffer.from(outputFiles[0].contents).toString("base64")}`
+  );
+}
+
+const parameter = (name, value, more = {}) => ({
+  name,
+  type: "Real",
+  default: value,
+  value,
+  description: "",
+  tunable: true,
+  ...more,
+});
+
+const gains = [
+  parameter("controller.eps_t", 10, { default: 1 }),
+  parameter("controller.K1[1]", 10),
+];
+const vehicle = [
+  parameter("plant.noise.std", 0.001),
+  parameter("plant.roll", true, { type: "Boolean" }),
+  parameter("plant.integrator", "euler", { type: "String", choices: ["euler", "rk4"] }),
+];
+const events = {
+  fault: [
+    {
+      text: "override plant.tau.r = 0",
+      label: "no yaw moment",
+      action: { kind: "alter", effect: "override", values: [["plant.tau.r", 0]] },
+      at: 50,
+      lasts: 10,
+    },
+    {
+      text: "freeze controller.y.x",
+      label: 'a "fix"',
+      action: { kind: "freeze", targets: ["controller.y.x"] },
+      when: { signal: "plant.eta.z", comparison: "<", value: -1.5 },
+    },
+  ],
+};
+const components = (controller) => ({
+  plant: "AuvPlant",
+  controller,
+  disturbance: "DisturbanceGenerator",
+  planner: "MotionPlanner",
+});
+const loop = (label, controller, more) => ({
+  label,
+  components: components(controller),
+  initial: [],
+  stages: [],
+  parameters: [...gains, ...vehicle],
+  events,
+  ...more,
+});
+
+/** A page's data with one preset, without FMUs. */
+export const preset = {
+  name: "fault",
+  title: "",
+  remark: "",
+  zUp: true,
+  stopTime: 100,
+  step: 0.02,
+  events: "fault",
+  comparing: true,
+  loops: [
+    loop("proposed", "ObserverController", {
+      scenario: "fault",
+      parameters: [...gains, parameter("controller.k_d", 50), ...vehicle],
+    }),
+    loop("PD", "PdController"),
+  ],
+};
+export const data = { version: "0", opened: "fault", fmus: {}, presets: [preset], indices: [] };

@@ -1,0 +1,150 @@
+// Settings, the link and the command line, against texts written out.
+import assert from "node:assert/strict";
+import test from "node:test";
+import { data, load, preset } from "./load.mjs";
+
+const { fromHash, toHash } = await load("link");
+const { untouched, withEdit, withValues, eventsOf } = await load("settings");
+const { commandLine, toToml } = await load("command");
+
+const start = untouched(preset);
+
+test("a value that is the preset's is no change", () => {
+  const changed = withValues(start, preset, { "controller.eps_t": 3, "plant.noise.std": 0 });
+  assert.deepEqual(changed.values, { "controller.eps_t": 3, "plant.noise.std": 0 });
+  const back = withValues(changed, preset, { "controller.eps_t": 10 });
+  assert.deepEqual(back.values, { "plant.noise.std": 0 });
+});
+
+test("a time that is the event's own is no change", () => {
+  const changed = withEdit(start, preset, 0, { at: 40, lasts: null });
+  assert.deepEqual(changed.edits, { 0: { at: 40, lasts: null } });
+  assert.deepEqual(withEdit(changed, preset, 0, { at: 50, lasts: 10 }).edits, {});
+});
+
+test("an edited event keeps what it does", () => {
+  const [first, second] = eventsOf(
+    withEdit(start, preset, 0, { at: 40, lasts: null }),
+    preset.loops[0],
+  );
+  assert.equal(first.at, 40);
+  assert.equal("lasts" in first, false);
+  assert.equal(first.label, "no yaw moment");
+  assert.deepEqual(second, preset.loops[0].events.fault[1]);
+});
+
+test("a link holds what differs, and reads back as the same settings", () => {
+  assert.equal(toHash(start, data), "#preset=fault");
+  let changed = withValues(start, preset, {
+    "controller.K1[1]": 2.5e-7,
+    "plant.roll": false,
+    "plant.integrator": "rk4",
+  });
+  changed = withEdit({ ...changed, stopTime: 50, step: 0.01 }, preset, 0, { at: 40, lasts: null });
+  changed = { ...changed, hidden: ["PD"] };
+  const hash = toHash(changed, data);
+  assert.equal(
+    hash,
+    "#preset=fault&controller.K1[1]=2.5e-7&plant.roll=false&plant.integrator=rk4" +
+      "&stop_time=50&step=0.01&events.1.at=40&events.1.for=always&hide=PD",
+  );
+  assert.deepEqual(fromHash(hash, data), { settings: changed, unknown: [] });
+});
+
+test("a link without events has none", () => {
+  const none = { ...start, events: "" };
+  assert.equal(toHash(none, data), "#preset=fault&events=");
+  assert.deepEqual(fromHash("#preset=fault&events=", data).settings, none);
+});
+
+test("what a link says wrongly is named and left out", () => {
+  const { settings, unknown } = fromHash(
+    "#preset=no&controller.eps_t=x&plant.lost=1&stop_time=",
+    data,
+  );
+  assert.deepEqual(settings, start);
+  assert.deepEqual(unknown, ["preset=no", "controller.eps_t=x", "plant.lost=1", "stop_time="]);
+});
+
+test("an empty link is the preset that is opened", () => {
+  assert.deepEqual(fromHash("", data), { settings: start, unknown: [] });
+});
+
+test("the command has what differs, for the parameters of its loop", () => {
+  const [own] = preset.loops;
+  assert.equal(commandLine(start, preset, own), "auv-fmu run fault");
+  const changed = withValues({ ...start, stopTime: 50, step: 0.01 }, preset, {
+    "controller.K1[1]": 20,
+    "controller.k_d": 40,
+  });
+  assert.equal(
+    commandLine(changed, preset, own),
+    "auv-fmu run fault --set 'controller.K1[1]=20' --set controller.k_d=40 --stop-time 50 --step 0.01",
+  );
+});
+
+test("edited events are a file", () => {
+  const changed = withEdit(start, preset, 0, { at: 40 });
+  assert.equal(
+    commandLine(changed, preset, preset.loops[0]),
+    `cat > fault-events.toml <<'END'
+[[events]]
+at = 40
+for = 10
+override = { "plant.tau.r" = 0 }
+label = "no yaw moment"
+
+[[events]]
+when = "plant.eta.z < -1.5"
+freeze = ["controller.y.x"]
+label = "a \\"fix\\""
+END
+auv-fmu run fault --events fault-events.toml`,
+  );
+});
+
+test("no events are a file that says so", () => {
+  const text = commandLine({ ...start, events: "" }, preset, preset.loops[0]);
+  assert.equal(text.split("\n")[1], "events = []");
+});
+
+test("a loop without a scenario is a scenario file", () => {
+  const changed = withValues({ ...start, events: "" }, preset, { "plant.noise.std": 0 });
+  assert.equal(
+    commandLine(changed, preset, preset.loops[1]),
+    `cat > fault-PD.toml <<'END'
+title = "fault with the PD controller"
+stop_time = 100
+step = 0.02
+
+[components]
+plant = "AuvPlant"
+controller = "PdController"
+disturbance = "DisturbanceGenerator"
+planner = "MotionPlanner"
+
+[wires]
+"controller.dy" = "plant.dy"
+
+[parameters]
+"controller.eps_t" = 10
+"plant.noise.std" = 0
+END
+auv-fmu run fault-PD.toml`,
+  );
+});
+
+test("all actions have their word in a scenario file", () => {
+  const action = (one) => toToml([{ text: "", label: "", at: 0, action: one }]).split("\n")[2];
+  assert.equal(
+    action({
+      kind: "set",
+      parameters: [["plant.current.x", 0.3]],
+      inputs: [["plant.tau.u", true]],
+    }),
+    'set = { "plant.current.x" = 0.3, "plant.tau.u" = true }',
+  );
+  assert.equal(action({ kind: "release", targets: ["a.b", "a.c"] }), 'release = ["a.b", "a.c"]');
+  assert.equal(action({ kind: "reset", components: ["plant"] }), 'reset = ["plant"]');
+  assert.equal(action({ kind: "stop", why: "" }), "stop = true");
+});

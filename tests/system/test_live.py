@@ -1,0 +1,297 @@
+"""`auv-fmu live`: the page's rows in Node and in a browser, beside the ones of the native FMUs."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import which
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+from orchestrator.commands.main import main
+from orchestrator.live.assembly import ENGINE, WEB, live_page, live_script
+from orchestrator.live.module import live_module
+from orchestrator.live.presets import page_data, preset, runs_of
+from orchestrator.master.observers.table import Table
+from orchestrator.runs.scenario import names
+from orchestrator.vehicle.indices import metrics_of
+from support.browser import BROWSER, Browser, browser
+
+NODE = which("node") and which("npm")
+
+pytestmark = [
+    pytest.mark.skipif(NODE is None, reason="npm is not installed"),
+    pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed"),
+]
+
+#: What rows may differ by, relative to the larger of 1 and the value: C libraries differ in the
+#: last bit of functions such as sine.
+TOLERANCE = 1e-9
+
+#: Until when [s] that is so where a run is chaotic: 100 m away, the robust term of the PD
+#: controller switches at every step.
+CHAOTIC = {"fig6-pd": 10.0}
+
+#: Changes of settings, each from the ones before it: all scenarios, then events and a path in
+#: others, and other values.
+CHANGES: list[dict[str, Any]] = [
+    *({"preset": name} for name in names()),
+    {"preset": "path", "events": "fault-sensor", "planner.waypoint[2].z": 2.5},
+    {"preset": "fig4", "events": "fault-thruster", "stop_time": 70.0, "plant.noise.seed": 7},
+    {"events": "", "stop_time": 10.01, "controller.saturation": "algebraic", "plant.roll": False},
+]
+
+
+class Parts(NamedTuple):
+    """What the page is made of, as files."""
+
+    engine: Path
+    module: Path
+    data: Path
+
+    def node(self, script: str, *arguments: str, given: str = "") -> Any:
+        """What a script of the tests says, that takes them first."""
+        command = ["node", str(WEB / "test" / script), *map(str, self), *arguments]
+        process = subprocess.run(command, input=given, capture_output=True, text=True, check=False)
+        assert process.returncode == 0, process.stderr
+        return json.loads(process.stdout)
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
+    """Script, module and data."""
+    folder = tmp_path_factory.mktemp("parts")
+    (folder / "loop.wasm").write_bytes(live_module())
+    (folder / "data.json").write_text(json.dumps(page_data("fig4")))
+    return Parts(live_script()[ENGINE], folder / "loop.wasm", folder / "data.json")
+
+
+class Rows(NamedTuple):
+    """Rows of all loops in Node, and what else is said of them."""
+
+    folder: Path
+    said: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def rows(parts: Parts, tmp_path_factory: pytest.TempPathFactory) -> Rows:
+    """The runs of all presets."""
+    folder = tmp_path_factory.mktemp("rows")
+    return Rows(folder, parts.node("rows.mjs", str(folder)))
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page, as the command writes it."""
+    path = tmp_path_factory.mktemp("page") / "live.html"
+    assert main(["live", "--out", str(path)]) == 0
+    return path
+
+
+@pytest.fixture(scope="module")
+def opened(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A browser with the page."""
+    if BROWSER is None:
+        pytest.skip("Chromium is not installed")
+    with browser(tmp_path_factory.mktemp("profile")) as found:
+        found.open(page)
+        yield found
+
+
+@pytest.mark.parametrize("name", names())
+def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows: Rows):
+    """Of a scenario and of what it is compared with."""
+    for i, run in enumerate(runs_of(name)):
+        table, said = Table(), rows.said[f"{name}.{i}"]
+        ending = run.run([table])
+        assert said["columns"] == [*table.columns]
+        assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
+        assert (tuple(said["messages"]), said.get("failure")) == (ending.messages, ending.failure)
+        found = np.fromfile(rows.folder / f"{name}.{i}").reshape(table.rows.shape)
+        until = CHAOTIC.get(run.scenario.name, np.inf)
+        looked_at = table.time <= until
+        difference = np.abs(found - table.rows) / np.maximum(1.0, np.abs(table.rows))
+        assert difference[looked_at].max() <= TOLERANCE
+        if until < table.time[-1]:
+            continue
+        wanted = metrics_of(table).found()
+        assert said["metrics"].keys() == wanted.keys()
+        for index, values in wanted.items():
+            assert said["metrics"][index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)
+
+
+#: Events of all kinds, at times and conditions, one upon another.
+EVENTS = """
+stop_time = 20.0
+[parameters]
+planner.eta0.z = -2.0
+[[events]]
+at = 2.0
+for = 3.0
+override = { controller.tau.u = 15.0 }
+[[events]]
+at = 3.0
+for = 1.0
+bias = { plant.y = 0.2 }
+[[events]]
+at = 3.5
+for = 4.0
+freeze = "planner.y_d"
+[[events]]
+when = "plant.nu.u > 0.2"
+repeat = true
+for = 0.5
+set = { controller.eps_t = 2.0, plant.current.x = 0.1 }
+[[events]]
+at = 5.0
+set = { plant.water = [0.1, 0.2, 0.0] }
+[[events]]
+at = 7.0
+release = "planner.y_d"
+[[events]]
+at = 9.0
+bias = { plant.water.x = 0.3 }
+[[events]]
+at = 10.0
+reset = ["controller"]
+[[events]]
+at = 12.0
+release = "plant.water"
+[[events]]
+at = 15.0
+drop = "plant.y"
+LAST
+"""
+
+
+@pytest.mark.parametrize(
+    ("last", "end"),
+    [
+        ('[[events]]\nwhen = "plant.eta.x < 1e9"\nstop = true', 20.0),
+        ("[[events]]\nat = 18.0\nstop = true", 18.0),
+        ("[[events]]\nat = 18.0\noverride = { disturbance.tau_w.u = 1e300 }", 18.0),
+    ],
+    ids=["whole", "stopped", "refused"],
+)
+def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text(EVENTS.replace("LAST", last))
+    data = json.loads(parts.data.read_text())
+    (tmp_path / "data.json").write_text(json.dumps(data | {"presets": [preset(str(scenario))]}))
+    said = parts._replace(data=tmp_path / "data.json").node("rows.mjs", str(tmp_path))["mine.0"]
+    [run, _] = runs_of(str(scenario))
+    table = Table()
+    ending = run.run([table])
+    assert table.time[-1] == pytest.approx(end)
+    found = np.fromfile(tmp_path / "mine.0").reshape(table.rows.shape)
+    assert found == pytest.approx(table.rows, rel=TOLERANCE, abs=TOLERANCE)
+    assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
+    assert len(ending.events) > 12
+    assert (said.get("failure"), said.get("remark")) == (ending.failure, ending.remark)
+
+
+def test_tables_are_the_same_in_node_and_in_a_browser(parts: Parts, opened: Browser):
+    """Bit for bit, for all scenarios, events in others, and other values."""
+    wanted = parts.node("tables.mjs", given=json.dumps(CHANGES))
+    for changes, one in zip(CHANGES, wanted, strict=True):
+        digest = opened.evaluate(f"""(async () => {{
+            await auvfmu.set({json.dumps(changes)});
+            const bytes = new TextEncoder().encode(await auvfmu.csv());
+            const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
+            return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
+        }})()""")
+        assert digest == one["digest"], changes
+    assert opened.said == []
+    # The page itself, and nothing else.
+    assert [address.split(":")[0] for address in opened.requests] == ["file"]
+
+
+def test_refusal_is_the_line_of_the_fmu_and_changes_nothing(parts: Parts):
+    changes = [
+        {"stop_time": 1.0},
+        {"plant.m11": -1.0},
+        {"planner.sort": 1.0},
+        {"stop_time": -1.0},
+        {"stop_time": 1.0},
+    ]
+    before, refused, unknown, backwards, after = parts.node("tables.mjs", given=json.dumps(changes))
+    assert re.fullmatch(r"plant: .*m11 = -1: must be at least 1e-09", refused["refusal"])
+    assert "planner.sort" in unknown["refusal"]
+    assert "must be positive" in backwards["refusal"]
+    assert after == before
+
+
+@pytest.mark.parametrize(
+    ("preset", "changes"),
+    [("fig4", {"controller.k_d": 25.0, "plant.noise.seed": 3}), ("path-pd", {"plant.ell": 0.4})],
+)
+def test_table_is_accepted_by_verify(preset, changes, opened: Browser, tmp_path, capsys):
+    given = {"preset": preset, "stop_time": 5.0, **changes}
+    opened.evaluate(f"auvfmu.set({json.dumps(given)})")
+    (tmp_path / "live.csv").write_text(opened.evaluate("auvfmu.csv()"))
+    values = [word for name, value in changes.items() for word in ("--set", f"{name}={value}")]
+    arguments = ["verify", str(tmp_path / "live.csv"), "--scenario", preset, *values]
+    assert main([*arguments, "--tolerance", "1e-9"]) == 0
+    assert "gauss-seidel" in capsys.readouterr().out
+    assert main(arguments[:-2]) == 2
+
+
+def test_page_stands_by_itself_and_is_light(page: Path):
+    text = page.read_text(encoding="utf-8")
+    assert len(text.encode()) < 700_000
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+    assert re.search(r'Content-Security-Policy" content="default-src .none.;', text)
+
+
+def test_page_opens_a_file_of_the_users(tmp_path, opened: Browser):
+    """With events of its own, which the scenarios of the list can have as well."""
+    scenario = tmp_path / "mine.toml"
+    scenario.write_text(
+        'title = "Mine <b>"\n[parameters]\nplant.noise.std = 0.0\n[[events]]\nat = 0.2\n'
+        "stop = true\n"
+    )
+    page = live_page(str(scenario))
+    assert "<title>Mine &lt;b&gt;</title>" in page
+    (tmp_path / "mine.html").write_text(page, encoding="utf-8")
+    opened.open(tmp_path / "mine.html")
+    table = opened.evaluate("auvfmu.csv()").splitlines()
+    assert len(table) == 1 + 11
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ('[components]\ncontroller = "own.fmu"\n', "own.fmu"),
+        ('coupling = "linear"\n', "linear"),
+        ("[steps]\nplanner = 0.1\n", "longer steps"),
+    ],
+)
+def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, capsys):
+    (tmp_path / "mine.toml").write_text(text)
+    assert main(["live", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "page.html")]) == 2
+    error = capsys.readouterr().err
+    assert why in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "page.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("lacking", "wanted"),
+    [("module.find_spec", "pip install 'auv-fmu[native]'"), ("assembly.shutil.which", "Node.js")],
+)
+def test_what_makes_a_part_is_named_where_it_is_missing(
+    lacking, wanted, tmp_path, monkeypatch, capsys
+):
+    monkeypatch.setattr(f"orchestrator.live.{lacking}", lambda *_: None)
+    # A whole cache would do without.
+    monkeypatch.setattr("orchestrator.machine.cache.read_cached", lambda *_: {})
+    assert main(["live", "--out", str(tmp_path / "page.html")]) == 2
+    error = capsys.readouterr().err
+    assert wanted in error
+    assert error.count("\n") == 1

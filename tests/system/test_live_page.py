@@ -1,0 +1,248 @@
+"""The page of `auv-fmu live` in a browser: keys, links, commands, a phone's width, the dark."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+from shutil import which
+
+import numpy as np
+import pytest
+
+from orchestrator.commands.main import main
+from support.browser import BROWSER, Browser, browser
+
+#: Rows of the page and of the native FMUs: different machines add with different roundings.
+TOLERANCE = 1e-9
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed"),
+    pytest.mark.skipif(which("npm") is None, reason="Node.js is not installed"),
+    pytest.mark.skipif(find_spec("ziglang") is None, reason="needs the extra `native`"),
+]
+
+SLIDER = "document.querySelector('input[data-names=\"controller.eps_t\"]')"
+TABLE = "document.getElementById('indices').innerText"
+CSV = "auvfmu.csv()"
+
+#: WebGL without a graphics card.
+SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+#: How long something that is waited for may take [s].
+PATIENCE = 90.0
+
+#: Numbers of keys, and what they write.
+KEYS = {"ArrowRight": (39, ""), "Enter": (13, "\r"), " ": (32, " ")}
+
+
+class Live:
+    """The page, and what a user does with it."""
+
+    def __init__(self, shown: Browser) -> None:
+        self._shown = shown
+        self.run = shown.evaluate
+        self.call = shown.call
+
+    def wait(self, script: str) -> None:
+        """Wait until an expression is true."""
+        end = time.monotonic() + PATIENCE
+        while not self.run(script):
+            assert time.monotonic() < end, f"never true: {script}"
+            time.sleep(0.05)
+
+    def start(self) -> None:
+        """Wait for the first run."""
+        self.wait("document.querySelector('#indices td') !== null")
+
+    def press(self, key: str) -> None:
+        """Press and release a key."""
+        number, text = KEYS[key]
+        code = {"key": key, "windowsVirtualKeyCode": number}
+        self.call("Input.dispatchKeyEvent", type="keyDown", **code, text=text)
+        self.call("Input.dispatchKeyEvent", type="keyUp", **code)
+
+    def type(self, field: str, text: str) -> None:
+        """Replace what is in a field."""
+        self.run(f"{field}.focus(), {field}.select()")
+        self.call("Input.insertText", text=text)
+        self.press("Enter")
+
+    def resize(self, width: int, height: int) -> None:
+        """Give the page another size, in pixels of its style sheet."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1}
+        self.call("Emulation.setDeviceMetricsOverride", **size, mobile=width < 500)
+
+    def prefer(self, scheme: str) -> None:
+        """Let the system ask for `light` or `dark`."""
+        feature = {"name": "prefers-color-scheme", "value": scheme}
+        self.call("Emulation.setEmulatedMedia", features=[feature])
+
+    def complaints(self) -> list[str]:
+        """Errors of the page, and what it has asked the network for."""
+        fetched = [one for one in self._shown.requests if not one.startswith(("file:", "blob:"))]
+        return [*self._shown.said, *fetched]
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of Fig. 4."""
+    out = tmp_path_factory.mktemp("live") / "page.html"
+    assert main(["live", "fig4", "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """One browser for all tests."""
+    with browser(tmp_path_factory.mktemp("profile"), *SOFTWARE_GL) as started:
+        yield started
+
+
+@pytest.fixture
+def opened(page, chromium) -> Iterator[Live]:
+    """A fresh page, with nothing to complain of at the end."""
+    chromium.open(page)
+    live = Live(chromium)
+    live.resize(1280, 900)
+    live.prefer("light")
+    live.start()
+    yield live
+    assert live.complaints() == []
+
+
+def rows(text: str) -> tuple[list[str], np.ndarray]:
+    """Columns and numbers of a table."""
+    header, *lines = csv.reader(io.StringIO(text))
+    return header, np.array(lines, dtype=float)
+
+
+def test_page_is_one_small_file(page):
+    text = page.read_text(encoding="utf-8")
+    assert page.stat().st_size < 700_000
+    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
+    assert "default-src 'none'" in text
+
+
+def test_arrow_keys_move_a_slider_and_the_numbers(opened):
+    before, table = opened.run(CSV), opened.run(TABLE)
+    opened.run(f"{SLIDER}.focus()")
+    for _ in range(5):
+        opened.press("ArrowRight")
+    opened.wait(f"{TABLE} !== {table!r}")
+    opened.wait("/controller\\.eps_t=/.test(location.hash)")
+    value = float(re.search(r"eps_t=([0-9.]+)", opened.run("location.hash"))[1])
+    # Four decades in a hundred presses.
+    assert value == pytest.approx(10 ** (5 * 4 / 100), rel=5e-3)
+    header, changed = rows(opened.run(CSV))
+    _, unchanged = rows(before)
+    assert np.abs(changed - unchanged)[:, header.index("plant.tau.u")].max() > 0.1
+
+
+EVENT = "document.querySelector('#event-list input')"
+
+
+def test_link_opens_the_same_run(opened):
+    opened.run('auvfmu.set({preset: "fault-sensor", "controller.eps_t": 4, stop_time: 60})')
+    opened.run(f"{EVENT}.closest('details').open = true")
+    opened.type(EVENT, "20")
+    opened.wait("/events\\.1\\.at=20/.test(location.hash)")
+    before = opened.run(CSV)
+    opened.call("Page.reload")
+    opened.wait("performance.getEntriesByType('navigation')[0].type === 'reload'")
+    opened.start()
+    assert opened.run(CSV) == before
+    assert opened.run("document.getElementById('stop-time').value") == "60"
+    assert opened.run(f"{EVENT}.value") == "20"
+
+
+@pytest.mark.parametrize("hidden", ["PD", "proposed"])
+def test_command_makes_the_same_rows(opened, tmp_path, hidden):
+    """What is copied, typed into a shell, with either controller."""
+    values = '"controller.eps_t": 4, "plant.noise.std": 0.002, "plant.noise.seed": 7'
+    opened.run(f'auvfmu.set({{preset: "fault-thruster", {values}, stop_time: 30}})')
+    opened.run(f"{EVENT}.closest('details').open = true")
+    opened.type(EVENT, "15")
+    opened.run(f"document.querySelector('#loops input[value={hidden}]').click()")
+    opened.wait(f"/at=15&hide={hidden}/.test(location.hash)")
+    opened.run(
+        "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; };"
+        "URL.createObjectURL = (blob) => { globalThis.saved = blob; return 'blob:'; };"
+        "HTMLAnchorElement.prototype.click = () => {};"
+    )
+    opened.run("document.getElementById('copy-command').click()")
+    opened.run("document.getElementById('download').click()")
+    programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    command = f"{opened.run('copied')} --kind native --columns all --no-figures --out run"
+    subprocess.run(
+        ["bash", "-c", command],
+        cwd=tmp_path, env={**os.environ, "PATH": programs}, check=True, timeout=300,
+    )  # fmt: skip
+    header, found = rows(opened.run("saved.text()"))
+    wanted, numbers = rows((tmp_path / "run" / "result.csv").read_text())
+    assert header == wanted
+    assert np.abs(found - numbers).max() <= TOLERANCE
+
+
+def test_value_that_is_refused_is_marked_and_nothing_else_changes(opened):
+    table = opened.run(TABLE)
+    field = "document.querySelector('#groups input[data-name=\"controller.K1[1]\"]')"
+    opened.type(field, "-3")
+    opened.wait(f"{field}.getAttribute('aria-invalid') === 'true'")
+    said = opened.run(f"{field}.closest('.row').innerText")
+    assert "K1[1] = -3" in said
+    assert opened.run(TABLE) == table
+    opened.type(field, "10")
+    opened.wait(f"{field}.getAttribute('aria-invalid') === 'false'")
+    assert "-3" not in opened.run(f"{field}.closest('.row').innerText")
+    assert opened.run(TABLE) == table
+
+
+def test_space_plays_and_stops(opened):
+    assert opened.run("document.querySelector('.scene canvas') !== null")
+    opened.run("document.activeElement.blur()")
+    opened.press(" ")
+    now = "parseFloat(document.getElementById('now').textContent)"
+    opened.wait(f"{now} > 0.5 && {now} < 99")
+    opened.press(" ")
+    assert opened.run("document.getElementById('play').dataset.playing") == "false"
+
+
+def test_phone_needs_no_sideways_scrolling(opened):
+    opened.resize(390, 844)
+    opened.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    for preset in ("fig4", "fault-sensor", "path", "fig3a"):
+        opened.run(f'auvfmu.set({{preset: "{preset}"}})')
+        assert opened.run("document.documentElement.scrollWidth") == 390
+        too_wide = (
+            "[...document.querySelectorAll('button, input, select, canvas, td')]"
+            ".filter((one) => one.getBoundingClientRect().right > 390.5).length"
+        )
+        assert opened.run(too_wide) == 0
+
+
+def test_dark_follows_the_system_until_the_button_is_pressed(opened):
+    light = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).every((c) => c > 200)"
+    assert opened.run(light)
+    opened.prefer("dark")
+    opened.wait(f"!({light})")
+    opened.run("document.getElementById('theme').click()")
+    assert opened.run(light)
+
+
+def test_without_webgl_only_the_path_in_space_is_missing(page, tmp_path):
+    with browser(tmp_path, "--disable-3d-apis") as without:
+        without.open(page)
+        live = Live(without)
+        live.start()
+        assert "WebGL" in live.run("document.querySelector('.scene').innerText")
+        assert live.run(CSV).count("\n") == 5002
+        assert live.run(f"{TABLE}.length") > 100
