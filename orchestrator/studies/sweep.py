@@ -13,14 +13,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
-from tqdm import tqdm
-
 from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.observers.observer import progress_bar
 from orchestrator.master.plan import PACKAGES
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
@@ -373,7 +372,7 @@ def _complete(
     points = (space[number] for number in unfinished.missing(len(space)))
     with (
         making_runs(engine, points, scheduler=means.scheduler, workers=means.workers) as blocks,
-        tqdm(
+        progress_bar(
             total=len(space),
             initial=len(unfinished),
             desc=name,
