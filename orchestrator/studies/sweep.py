@@ -112,28 +112,28 @@ def sweep(
     progress: bool = False,
     force: bool = False,
 ) -> StudyResult:
-    """Make the runs of a study, or the ones that are missing.
+    """Make all runs of a study, or the missing ones.
 
         result = sweep("attraction")
         result["plant.eta0.z"], result["failure"], result.to_dataframe()
 
     Args:
-        study: name of a ready study, path of a .toml file, or what such a file holds.
-        engine: that makes the runs, `fmu` or `batch`; None: the study's own.
-        kind: of the bundle's FMUs, `python`, `native`, or `auto`: the one that the study was begun
-            with, else native where available.
-        loop: that makes their steps: `python`, `compiled` or `auto`.
+        study: name of a ready study, path of a .toml file, or a dictionary with its entries.
+        engine: engine that makes the runs, `fmu` or `batch`; None: the study's own.
+        kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
+            study began, else native where available.
+        loop: loop that makes their steps: `python`, `compiled` or `auto`.
         scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
             this machine.
         workers: how many of these; None: one for each core.
-        out: folder of the study; what was done there before is not done again. None:
+        out: folder of the study; runs that are finished there are not made again. None:
             `results/NAME`.
         progress: show a bar on studies that take longer than some seconds.
-        force: move aside files of yours that have names of the study's, and another study.
+        force: move aside your files with names of the study's files, and another study.
 
     Raises:
         ValueError: something about the study is not usable; the text says what to change.
-        KeyboardInterrupt: Ctrl-C; what is done is kept.
+        KeyboardInterrupt: Ctrl-C; finished runs are kept.
 
     """
     wanted = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))

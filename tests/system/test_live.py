@@ -4,26 +4,31 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
+import zipfile
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from shutil import which
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
+from fmus.compilers import FLAGS, machines_compiler
+from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
+from orchestrator.live import module, presets
 from orchestrator.live.assembly import ENGINE, WEB, live_page, live_script
 from orchestrator.live.module import live_module
 from orchestrator.live.presets import page_data, preset, runs_of
 from orchestrator.master.observers.table import Table
+from orchestrator.runs import bundle
 from orchestrator.runs.scenario import names
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
 
-NODE = which("node") and which("npm")
+NODE = shutil.which("node") and shutil.which("npm")
 
 pytestmark = [
     pytest.mark.skipif(NODE is None, reason="npm is not installed"),
@@ -37,6 +42,9 @@ TOLERANCE = 1e-9
 #: Until when [s] that is so where a run is chaotic: 100 m away, the robust term of the PD
 #: controller switches at every step.
 CHAOTIC = {"fig6-pd": 10.0}
+
+#: Sine and its like, which differ between C libraries in the last bit.
+SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 
 #: Changes of settings, each from the ones before it: all scenarios, then events and a path in
 #: others, and other values.
@@ -124,6 +132,47 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         assert said["metrics"].keys() == wanted.keys()
         for index, values in wanted.items():
             assert said["metrics"][index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path, monkeypatch):
+    """With the same sine and its like in both, all rows are the same bit for bit."""
+    with monkeypatch.context() as patch:
+        patch.setattr(module, "_FLAGS", (*module._FLAGS, "-include", str(SAME_FUNCTIONS)))
+        [content] = module.compiled().values()
+    (tmp_path / "loop.wasm").write_bytes(content)
+    said = parts._replace(module=tmp_path / "loop.wasm").node("rows.mjs", str(tmp_path))
+    fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
+    for room in ("runs.loading", "runs.preparation"):
+        monkeypatch.setattr(f"orchestrator.{room}.current_fmus", lambda *_: fmus)
+    monkeypatch.setattr(presets, "_check", lambda _: None)
+    for name in names():
+        for i, run in enumerate(presets.runs_of(name)):
+            table = Table()
+            ending = run.run([table])
+            found = np.fromfile(tmp_path / f"{name}.{i}").reshape(table.rows.shape)
+            assert found.tobytes() == table.rows.tobytes(), (name, i)
+            assert said[f"{name}.{i}"].get("failure") == ending.failure
+    # They are not the rows of any C library.
+    assert (tmp_path / "fig4.0").read_bytes() != (rows.folder / "fig4.0").read_bytes()
+
+
+def with_same_functions(folder: Path, place: Path) -> Path:
+    """The native FMUs, compiled with other functions of the C library."""
+    made = place / "fmus"
+    made.mkdir()
+    for fmu in folder.glob("*.fmu"):
+        with zipfile.ZipFile(fmu) as archive:
+            archive.extractall(place / fmu.stem)
+            [library] = (name for name in archive.namelist() if name.startswith("binaries/"))
+        compiler = str(machines_compiler())
+        command = [compiler, *FLAGS, "-include", str(SAME_FUNCTIONS), "fmi2.c", "-lm", "-o"]
+        sources = place / fmu.stem / "sources"
+        subprocess.run([*command, f"../{library}"], cwd=sources, check=True, capture_output=True)
+        shutil.make_archive(str(place / fmu.stem), "zip", place / fmu.stem)
+        (place / f"{fmu.stem}.zip").rename(made / fmu.name)
+    return made
 
 
 #: Events of all kinds, at times and conditions, one upon another.

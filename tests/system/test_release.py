@@ -25,6 +25,7 @@ from auv_fmu import __version__
 from fmus.kinds import FMI_VERSIONS, platforms
 from orchestrator import simulate
 from orchestrator.commands.main import main
+from orchestrator.live import assembly, module
 from orchestrator.runs import bundle
 from ready_wheel import write_wheel
 from support.machine import contents
@@ -41,6 +42,7 @@ PROCESSORS = {
     MACH_O: {0x01000007: "x86_64-darwin", 0x0100000C: "aarch64-darwin"},
 }
 
+needs_npm = pytest.mark.skipif(shutil.which("npm") is None, reason="npm is not installed")
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 each_version = pytest.mark.parametrize("fmi", FMI_VERSIONS)
 
@@ -82,6 +84,7 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
 
 
 @pytest.mark.slow
+@needs_npm
 @needs_zig
 def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(tmp_path: Path):
     wheel = write_wheel(tmp_path)
@@ -104,7 +107,13 @@ def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(tm
         assert record["loop"] == "compiled"
         table = (empty / kind / "result.csv").read_bytes()
         assert table == (expected / "result.csv").read_bytes()
-    assert not (cache / "auv-fmu" / "fmus").exists()
+    subprocess.run(
+        [*command[:4], "live", "--out", "live.html"],
+        env=environment, cwd=empty, check=True, capture_output=True,
+    )  # fmt: skip
+    assert (empty / "live.html").stat().st_size > 100_000
+    for category in ("fmus", module.CATEGORY, assembly.CATEGORY):
+        assert not (cache / "auv-fmu" / category).exists()
 
 
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):

@@ -15,7 +15,7 @@ const HEIGHT = 132;
 const TIME_AXIS = 22;
 const VALUE_AXIS = 46;
 
-const DASHES: Record<Style, number[]> = { first: [], second: [6, 3], reference: [] };
+const DASHES: Record<Style, number[]> = { first: [], second: [6, 3], reference: [4, 4] };
 const WIDTHS: Record<Style, number> = { first: 1.5, second: 1.5, reference: 1.5 };
 
 /** Share of a limit from which on it is in sight. */
@@ -47,6 +47,7 @@ class Chart {
   #stale = false;
   #visible = false;
   #time = 0;
+  #from = 0;
 
   constructor(panel: Panel, scrub: (time: number) => void) {
     this.#panel = panel;
@@ -67,6 +68,8 @@ class Chart {
     caption.append(readout);
     const host = document.createElement("div");
     host.className = "plot";
+    host.setAttribute("role", "img");
+    host.setAttribute("aria-label", `${caption.textContent} over time: ${panel.names.join(", ")}`);
     this.root.append(caption, host);
     this.#plot = new uPlot(this.#options(), [new Float64Array(0)], host);
     const point = (event: PointerEvent) => {
@@ -104,7 +107,7 @@ class Chart {
       legend: { show: false },
       cursor: { y: false, drag: { x: false, y: false }, bind: silent(), points: { size: 6 } },
       scales: {
-        x: { time: false, range: (_, low, high) => [low ?? 0, high ?? 1] },
+        x: { time: false, range: (_, low, high) => this.#times(low ?? 0, high ?? 1) },
         y: { range: (_, low, high) => this.#range(low ?? 0, high ?? 0) },
       },
       axes: [
@@ -133,6 +136,11 @@ class Chart {
     };
   }
 
+  /** From the time that is wanted on, if the run is not over by then. */
+  #times(low: number, high: number): [number, number] {
+    return [this.#from < high ? Math.max(low, this.#from) : low, high];
+  }
+
   /** Where the values are; a limit is in sight when they are near it. */
   #range(low: number, high: number): [number, number] {
     for (const limit of this.#lines.limits ?? []) {
@@ -141,7 +149,7 @@ class Chart {
         high = Math.max(high, limit);
       }
     }
-    const margin = 0.07 * (high - low) || Math.max(0.1 * Math.abs(high), 1e-6);
+    const margin = 0.07 * (high - low) || 0.1 * Math.abs(high) || 1;
     return [low - margin, high + margin];
   }
 
@@ -220,6 +228,13 @@ class Chart {
     this.show(this.#time);
   }
 
+  /** Begins at another time [s], so that small values can be seen once large ones are over. */
+  begin(from: number): void {
+    this.#from = from;
+    if (this.#visible && !this.root.hidden) this.#redraw();
+    else this.#stale = true;
+  }
+
   /** Colours have changed. */
   repaint(): void {
     this.#plot.redraw(false);
@@ -267,6 +282,7 @@ export function rowAt(times: Float64Array, time: number): number {
 /** All sections of charts. */
 export class Charts {
   #charts: Chart[][] = [];
+  #from = 0;
   readonly #host: HTMLElement;
   readonly #scrub: (time: number) => void;
 
@@ -278,7 +294,7 @@ export class Charts {
   /** Makes the charts anew. */
   build(sections: readonly Section[]): void {
     this.#host.replaceChildren();
-    this.#charts = sections.map(({ title, note, panels }) => {
+    this.#charts = sections.map(({ title, note, panels }, place) => {
       const section = document.createElement("section");
       const heading = document.createElement("h2");
       heading.textContent = title;
@@ -286,14 +302,36 @@ export class Charts {
       aside.className = "note";
       aside.textContent = note;
       heading.append(aside);
+      if (place === 0) heading.append(this.#beginning());
       const row = document.createElement("div");
       row.className = `charts of-${panels.length}`;
       const charts = panels.map((panel) => new Chart(panel, this.#scrub));
+      for (const chart of charts) chart.begin(this.#from);
       row.append(...charts.map(({ root }) => root));
       section.append(heading, row);
       this.#host.append(section);
       return charts;
     });
+  }
+
+  /** A field for the time at which all charts begin. */
+  #beginning(): HTMLElement {
+    const whole = document.createElement("label");
+    whole.className = "from";
+    whole.title = "Charts begin at this time, so that small values can be seen";
+    const input = document.createElement("input");
+    input.type = "text";
+    input.inputMode = "decimal";
+    input.value = String(this.#from);
+    input.addEventListener("change", () => {
+      const from = Number(input.value);
+      input.setAttribute("aria-invalid", String(!(from >= 0)));
+      if (!(from >= 0)) return;
+      this.#from = from;
+      for (const chart of this.#charts.flat()) chart.begin(from);
+    });
+    whole.append("from ", input, " s");
+    return whole;
   }
 
   set(lines: readonly (readonly Lines[])[], marks: readonly Mark[]): void {

@@ -95,6 +95,7 @@ export function lines(shown: readonly (Shown | undefined)[]): readonly (readonly
   const steps = (result: Result | undefined, name: string) =>
     result?.has(name) ? result.column(name).subarray(1) : undefined;
   const observed = shown.find((one) => one?.result.has("controller.dy_hat.x"))?.result;
+  const moving = observed ?? longest;
   return [
     AXES.map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
     Object.keys(ACTUATORS).map((member) => {
@@ -105,7 +106,7 @@ export function lines(shown: readonly (Shown | undefined)[]): readonly (readonly
       time: starts,
       values: [
         steps(observed, `controller.dy_hat.${axis}`),
-        observed?.column(`plant.dy.${axis}`).subarray(0, rows),
+        moving?.column(`plant.dy.${axis}`).subarray(0, rows),
       ],
     })),
     THETA.map((_, k) => ({

@@ -43,6 +43,9 @@ const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
 
+/** Half of the width of a title [px]. */
+const TITLE = 40;
+
 /** Room for the numbers around the box [px]. */
 const MARGIN = 25;
 
@@ -272,8 +275,10 @@ export class Scene {
     const spans = this.#labels.children as HTMLCollectionOf<HTMLElement>;
     const before: [number, number][][] = [[], [], []];
     let used = 0;
+    const width = this.#host.clientWidth;
     for (const { at, text, axis, isTitle } of labels) {
-      const [x, y] = onScreen(at);
+      const [left, y] = onScreen(at);
+      const x = isTitle ? Math.min(width - TITLE, Math.max(TITLE, left)) : left;
       const crowded = before[axis].some(([a, b]) => Math.hypot(a - x, b - y) < CROWDED);
       if (crowded && !isTitle) continue;
       before[axis].push([x, y]);

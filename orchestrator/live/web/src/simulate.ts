@@ -188,18 +188,11 @@ class Simulation {
     const run: Run = { experiment, instances, row, overrides, values: this.set, made: 0 };
     const width = 1 + row.names.length;
     const table = new Float64Array((experiment.steps + 1) * width);
-    /** Keep the row of now, unless a value is not finite. */
+    /** Keep the row of now; whether all of it is finite. */
     const append = (): boolean => {
-      const { values } = row;
-      const first = run.made * width;
-      table[first] = experiment.time(run.made);
-      // Times zero, what is finite is zero and what is not is nan.
-      let sum = 0;
-      for (let i = 0; i < values.length; i++) {
-        table[first + 1 + i] = values[i];
-        sum += values[i] * 0;
-      }
-      return sum === 0;
+      table[run.made * width] = experiment.time(run.made);
+      table.set(row.values, run.made * width + 1);
+      return areFinite(row.values);
     };
     append();
     let [failure, remark]: [string | undefined, string | undefined] = [undefined, undefined];
@@ -249,7 +242,7 @@ class Simulation {
   /** The first value that is not finite, and where it comes from, in words. */
   private wrong(components: readonly string[]): string | undefined {
     const { row, loop, data } = this;
-    if (row.values.every(Number.isFinite)) return undefined;
+    if (areFinite(row.values)) return undefined;
     const sources = new Map(loop.stages.flatMap(({ connections }) => connections));
     let passedOn: string | undefined;
     for (const component of components) {
@@ -269,6 +262,22 @@ class Simulation {
     }
     return passedOn;
   }
+}
+
+/** Whether all values are numbers that can be computed with. */
+function areFinite(values: Float64Array): boolean {
+  // Times zero, what is finite is zero and what is not is nan. Sums that do not wait for each other
+  // take less than half the time.
+  let [a, b, c, d] = [0, 0, 0, 0];
+  let i = values.length & 3;
+  for (let k = 0; k < i; k++) a += values[k] * 0;
+  for (; i < values.length; i += 4) {
+    a += values[i] * 0;
+    b += values[i + 1] * 0;
+    c += values[i + 2] * 0;
+    d += values[i + 3] * 0;
+  }
+  return a + b + c + d === 0;
 }
 
 /** The rows of a run. */
