@@ -70,13 +70,19 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 
 def add_live(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu live`."""
+    describe(
+        parser,
+        "Write one web page in which scenarios run while you change their settings: parameters, "
+        "events, stop time. It needs no server and no network.",
+        "live fig4 --out fig4.html",
+    )
     parser.add_argument(
         "scenario",
         nargs="?",
         default=_OPENED,
         metavar="SCENARIO|FILE.toml",
-        help="the scenario that the page opens, of the bundle's components; it has all scenarios "
-        f"of `auv-fmu list` besides; default: {_OPENED}",
+        help="the scenario that the page shows first, made of the bundle's components; all "
+        f"scenarios of `auv-fmu list` are there as well; default: {_OPENED}",
     )
     _add_file(parser, "a .html; default: SCENARIO-live.html")
     parser.set_defaults(action=_live)
