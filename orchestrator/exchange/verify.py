@@ -119,7 +119,9 @@ def verify(
         for component in system.components.values()
         for variable in component.variables
     }
-    table = read_table(path, outputs, known)
+    # A tool that runs one FMU names ports only.
+    names = [f"{name}." for name in system.components]
+    table = read_table(path, outputs, known, names[0] if len(names) == 1 else "")
     if not len(table.time) or not table.time[-1] > 0.0:
         raise InputError(f"{path}: has no row after t = 0")
     if not table.columns:
@@ -305,13 +307,16 @@ class ForeignTable:
     repeated: int
 
 
-def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> ForeignTable:
+def read_table(
+    path: Path, ports: Mapping[str, str], known: Collection[str], before: str = ""
+) -> ForeignTable:
     """Read a table: every value of the time and of the ports in it, or none.
 
     Args:
         path: CSV with a line of names; the separators are commas, semicolons or tabs.
         ports: types of the ports that are looked for, by `component.port`.
         known: names of all ports; names of systems may stand before them.
+        before: what a column's name may lack.
 
     Raises:
         InputError: a row is not as long as the first, a time falls, a value is no number,
@@ -320,11 +325,15 @@ def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> 
     """
     what = "not a table that can be compared"
     with records(path, what, places_of_time) as (names, rows):
-        return _table(names, rows, ports, known)
+        return _table(names, rows, ports, known, before)
 
 
 def _table(
-    names: Sequence[str], rows: Iterable[Record], ports: Mapping[str, str], known: Collection[str]
+    names: Sequence[str],
+    rows: Iterable[Record],
+    ports: Mapping[str, str],
+    known: Collection[str],
+    before: str,
 ) -> ForeignTable:
     if not places_of_time(names):
         separators = ", ".join(SEPARATORS.values())
@@ -335,7 +344,7 @@ def _table(
     places: dict[str, int] = {}
     longest = max(map(len, known), default=0)
     for place, name in enumerate(names):
-        port = port_of(name, known, longest)
+        port = port_of(f"{before}{name.strip()}", known, longest)
         port = port if port in ports else None
         if port in places:
             raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")

@@ -61,7 +61,7 @@ class Space:
             systems: of its scenarios, by the names that it has for them.
 
         Raises:
-            InputError: a value does not exist, or cannot be what it shall be.
+            InputError: a name does not exist, or a value has the wrong type.
 
         """
         known = _Known([system for _, system in systems.values()])
