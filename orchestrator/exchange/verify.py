@@ -176,11 +176,7 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
 
 
 def _complaint(
-    table: ForeignTable,
-    system: System,
-    events: Sequence[Event],
-    way: Algorithm,
-    tolerance: float,
+    table: ForeignTable, system: System, events: Sequence[Event], way: Algorithm, tolerance: float
 ) -> str | None:
     """What is wrong with a table, seen from our own run; None: nothing."""
     stop_time = float(table.time[-1])
