@@ -26,6 +26,7 @@ from orchestrator.master.experiment import (
     Order,
     format_order,
 )
+from orchestrator.master.hooks.events import Event, Events
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
@@ -78,6 +79,7 @@ def verify(
     tolerance: float,
     order: Order | None = None,
     *,
+    events: Sequence[Event] = (),
     initial: str = FULL,
     verbose: bool = False,
 ) -> str:
@@ -93,6 +95,7 @@ def verify(
             largest magnitude of the port.
         order: in which the tool steps the components, with `a+b` for some that it steps side by
             side; None: one of :data:`ORDERS`.
+        events: that have happened in its run.
         initial: what it exchanges before the first step.
         verbose: whether all names of what was not compared are said.
 
@@ -127,7 +130,7 @@ def verify(
         )
     complaints = []
     for way in algorithms:
-        complaint = _complaint(table, system, way, tolerance)
+        complaint = _complaint(table, system, events, way, tolerance)
         if complaint is None:
             return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
         complaints.append(f"{way.words} {complaint}")
@@ -172,14 +175,17 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
             yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
 
 
-def _complaint(table: ForeignTable, system: System, way: Algorithm, tolerance: float) -> str | None:
+def _complaint(
+    table: ForeignTable, system: System, events: Sequence[Event], way: Algorithm, tolerance: float
+) -> str | None:
     """What is wrong with a table, seen from our own run; None: nothing."""
     stop_time = float(table.time[-1])
     ours = _Samples(table.time, tuple(table.columns))
     try:
         step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
         experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
-        simulate_to_end(make_plan(system, experiment), [ours], way.exchange)
+        hooks = [Events(events)] if events else []
+        simulate_to_end(make_plan(system, experiment), [ours], way.exchange, hooks)
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)
