@@ -82,6 +82,7 @@ In Python:
 ```python
 import fmpy
 
+
 result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
 ```
 

@@ -1,9 +1,10 @@
 """Check the English of the pages: words to avoid, and how long the sentences are.
 
-`python tools/prose.py` reads all pages, the Markdown of notebooks and the messages in the code of
-`orchestrator`; `python tools/prose.py PATH...` reads some pages, or all in a folder. It prints a
-line for each finding, with the words to write instead. Then it prints the lengths of the sentences
-of each page, in words. It fails if there is a finding, or an average above 20 words.
+`python tools/prose.py` reads all pages, the Markdown of notebooks, the docstrings of the public
+names of `orchestrator` and the messages in its code; `python tools/prose.py PATH...` reads some
+pages, or all in a folder. It prints a line for each finding, with the words to write instead. Then
+it prints the lengths of the sentences of each page, in words. It fails if there is a finding, or an
+average above 20 words.
 
 The words are in `tools/prose.toml`; others come from proselint, which the extra `dev` installs.
 Code, the targets of links and comments are not read. Lengths are of whole sentences in paragraphs
@@ -21,6 +22,7 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import cache
+from inspect import getdoc
 from itertools import accumulate
 from pathlib import Path
 from statistics import mean
@@ -32,6 +34,8 @@ from proselint.checks import __register__ as library_checks
 from proselint.config import DEFAULT
 from proselint.registry import CheckRegistry
 from proselint.tools import LintFile
+
+import orchestrator
 
 ROOT = Path(__file__).parents[1]
 
@@ -54,7 +58,9 @@ _BETWEEN = "\n\n¶\n\n"
 _MARKDOWN = MarkdownIt("commonmark").enable("table")
 
 #: Where sentences end, the end of an item that is one, and what has a full stop within one.
-_END = re.compile(r"""[.!?]["')\]]*\s+(?=["'(\[]*[A-Z0-9`§λγστε])""")
+_END = re.compile(
+    r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|numba|pip|theta_hat))"""
+)
 _SENTENCE = re.compile(r"""[.!?:]["')\]]*$""")
 _ABBREVIATION = re.compile(
     r"\b(?:e\.g|i\.e|cf|vs|[Ee]qs?|[Ff]igs?|[Ss]ecs?|[Rr]efs?|Nos?|approx|resp|al)$"
@@ -70,7 +76,7 @@ class Block(NamedTuple):
 
 
 class Page(NamedTuple):
-    """A page or a module, by its path."""
+    """A page or a module, by its path, or a public name."""
 
     name: str
     blocks: Sequence[Block]
@@ -103,8 +109,14 @@ def pages(paths: Sequence[Path]) -> Iterator[Page]:
 
 
 def all_pages() -> Iterator[Page]:
-    """All pages of the repository, then the messages of the program."""
+    """All pages of the repository, the interface in Python, and the messages of the program."""
     yield from pages([*sorted(ROOT.glob("*.md")), ROOT / "docs"])
+    for name in orchestrator.__all__:
+        shown = getattr(orchestrator, name)
+        members = vars(shown).items() if isinstance(shown, type) else ()
+        texts = [shown, *(member for key, member in members if not key.startswith("_"))]
+        blocks = [Block(1, getdoc(text) or "", False) for text in texts]
+        yield Page(f"orchestrator.{name}", blocks)
     for file in sorted(ROOT.glob("orchestrator/**/*.py")):
         blocks = list(message_blocks(file.read_text(encoding="utf-8")))
         yield Page(file.relative_to(ROOT).as_posix(), blocks)

@@ -1,4 +1,4 @@
-"""What others have made, in our master: `python benchmarks/foreign FOLDER`.
+"""Public FMUs and SSP archives in our master: `python benchmarks/foreign FOLDER`.
 
 Collects public FMUs and SSP archives into FOLDER, runs each of them, holds what runs against
 libcosim, ecos and a plain host of its own, and writes tested-fmus.md. FMUs are programs of

@@ -44,20 +44,28 @@ _OUTCOMES = {
 }
 
 _HEAD = """\
-# What others have made
+# Public FMUs and SSP archives, tested
 
-`python benchmarks/foreign FOLDER` clones public repositories at named commits, collects every FMU
-and every SSP archive in them, runs each in a process of its own, and writes this page. Archives are
-run unchanged, in the default order, for {steps} steps or to the end that they name, whichever comes
-first; a folder with a `SystemStructure.ssd` is zipped as it is, and each further `.ssd` in it is an
-archive of its own. FMUs are run one by one, for {steps} steps of the size that they name, else of
-20 ms, with all inputs at their start values. What holds the same bytes is counted once.
+This page lists public FMUs and SSP archives, and says which of them run in auv-fmu. `python
+benchmarks/foreign FOLDER` writes it. It clones public repositories at named commits, collects every
+FMU and every SSP archive in them, and runs each in a separate process.
 
-Systems that libcosim or ecos can run as well are held against them in Jacobi order, with rings
-delayed and the same steps: as they are, and in libcosim also as `auv-fmu export --format osp`
-writes what we have read. FMUs are held against a plain host of {host} lines that shares nothing
-with the master, as t_k = k h has it. A deviation is the largest over all Real outputs and steps,
-relative to the size of an output where that is above one. Compared with: {tools}.
+- **Archives** are run unchanged, in the default order, for {steps} steps or to the end that they
+  name, whichever comes first. A folder with a `SystemStructure.ssd` is zipped as it is, and each
+  further `.ssd` in it counts as another archive.
+- **FMUs** are run one by one, for {steps} steps with all inputs at their start values. The step is
+  the one that the FMU names, else 20 ms.
+- Files with the same bytes are counted once.
+
+The results are compared with other programs: {tools}.
+
+- **Systems** that libcosim or ecos can also run are compared in Jacobi order, with algebraic loops
+  delayed and the same steps. libcosim also runs them as `auv-fmu export --format osp` writes them
+  after we have read them.
+- **FMUs** are compared with a plain host of {host} lines, which shares no code with the master and
+  takes steps at t_k = k h.
+- **A deviation** is the largest over all Real outputs and steps, relative to the size of an output
+  where that is above one.
 """
 
 
@@ -82,7 +90,7 @@ def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     there = [one for one in archives if one["outcome"] != "absent"]
     running = [one for one in there if one["outcome"] == "runs"]
     yield f"\n## Archives\n\n{len(running)} of {len(there)} run.\n"
-    yield f"| archive | rows | {' | '.join(TOOLS)} | said |"
+    yield f"| archive | rows | {' | '.join(TOOLS)} | messages |"
     yield f"| --- | --: |{' --- |' * len(TOOLS)} --- |"
     for one in running:
         tools = one.get("tools", {})
@@ -116,14 +124,15 @@ def _explained(one: Mapping[str, Any], tool: str) -> str:
 
 
 def _not_running(what: str, files: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """Those that do not run, by their reasons."""
+    """The files that do not run, by their reasons."""
     grouped: dict[str, list[Mapping[str, Any]]] = {reason: [] for reason in _REASONS}
     for one in files:
         if one["outcome"] != "runs":
             found = (name for name, part in _REASONS.items() if re.search(part, one["reason"]))
             grouped[next(found)].append(one)
-    counts = (f"{len(members)} {reason}" for reason, members in grouped.items() if members)
-    yield f"\nThe others, {', '.join(counts)}:\n\n| {what} | why |\n| --- | --- |"
+    counts = (f"- {len(members)} {reason}" for reason, members in grouped.items() if members)
+    yield "\nThe others do not run:\n\n" + "\n".join(counts)
+    yield f"\n| {what} | why |\n| --- | --- |"
     for members in grouped.values():
         for one in members:
             yield f"| {_name(one)} | {_why(one)} |"
@@ -135,7 +144,7 @@ def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     numbers = [one["deviation"] for one in running if isinstance(one["deviation"], float)]
     yield f"\n## FMUs one by one\n\n{len(running)} of {len(there)} run{_versions(there)}.\n"
     yield (
-        f"{len(numbers)} have Real outputs that the plain host reads as well: {_equal(numbers)} "
+        f"{len(numbers)} have Real outputs that the plain host also reads. {_equal(numbers)} "
         f"agree bit for bit, {_within(numbers)} to {FMU_BOUND:g}.\n"
     )
     for one in running:
@@ -167,12 +176,13 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     lost = [one for one in ran if one["changed"]["lost"]]
     silent = [one for one in lost if one["changed"]["silent"]]
     yield (
-        f"\n## Parameters\n\n{len(changed)} of the FMUs that run have Real parameters. All of an "
-        "FMU's were changed at once, by a hundredth, and read back after initialisation.\n\n"
+        f"\n## Parameters\n\n{len(changed)} of the FMUs that run have Real parameters. All "
+        "parameters of an FMU were changed at once, by a hundredth, and read back after "
+        "initialisation.\n\n"
         "| FMUs | how many |\n| --- | --: |\n"
-        f"| that hold all that they were given | {len(ran) - len(lost)} |\n"
-        f"| that do not, which is said | {len(lost) - len(silent)} |\n"
-        f"| that do not, in silence | {len(silent)} |\n"
+        f"| that keep all new values | {len(ran) - len(lost)} |\n"
+        f"| that do not, with a message | {len(lost) - len(silent)} |\n"
+        f"| that do not, silently | {len(silent)} |\n"
         f"| that do not run with these values | {len(changed) - len(ran)} |\n"
     )
     numbers = [one["changed"].get("deviation") for one in ran]
@@ -201,7 +211,8 @@ def _absent(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """What could not be fetched where this page was written."""
     places = Counter(one["place"] for one in found if one["outcome"] == "absent")
     if places:
-        yield "\n## Not to be had\n\nFiles that could not be fetched when this page was written:\n"
+        yield "\n## Unavailable files\n"
+        yield "Files that could not be fetched when this page was written:\n"
         for one in found:
             if one["outcome"] == "absent":
                 yield f"- {_name(one)}"

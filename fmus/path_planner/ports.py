@@ -21,7 +21,7 @@ def _of_each_waypoint(member: str, unit: str, description: str) -> tuple[Port, .
 
 
 _X, _Y, _Z = (_of_each_waypoint(axis, "m", f"Waypoint: {axis}") for axis in "xyz")
-_T = _of_each_waypoint("t", "s", "When it is passed, if `timed`")
+_T = _of_each_waypoint("t", "s", "Time at which it is passed, if `timed`")
 
 _COUNT = setting(
     "count",
@@ -39,7 +39,7 @@ _CRUISE = parameter(
     "cruise", _WAYPOINTS.cruise, "m/s", "Speed between waypoints without times", POSITIVE
 )
 _ROUNDING = parameter(
-    "rounding", _WAYPOINTS.rounding, "s", "Time that a corner is rounded in", POSITIVE
+    "rounding", _WAYPOINTS.rounding, "s", "Time that the rounding of a corner takes", POSITIVE
 )
 
 PARAMETERS = ParameterSet(
@@ -58,8 +58,8 @@ PARAMETERS = ParameterSet(
     vehicle=VEHICLE,
     ell=CONTROL_POINT,
     limits=LIMITS,
-    speed_max=parameter("speed_max", _DEFAULTS.speed_max, "m/s", "Fastest that is let pass", 0.0),
-    turn_max=parameter("turn_max", _DEFAULTS.turn_max, "rad/s", "Sharpest turn let pass", 0.0),
+    speed_max=parameter("speed_max", _DEFAULTS.speed_max, "m/s", "Largest accepted speed", 0.0),
+    turn_max=parameter("turn_max", _DEFAULTS.turn_max, "rad/s", "Largest accepted turn rate", 0.0),
 )
 
 _WAYS = (_COUNT, *(port for k in zip(_X, _Y, _Z, _T) for port in k), _TIMED, _CRUISE, _ROUNDING)

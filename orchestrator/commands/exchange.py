@@ -32,6 +32,8 @@ from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import brings_its_own, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.scenario_events import read_events
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
@@ -43,7 +45,7 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 
 
 #: Options of `verify` that are for a table only.
-_OF_TABLES = ("scenario", "order", "initial", "verbose", "set")
+_OF_TABLES = ("scenario", "order", "initial", "verbose", "events", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
@@ -147,6 +149,11 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--verbose", action="store_true", help="list every column that was not compared"
     )
+    parser.add_argument(
+        "--events",
+        metavar="SCENARIO|FILE.toml",
+        help="the scenario whose events happened in the run of the table; default: none did",
+    )
     add_set(parser)
     parser.set_defaults(action=partial(_verify, parser.get_default))
 
@@ -229,11 +236,13 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
                 raise InputError(f"--{name} is for a table; an FMU says itself what is compared")
         return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
+    tables = read_scenario(options.events).events if options.events else ()
     certificate = verify(
         options.table,
         system,
         TOLERANCE if options.tolerance is None else options.tolerance,
         options.order,
+        events=read_events(options.events, tables, system),
         initial=options.initial,
         verbose=options.verbose,
     )

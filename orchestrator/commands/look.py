@@ -70,15 +70,21 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 
 def add_live(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu live`."""
+    describe(
+        parser,
+        "Write one self-contained page in which the closed loop runs in the browser: change gains, "
+        "limits, noise or the start, and the figures follow.",
+        "live fig5 --out live.html",
+    )
     parser.add_argument(
         "scenario",
         nargs="?",
         default=_OPENED,
         metavar="SCENARIO|FILE.toml",
-        help="the scenario that the page opens, of the bundle's components; it has all scenarios "
-        f"of `auv-fmu list` besides; default: {_OPENED}",
+        help="scenario that the page opens with, made of the bundle's components; the page also "
+        f"offers every scenario of `auv-fmu list`; default: {_OPENED}",
     )
-    _add_file(parser, "a .html; default: SCENARIO-live.html")
+    _add_file(parser, "page to write: .html; default: SCENARIO-live.html")
     parser.set_defaults(action=_live)
 
 
@@ -180,7 +186,7 @@ def _live(options: argparse.Namespace) -> int:
 
     out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
     if out.suffix != ".html":
-        raise InputError(f"{out}: write a .html")
+        raise InputError(f"{out}: must end with .html")
     text = live_page(options.scenario)
     with _written([out], options.force) as folder:
         (folder / out.name).write_text(text, encoding="utf-8")

@@ -31,7 +31,7 @@ COMMANDS = {
     "sweep": ("many_runs", "make the runs of a study"),
     "plot": ("look", "draw signals of stored results"),
     "view": ("look", "write a page that plays a stored result in 3D"),
-    "live": ("look", "write a page in which a scenario runs while its settings are changed"),
+    "live": ("look", "write a page in which a scenario runs while you change its settings"),
     "animate": ("look", "write a film of a scenario"),
     "new": ("build", "create a controller from a template"),
     "report": ("many_runs", "run all scenarios and compare them with the paper"),

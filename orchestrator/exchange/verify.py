@@ -26,6 +26,7 @@ from orchestrator.master.experiment import (
     Order,
     format_order,
 )
+from orchestrator.master.hooks.events import Event, Events
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
@@ -78,6 +79,7 @@ def verify(
     tolerance: float,
     order: Order | None = None,
     *,
+    events: Sequence[Event] = (),
     initial: str = FULL,
     verbose: bool = False,
 ) -> str:
@@ -93,6 +95,7 @@ def verify(
             largest magnitude of the port.
         order: in which the tool steps the components, with `a+b` for some that it steps side by
             side; None: one of :data:`ORDERS`.
+        events: that have happened in its run.
         initial: what it exchanges before the first step.
         verbose: whether all names of what was not compared are said.
 
@@ -116,7 +119,9 @@ def verify(
         for component in system.components.values()
         for variable in component.variables
     }
-    table = read_table(path, outputs, known)
+    # A tool that runs one FMU names ports only.
+    names = [f"{name}." for name in system.components]
+    table = read_table(path, outputs, known, names[0] if len(names) == 1 else "")
     if not len(table.time) or not table.time[-1] > 0.0:
         raise InputError(f"{path}: has no row after t = 0")
     if not table.columns:
@@ -125,7 +130,7 @@ def verify(
         )
     complaints = []
     for way in algorithms:
-        complaint = _complaint(table, system, way, tolerance)
+        complaint = _complaint(table, system, events, way, tolerance)
         if complaint is None:
             return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
         complaints.append(f"{way.words} {complaint}")
@@ -170,14 +175,17 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
             yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
 
 
-def _complaint(table: ForeignTable, system: System, way: Algorithm, tolerance: float) -> str | None:
+def _complaint(
+    table: ForeignTable, system: System, events: Sequence[Event], way: Algorithm, tolerance: float
+) -> str | None:
     """What is wrong with a table, seen from our own run; None: nothing."""
     stop_time = float(table.time[-1])
     ours = _Samples(table.time, tuple(table.columns))
     try:
         step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
         experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
-        simulate_to_end(make_plan(system, experiment), [ours], way.exchange)
+        hooks = [Events(events)] if events else []
+        simulate_to_end(make_plan(system, experiment), [ours], way.exchange, hooks)
     except InputError as error:
         return f"our own run fails: {error}"
     return _first_difference(table.time, table.columns, ours.values, tolerance)
@@ -295,13 +303,16 @@ class ForeignTable:
     repeated: int
 
 
-def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> ForeignTable:
+def read_table(
+    path: Path, ports: Mapping[str, str], known: Collection[str], before: str = ""
+) -> ForeignTable:
     """Read a table: every value of the time and of the ports in it, or none.
 
     Args:
         path: CSV with a line of names; the separators are commas, semicolons or tabs.
         ports: types of the ports that are looked for, by `component.port`.
         known: names of all ports; names of systems may stand before them.
+        before: what a column's name may lack.
 
     Raises:
         InputError: a row is not as long as the first, a time falls, a value is no number,
@@ -310,11 +321,15 @@ def read_table(path: Path, ports: Mapping[str, str], known: Collection[str]) -> 
     """
     what = "not a table that can be compared"
     with records(path, what, places_of_time) as (names, rows):
-        return _table(names, rows, ports, known)
+        return _table(names, rows, ports, known, before)
 
 
 def _table(
-    names: Sequence[str], rows: Iterable[Record], ports: Mapping[str, str], known: Collection[str]
+    names: Sequence[str],
+    rows: Iterable[Record],
+    ports: Mapping[str, str],
+    known: Collection[str],
+    before: str,
 ) -> ForeignTable:
     if not places_of_time(names):
         separators = ", ".join(SEPARATORS.values())
@@ -325,7 +340,7 @@ def _table(
     places: dict[str, int] = {}
     longest = max(map(len, known), default=0)
     for place, name in enumerate(names):
-        port = port_of(name, known, longest)
+        port = port_of(f"{before}{name.strip()}", known, longest)
         port = port if port in ports else None
         if port in places:
             raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")

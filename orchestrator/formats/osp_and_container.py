@@ -115,9 +115,7 @@ def read_osp(path: Path, findings: Findings | None = None) -> System:
     connections = tuple(_connections(archive, root, components))
     algorithm = root.findtext("Algorithm", _ALGORITHM).strip()
     if algorithm != _ALGORITHM:
-        archive.note(
-            f"asks for the algorithm {algorithm!r}; steps of a fixed length are made instead"
-        )
+        archive.note(f"asks for the algorithm {algorithm!r}; fixed steps are used instead")
     step = _number(archive, root, "BaseStepSize") or _STEP
     system = System(
         name=archive.folder.name,
@@ -267,7 +265,7 @@ def _parameters(
                 archive.problem(error)
                 continue
             if port in fed or not components[name].is_settable(port.port):
-                why = f"is of causality {variable.causality} and cannot be set"
+                why = f"has causality {variable.causality} and cannot be set"
                 why = f"is fed by {fed[port]}" if port in fed else why
                 archive.note(f"{port}: {why}; the value that is given to it has no effect")
                 continue

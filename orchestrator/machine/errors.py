@@ -1,4 +1,4 @@
-"""What can go wrong, in words for the user, and all that is wrong with a file, collected."""
+"""Errors in words for the user, and all problems of a file, collected."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 
-#: Of a long text, such as all that is wrong with a description, this many lines and letters of
-#: each are said.
+#: How many lines of a long text, such as the problems of a description, are shown, and how many
+#: letters of each.
 _MOST_LINES, _LONGEST_LINE = 10, 300
 
 

@@ -1,4 +1,4 @@
-"""Files that the user names, read with care: none is waited for, and none is without an end.
+"""Files that the user names: only regular ones, so that none blocks and none is endless.
 
 Archives are unpacked once a process and content, into a temporary folder of the process, which ends
 with it. Running a system again then neither unzips an FMU nor loads its library a second time; and

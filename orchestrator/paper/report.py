@@ -81,7 +81,7 @@ def write_report(
         stop_time: of all runs [s]; None: their own. For a look at the report, not at the paper.
         kind: of the bundle's FMUs in all runs.
         ready: studies that have a section: names, or paths of files.
-        variants: hold the printed table against all that the paper leaves open.
+        variants: compare the printed table with every reading of the paper.
         force: move aside files of the user's that have names of these.
 
     Returns:

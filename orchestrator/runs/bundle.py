@@ -303,7 +303,7 @@ def new_controller(
     folder = Path(name) if folder is None else folder
     contents = {
         f"{module}.py": f"{base}.py.txt",
-        "scenario.toml": "scenario.toml",
+        f"{module}.toml": f"{_MODULE}.toml",
         "README.md": "README.md",
     }
     if folder.is_dir() and any(folder.iterdir()):

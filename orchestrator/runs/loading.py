@@ -37,18 +37,18 @@ def load(
     variant: str | None = None,
     strict: bool = False,
 ) -> System:
-    """The system of a scenario, or of a file of others, with its experiment.
+    """Read the system of a scenario, of an SSP or of another file, with its experiment.
 
-    What is not as it should be and does no harm is a warning.
+    Harmless flaws give a warning.
 
     Args:
-        name: of a scenario of the bundle, or path of a .toml file, an SSP, an FMU, or libcosim's
-            OspSystemStructure.xml; an SSP and the latter may also be a folder; or what a scenario
-            file would hold, as a dictionary.
-        kind: of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
+        name: name of a scenario, path of a .toml file, an SSP, an FMU or libcosim's
+            OspSystemStructure.xml, or a dictionary with the entries of a scenario file. The folder
+            of an SSP or of an OspSystemStructure.xml will also do.
+        kind: kind of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
         fmi: their version of FMI, `2` or `3`.
-        variant: which of the descriptions in an SSP; None: the default.
-        strict: refuse what otherwise is a warning.
+        variant: name of a system description in an SSP; None: the default.
+        strict: treat warnings as errors.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.

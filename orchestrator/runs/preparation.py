@@ -174,8 +174,8 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     """A scenario, and the one it is compared with, if there is one.
 
-    What the scenario and the user set goes for both, as far as both have it. The companion keeps
-    its controller, and follows the reference of the scenario.
+    Settings of the scenario and of the user apply to both, where both have them. The companion
+    keeps its controller, and follows the reference of the scenario.
 
     Raises:
         InputError: something about the request cannot be done for the companion.

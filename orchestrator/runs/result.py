@@ -112,7 +112,7 @@ class Result(Table):
     `result.failure` why the run ended early, or None.
 
     Attributes:
-        resumed_at: where it went on with a checkpoint of an earlier process [s]; None: it did not.
+        resumed_at: when it continued from a checkpoint [s]; None: it was not resumed.
 
     """
 
@@ -147,12 +147,12 @@ class Result(Table):
 
     @cached_property
     def parameters(self) -> Parameters:
-        """Of all components, as the FMUs reported them after initialisation."""
+        """Parameters of all components, as the FMUs reported them after initialisation."""
         return Parameters(self.header.parameters)
 
     @property
     def system(self) -> System:
-        """What was run.
+        """The system of the run.
 
         Raises:
             ValueError: the result was read from files, which do not hold it.
@@ -162,11 +162,11 @@ class Result(Table):
 
     @property
     def events(self) -> tuple[Occurrence, ...]:
-        """What has happened during the run: each has a time [s], a text and a label."""
+        """Events that happened during the run: each has a time [s], a text and a label."""
         return self.ending.events
 
     def metrics(self) -> dict[str, Any]:
-        """What the command line writes into metrics.json."""
+        """The indices, as in metrics.json."""
         return self._origin.metrics(self)
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -187,8 +187,9 @@ class Result(Table):
         """Draw columns over time, a group such as `plant.y` a panel.
 
         Args:
-            what: names of groups or columns, or patterns such as `plant.eta.*`; none: errors,
-                commands and estimates of the loop. Other results are drawn over this one.
+            what: names of groups or columns, or patterns such as `plant.eta.*`; without any:
+                errors, commands and estimates of the loop. Results among them are drawn over this
+                one.
 
         Raises:
             ValueError: a pattern matches no column.
@@ -207,12 +208,12 @@ class Result(Table):
 
         Args:
             others: results that are drawn with it, as in a comparison.
-            name: of the figure, such as `comparison`, or `tracking-velocity`; None: the one that
-                its scenario names.
-            vehicle: whose, if there are several; the first, if none is named.
+            name: name of the figure, such as `comparison` or `tracking-velocity`; None: the
+                scenario's.
+            vehicle: name of the vehicle, if there are several; None: the first.
 
         Raises:
-            ValueError: there is no such figure, or the result has nothing that it shows.
+            ValueError: there is no such figure, or the result lacks all of its signals.
 
         """
         from orchestrator.figures.drawing import one_figure  # noqa: PLC0415
@@ -235,8 +236,8 @@ class Result(Table):
         Args:
             folder: made if it does not exist; an earlier result in it is replaced.
             format: of the table, `csv` or `parquet`.
-            force: move aside files of yours that have names of its files; otherwise they stay, and
-                nothing is written.
+            force: move aside your files with names of its files; without it they stay, and nothing
+                is written.
 
         Returns:
             The folder.
@@ -315,14 +316,14 @@ class _OnDisk:
 
 
 def read(path: str | Path) -> Result:
-    """A result that `auv-fmu run` or :meth:`Result.save` has written.
+    """Read a result that `auv-fmu run` or :meth:`Result.save` has written.
 
         result = read("results/fig4")
 
-    Its columns are numbers: those with texts are left out.
+    Columns with texts are left out.
 
     Args:
-        path: of the folder, or of a table in it.
+        path: path of the folder, or of a table in it.
 
     Raises:
         ValueError: there is no result, or it cannot be read.

@@ -166,7 +166,7 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
         said, others = content.pop("path"), content["parameters"]
         found = path_parameters(path.parent / said["file"], said.get("component", STANDARD.planner))
         for name in found.keys() & others.keys():
-            raise InputError(f"{path}: {name} is given by {said['file']} already")
+            raise InputError(f"{path}: {name} is already given by {said['file']}")
         content["parameters"] |= found
     if "inputs" in content:
         said = content["inputs"]
@@ -251,7 +251,7 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
     """Check that an input can be supplied, and takes all values of its column."""
     variable = system.component(target.component).variable(target.port)
     if variable.causality != "input":
-        raise InputError(f"{target} is of causality {variable.causality}, not input")
+        raise InputError(f"{target} has causality {variable.causality}, not input")
     if type_of(variable) == "String":
         raise InputError(f"{target} is a String: a table holds only numbers")
     for connection in system.connections:

@@ -143,7 +143,7 @@ def _ports(
     variable = system.component(port.component).variable(port.port)
     if variable.causality not in causalities:
         raise InputError(
-            f"{port} is of causality {variable.causality}, not {' or '.join(causalities)}"
+            f"{port} has causality {variable.causality}, not {' or '.join(causalities)}"
         )
     if type_of(variable) == "String" and "parameter" not in causalities:
         raise InputError(f"{port} is a String: events act only on numbers and Booleans")

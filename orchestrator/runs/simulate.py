@@ -92,50 +92,50 @@ def simulate(
         result["plant.eta.x"], result.metrics(), result.plot("plant.tau.*")
 
     Args:
-        system: name of a scenario, path of a .toml or .ssp file, what a scenario file would hold,
-            as a dictionary, or what :func:`load` has given.
-        parameters: values that win over the scenario's, by `component.parameter`: numbers, truth
-            values, names, or text as it stands on the command line; for a group, such as
-            `plant.eta0`, a list with a value for each member.
+        system: name of a scenario, path of a .toml or .ssp file, a dictionary with the entries of
+            a scenario file, or a system from :func:`load`.
+        parameters: values that replace the scenario's, by `component.parameter`: numbers, truth
+            values, names, or text as on the command line; for a group, such as `plant.eta0`, a
+            list with a value for each member.
         stop_time: end of the run [s]; None: the scenario's own.
-        step: communication step [s]; None: the scenario's own, else the longest that fits into
-            the steps that the FMUs were made for, else 0.02.
-        order: `gauss-seidel`, as the paper's scheme has it, `jacobi`, as most tools step, or the
-            names of all components, one stepped after the other; None: the scenario's own, else
+        step: communication step [s]; None: the scenario's own, else the longest that divides the
+            default steps of the FMUs, else 0.02.
+        order: `gauss-seidel`, the paper's scheme, `jacobi`, the scheme of most tools, or the names
+            of all components, stepped one after the other; None: the scenario's own, else
             `gauss-seidel`.
-        kind: of the bundle's FMUs, `python`, `native`: translated to C, with the same numbers, or
-            `auto`, native where available.
+        kind: kind of the bundle's FMUs: `python`, `native`, translated to C with the same numbers,
+            or `auto`, native where available.
         progress: show a bar on runs that take longer than some seconds.
-        isolate: run each FMU in a process of its own, whose end, whatever it does, is no more than
-            a failure of the run.
+        isolate: run each FMU in a separate process. If that process crashes, hangs or exits, only
+            the run fails.
         step_timeout: how long an isolated FMU may take for one call [s]; None: 60.
-        loop: what makes the steps: `python`, `compiled`, or `auto`, the compiled loop where it is
-            to be had; the rows are the same.
-        variant: which of the descriptions in an SSP; None: the default.
-        strict: refuse what otherwise is a warning.
-        steps: of components that take longer ones of their own [s], multiples of the communication
-            step; they win over the scenario's.
-        events: what happens during the run, instead of the scenario's own: tables as a
-            scenario file has them, such as `{"at": 20.0, "lose": "controller.tau.r"}`.
+        loop: the loop that makes the steps: `python`, `compiled`, or `auto`, compiled where
+            available; the rows are the same.
+        variant: name of a system description in an SSP; None: the default.
+        strict: treat warnings as errors.
+        steps: longer steps of single components [s], multiples of the communication step; they
+            replace the scenario's.
+        events: events of the run, instead of the scenario's own: tables as in a scenario file,
+            such as `{"at": 20.0, "lose": "controller.tau.r"}`.
         inputs: a table of inputs over time, instead of the scenario's own: a .csv or .parquet
             file.
         coupling: how rings of direct feedthroughs are closed: `solve`, at every communication
             point, `delay`, by a delay of one step, or `linear`, solved, with inputs that change
             linearly during a step; None: the scenario's own, else `solve` where the FMUs allow it.
-        checkpoint: folder for what it takes to go on after the process has ended, whatever ended
-            it; removed when the run has come to its end.
-        checkpoint_every: how often that is written, in simulated seconds; None: as often as
-            before, if the run is resumed.
-        resume: go on from there. The result has all rows, as if nothing had happened, and says in
-            `resumed_at` where it went on.
+        checkpoint: folder for checkpoints, from which another process can continue the run; it is
+            removed when the run is complete.
+        checkpoint_every: time between two checkpoints [simulated s]; None: as before, if the run
+            is resumed.
+        resume: continue from the last checkpoint. The result has all rows, as if the run had not
+            been interrupted. `resumed_at` has the time at which it continued.
 
     Returns:
-        The rows that were computed: all of them, or those before a failure, which
-        `Result.failure` then describes.
+        The computed rows: all of them, or the rows before a failure, which `Result.failure` then
+        describes.
 
     Raises:
         ValueError: a name, a value or a file is not usable; the text says what to change.
-        KeyboardInterrupt: Ctrl-C, when the step has ended that it came in.
+        KeyboardInterrupt: Ctrl-C, after the current step.
 
     """
     is_named = not isinstance(system, System)

@@ -184,4 +184,4 @@ def _joined(
                 case "input", "output":
                     yield Connection(here, there)
                 case first, second:
-                    raise InputError(f"{there} is of causality {first}, {here} of {second}")
+                    raise InputError(f"{there} has causality {first}, {here} of {second}")

@@ -61,7 +61,7 @@ class Space:
             systems: of its scenarios, by the names that it has for them.
 
         Raises:
-            InputError: a value does not exist, or cannot be what it shall be.
+            InputError: a name does not exist, or a value has the wrong type.
 
         """
         known = _Known([system for _, system in systems.values()])
@@ -94,10 +94,9 @@ class Space:
         if self._n > MOST_RUNS:
             raise InputError(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
         self._points = draw_shares(study.sample) if study.sample else np.empty((1, 0))
-        self._constants = {
-            name: known.typed(name, value) for name, value in study.parameters.items()
-        }
-        names = {name for name in (*study.parameters, *study.varied) if name != STEP}
+        given = known.expanded(study.parameters)
+        self._constants = {name: known.typed(name, value) for name, value in given.items()}
+        names = {name for name in (*given, *study.varied) if name != STEP}
         self._has = {
             scenario: {name for name in names if system.has(port_name(name))}
             for scenario, (_, system) in systems.items()
@@ -201,6 +200,16 @@ class _Known:
         if not is_finite(value):
             raise InputError(f"{STEP} = {shortened(repr(value))}: not a number of seconds")
         return float(value)
+
+    def expanded(self, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Values by ports only: a group is taken from the first system that has it."""
+        found: dict[str, Any] = {}
+        for name, value in values.items():
+            port = port_name(name) if name != STEP else None
+            of = [system.expanded({port: value}) for system in self._systems if port is not None]
+            members = next((one for one in of if one.keys() != {port}), {name: value})
+            found |= {str(member): its for member, its in members.items()}
+        return found
 
     def _variable(self, name: str) -> ModelVariable:
         target = port_name(name)

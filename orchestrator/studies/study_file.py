@@ -187,7 +187,7 @@ class StudyFile(TomlTable):
         "with equal probability.",
         "none",
     )
-    figures: FiguresTable = entry("What is drawn: see below.", "what moves what")
+    figures: FiguresTable = entry("What is drawn: see below.", "a figure of kind `influence`")
 
 
 def read_study(name: str) -> Study:

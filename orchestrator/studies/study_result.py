@@ -41,14 +41,14 @@ def read_study_record(folder: Path) -> dict[str, Any]:
 
 
 class StudyResult(Mapping[str, np.ndarray]):
-    """The runs of a study that is done, by column.
+    """The runs of a finished study, by column.
 
     `result["plant.eta0.z"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. What a run does not have is nan; `result["failure"]` is None where a run came to its
-    end.
+    suggestion. A missing value of a run is nan. `result["failure"]` is None for a run without a
+    failure.
 
     Attributes:
-        folder: that holds them.
+        folder: the folder of the study.
 
     """
 
@@ -79,17 +79,17 @@ class StudyResult(Mapping[str, np.ndarray]):
 
     @cached_property
     def record(self) -> dict[str, Any]:
-        """What study.json holds."""
+        """The content of study.json."""
         return read_study_record(self.folder)
 
     @property
     def runs(self) -> int:
-        """How many there are."""
+        """Number of runs."""
         return int(self._table.num_rows)
 
     @property
     def failed(self) -> int:
-        """How many of them have failed."""
+        """Number of failed runs."""
         return int(self.runs - self._table[FAILURE].null_count)
 
     def __iter__(self) -> Iterator[str]:

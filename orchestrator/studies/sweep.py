@@ -13,14 +13,13 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated, Any
 
-from tqdm import tqdm
-
 from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.observers.observer import progress_bar
 from orchestrator.master.plan import PACKAGES
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
@@ -113,28 +112,28 @@ def sweep(
     progress: bool = False,
     force: bool = False,
 ) -> StudyResult:
-    """Make the runs of a study, or the ones that are missing.
+    """Make all runs of a study, or the missing ones.
 
         result = sweep("attraction")
         result["plant.eta0.z"], result["failure"], result.to_dataframe()
 
     Args:
-        study: name of a ready study, path of a .toml file, or what such a file holds.
-        engine: that makes the runs, `fmu` or `batch`; None: the study's own.
-        kind: of the bundle's FMUs, `python`, `native`, or `auto`: the one that the study was begun
-            with, else native where available.
-        loop: that makes their steps: `python`, `compiled` or `auto`.
+        study: name of a ready study, path of a .toml file, or a dictionary with its entries.
+        engine: engine that makes the runs, `fmu` or `batch`; None: the study's own.
+        kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
+            study began, else native where available.
+        loop: loop that makes their steps: `python`, `compiled` or `auto`.
         scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
             this machine.
         workers: how many of these; None: one for each core.
-        out: folder of the study; what was done there before is not done again. None:
+        out: folder of the study; runs that are finished there are not made again. None:
             `results/NAME`.
         progress: show a bar on studies that take longer than some seconds.
-        force: move aside files of yours that have names of the study's, and another study.
+        force: move aside your files with names of the study's files, and another study.
 
     Raises:
         ValueError: something about the study is not usable; the text says what to change.
-        KeyboardInterrupt: Ctrl-C; what is done is kept.
+        KeyboardInterrupt: Ctrl-C; finished runs are kept.
 
     """
     wanted = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
@@ -373,7 +372,7 @@ def _complete(
     points = (space[number] for number in unfinished.missing(len(space)))
     with (
         making_runs(engine, points, scheduler=means.scheduler, workers=means.workers) as blocks,
-        tqdm(
+        progress_bar(
             total=len(space),
             initial=len(unfinished),
             desc=name,

@@ -197,7 +197,7 @@ class Component:
     @property
     def remainder(self) -> str:
         """Which variables are left alone, in words."""
-        return f"{shortened(', '.join(self.left_alone))}: not supported, and left alone"
+        return f"{shortened(', '.join(self.left_alone))}: not supported, and ignored"
 
     @cached_property
     def arrays(self) -> dict[str, list[ModelVariable]]:

@@ -46,7 +46,7 @@ def port_name(text: str) -> PortName:
     """
     component, dot, port = text.partition(".")
     if not (component and dot and port):
-        raise InputError(f"{text!r}: write COMPONENT.PORT, for example plant.m11")
+        raise InputError(f"{text!r}: write COMPONENT.PORT or COMPONENT.PARAMETER")
     return PortName(component, port)
 
 

@@ -233,7 +233,7 @@ class System:
             if target in fed:
                 yield f"{target} is fed by {fed[target]} and cannot be set"
             if not settable:
-                yield f"{target} is of causality {causality} and cannot be set"
+                yield f"{target} has causality {causality} and cannot be set"
 
     def _ambiguous(self) -> Iterator[str]:
         """Names that two ports share, when one component's name begins another's."""
@@ -252,8 +252,7 @@ class System:
         for end, variable, wanted in ((source, a, "output"), (target, b, "input")):
             if variable.causality != wanted:
                 raise InputError(
-                    f"{source} -> {target}: {end} is of causality {variable.causality}, "
-                    f"not {wanted}"
+                    f"{source} -> {target}: {end} has causality {variable.causality}, not {wanted}"
                 )
         if not _can_feed(a, b):
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")

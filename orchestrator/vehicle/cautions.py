@@ -169,8 +169,8 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
     if apart <= _SAME:
         return []
     return [
-        f"its reference {loop.planner}.y_d is up to {apart:.3g} m away from the one of {name}: the "
-        "two runs follow different paths"
+        f"its reference {loop.planner}.y_d is up to {apart:.3g} m away from {name}'s: the two "
+        "runs follow different paths"
     ]
 
 

@@ -64,8 +64,8 @@ def test_law_of_the_guide_follows_the_reference(followed: Path):
 
 
 def test_runs_of_the_guide_are_drawn(followed: Path):
-    assert (followed / "my_law/results/scenario.png").is_file()
-    assert (followed / "hardened/results/scenario.svg").is_file()
+    assert (followed / "my_law/results/my_law.png").is_file()
+    assert (followed / "hardened/results/my_law.svg").is_file()
     assert (followed / "compared.png").is_file()
 
 
@@ -113,9 +113,9 @@ def test_mistake_in_a_step_is_told_once_with_its_line(base, isolated, workplace,
     script.write_text(text.replace(first, f"{first}        beside.waiting({argument})\n"))
     assert main(["build", "my_law.py"]) == 0
     capsys.readouterr()
-    assert main(["run", "scenario.toml", "--no-figures", "--out", "out", *isolated]) == 1
+    assert main(["run", "my_law.toml", "--no-figures", "--out", "out", *isolated]) == 1
     [line] = capsys.readouterr().err.splitlines()
-    assert mentions(line, "scenario t = 0.5 s: controller: beside.py:2: NameError: 'value'")
+    assert mentions(line, "my_law t = 0.5 s: controller: beside.py:2: NameError: 'value'")
     assert line.count("beside.py") == 1
     assert len(Path("out/result.csv").read_text().splitlines()) == 1 + 26
 
@@ -135,7 +135,7 @@ def test_mistake_in_the_first_step_is_all_that_is_told(workplace, capsys):
     """No figures and no indices of a run that has made no step."""
     line = built_with("        value = self.values\n", "        value = self.valu\n")
     capsys.readouterr()
-    assert main(["run", "scenario.toml", "--out", "out"]) == 1
+    assert main(["run", "my_law.toml", "--out", "out"]) == 1
     told = capsys.readouterr()
     assert told.out == f"written to out{os.sep}\n"
     [complaint] = told.err.splitlines()
@@ -152,7 +152,7 @@ def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mista
     head = f"        def {head}:\n"
     line = built_with(head, f"{head}            {mistake}\n")
     capsys.readouterr()
-    assert main(["run", "scenario.toml", "--no-figures"]) == status
+    assert main(["run", "my_law.toml", "--no-figures"]) == status
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1
     assert f"controller: my_law.py:{line}: NameError: " in complaint
@@ -170,7 +170,7 @@ def test_changed_script_runs_changed_in_the_same_process(workplace):
     for sign in ("1.0", "-1.0"):
         Path("beside.py").write_text(f"SIGN = {sign}\n")
         assert main(["build", "two_versions.py"]) == 0
-        forces.append(simulate("scenario.toml", stop_time=0.02)["controller.tau.u"][-1])
+        forces.append(simulate("two_versions.toml", stop_time=0.02)["controller.tau.u"][-1])
     assert forces[0] == -forces[1] != 0.0
 
 
@@ -180,6 +180,6 @@ def test_many_instances_of_a_plain_slave_in_one_process(workplace):
     assert main(["new", "controller", "Often", "."]) == 0
     code = (
         "from orchestrator import simulate\n"
-        "for _ in range(80): simulate('scenario.toml', stop_time=0.02)\n"
+        "for _ in range(80): simulate('often.toml', stop_time=0.02)\n"
     )
     subprocess.run([sys.executable, "-P", "-c", code], check=True)

@@ -277,15 +277,19 @@ def test_refusal_is_the_line_of_the_fmu_and_changes_nothing(parts: Parts):
 
 
 @pytest.mark.parametrize(
-    ("preset", "changes"),
-    [("fig4", {"controller.k_d": 25.0, "plant.noise.seed": 3}), ("path-pd", {"plant.ell": 0.4})],
+    ("preset", "events", "changes"),
+    [
+        ("fig4", [], {"controller.k_d": 25.0, "plant.noise.seed": 3}),
+        ("path-pd", [], {"plant.ell": 0.4}),
+        ("fault-thruster", ["--events", "fault-thruster"], {"controller.eps_t": 5.0}),
+    ],
 )
-def test_table_is_accepted_by_verify(preset, changes, opened: Browser, tmp_path, capsys):
-    given = {"preset": preset, "stop_time": 5.0, **changes}
+def test_table_is_accepted_by_verify(preset, events, changes, opened: Browser, tmp_path, capsys):
+    given = {"preset": preset, "stop_time": 55.0 if events else 5.0, **changes}
     opened.evaluate(f"auvfmu.set({json.dumps(given)})")
     (tmp_path / "live.csv").write_text(opened.evaluate("auvfmu.csv()"))
     values = [word for name, value in changes.items() for word in ("--set", f"{name}={value}")]
-    arguments = ["verify", str(tmp_path / "live.csv"), "--scenario", preset, *values]
+    arguments = ["verify", str(tmp_path / "live.csv"), "--scenario", preset, *values, *events]
     assert main([*arguments, "--tolerance", "1e-9"]) == 0
     assert "gauss-seidel" in capsys.readouterr().out
     assert main(arguments[:-2]) == 2

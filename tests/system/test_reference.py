@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
-from fmpy.util import read_csv, read_ref_opt_file
+from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
 from fmus.discovery import REFERENCE, components, package_folder
 from orchestrator.commands.main import main
@@ -56,6 +57,20 @@ def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
     path = tmp_path / "ours.csv"
     write(run(system, 2.0, 0.02), path)
     assert "in gauss-seidel order" in verify(path, system, 1e-12)
+
+
+@pytest.mark.parametrize("name", ["MotionPlanner", "DisturbanceGenerator"])
+def test_table_of_a_tool_that_runs_one_fmu_is_verified(dist, tmp_path, capsys, name):
+    """Its columns have the names of ports, without a component."""
+    fmu, table = str(dist / f"{name}.fmu"), tmp_path / "table.csv"
+    rows = fmpy.simulate_fmu(fmu, stop_time=1.0, output_interval=0.02)
+    write_csv(str(table), rows)
+    assert main(["verify", str(table), "--scenario", fmu]) == 0
+    assert f"{len(rows.dtype.names) - 1} of " in capsys.readouterr().out
+    rows[rows.dtype.names[1]][20] += 1.0
+    write_csv(str(table), rows)
+    assert main(["verify", str(table), "--scenario", fmu]) == 2
+    assert f"{name}.{rows.dtype.names[1]}" in capsys.readouterr().err
 
 
 def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):

@@ -160,7 +160,7 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
         ("run fig4 --columns plant.tua.*", "plant.tua.*"),
         ("run fig4 --stop-time 0.1 --out taken", "taken/result.csv"),
         ("run fig4 --isolate --loop compiled", "compiled isolated"),
-        ("run fig4 --step-timeout 3", "isolation"),
+        ("run fig4 --step-timeout 3", "--isolate"),
         ("run fig4 --variant B", "fig4 variants"),
         ("run fig4 --out r --resume", "r/checkpoint"),
         ("run fig4 --out taken --force --checkpoint-every 0", "checkpoint positive"),

@@ -10,7 +10,7 @@ from orchestrator.commands.main import COMMANDS, parser
 from orchestrator.paper.page import table
 
 #: How wide a usage is at most.
-_WIDTH = 88
+_WIDTH = 80
 
 
 def command_line() -> str:

@@ -26,9 +26,8 @@ from orchestrator.machine.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 
-#: Where the site has the files of the root.
+#: Where the site has the pages of the root; its home is another page than the README.
 PAGES = {
-    "README.md": "index.md",
     "CONTRIBUTING.md": "contributing/README.md",
     "CHANGELOG.md": "contributing/changelog.md",
     "LICENSE": "contributing/licence.md",
@@ -51,6 +50,7 @@ BOOSTS = {
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: ([\w-]+) -->")
 _ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
+_ROLE = re.compile(r":(class|data|func|mod):(?=<code>)")
 
 log = logging.getLogger(f"mkdocs.hooks.{__name__}")
 _why_not = ""
@@ -59,11 +59,10 @@ _why_not = ""
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add what is not in docs/."""
     for source, place in PAGES.items():
-        if source != "README.md":
-            text = (ROOT / source).read_text(encoding="utf-8")
-            if source == "LICENSE":
-                text = f"# Licence\n\n{text}"
-            files.append(File.generated(config, place, content=linked(text, source, files)))
+        text = (ROOT / source).read_text(encoding="utf-8")
+        if source == "LICENSE":
+            text = f"# Licence\n\n{text}"
+        files.append(File.generated(config, place, content=text))
     for notebook in [file for file in files if file.src_uri.endswith(".ipynb")]:
         files.remove(notebook)
         text = notebook_text(Path(str(notebook.abs_src_path)))
@@ -76,16 +75,16 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point links to the site's pages, and to the live page from where it is announced."""
-    [boost] = [n for place, n in BOOSTS.items() if page.file.src_uri.startswith(place)] or [1.0]
+    place = page.file.src_uri
+    [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
     page.meta["search"] = {"boost": boost}
-    if "/" not in page.file.src_uri:
+    if "/" not in place:
         # Nothing stands beside these pages in the tree.
         page.meta["hide"] = ["navigation"]
-    if page.file.src_uri not in PAGES.values() or page.file.src_uri == PAGES["README.md"]:
-        markdown = linked(markdown, f"docs/{page.file.src_uri}", files)
-    up = posixpath.relpath(LIVE, posixpath.dirname(page.file.src_uri) or ".")
+    markdown = linked(markdown, place, files)
+    up = posixpath.relpath(LIVE, posixpath.dirname(place) or ".")
     if _why_not:
-        note = f"This site was built without the live page: {_why_not}."
+        note = f"This site was built without it: {_why_not}."
     else:
         note = f'<iframe class="live" src="{up}" title="The live page" loading="lazy"></iframe>'
     markdown = markdown.replace("<!-- the live page -->", note)
@@ -94,32 +93,40 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return _PRESET.sub(link, markdown)
 
 
+def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Leave out the roles of names in docstrings."""
+    return _ROLE.sub("", content)
+
+
 def _with_plain_bars(row: re.Match[str]) -> str:
     """A row of a table: GitHub needs a backslash before bars in its code, here it would show."""
     return _CODE.sub(lambda code: code.group().replace(r"\|", "|"), row.group())
 
 
-def linked(text: str, source: str, files: Files) -> str:
+def linked(text: str, place: str, files: Files) -> str:
     """A page's text with its links as the site needs them.
 
     Args:
         text: in Markdown.
-        source: of the page in the repository; its links start there.
+        place: of the page in the site. Its links start where its source is in the repository.
         files: of the site.
 
     """
-    here = posixpath.dirname(PAGES.get(source, source.removeprefix("docs/"))) or "."
+    roots = [source for source, page in PAGES.items() if page == place]
+    folder = "" if roots else posixpath.dirname(f"docs/{place}")
+    here = posixpath.dirname(place) or "."
 
     def found(link: re.Match[str]) -> str:
         label, target, anchor = link.group(1), link.group(2), link.group(3) or ""
-        if not target or "://" in target or target.startswith("mailto:"):
+        if not target or ":" in target:
             return link.group()
-        file = posixpath.normpath(posixpath.join(posixpath.dirname(source), target))
-        place = PAGES.get(file, page_of(file.removeprefix("docs/")))
-        if file.startswith("docs/") and (ROOT / file).is_dir():
-            place += "/README.md"
-        if place in PAGES.values() or files.get_file_from_path(place):
-            return f"[{label}]({posixpath.relpath(place, here)}{anchor})"
+        file = posixpath.normpath(posixpath.join(folder, target))
+        inside = "index.md" if file == "README.md" else file.removeprefix("docs/")
+        wanted = PAGES.get(file) or page_of(inside)
+        if (ROOT / file).is_dir():
+            wanted += "/README.md"
+        if files.get_file_from_path(wanted):
+            return f"[{label}]({posixpath.relpath(wanted, here)}{anchor})"
         if (ROOT / file).exists() and not file.startswith("docs/"):
             return label if label.startswith("`") else f"{label} (`{file}`)"
         return link.group()
@@ -149,7 +156,7 @@ def live_page() -> tuple[str, str]:
         return assembly.live_page("fig4"), ""
     except InputError as error:
         log.info("no live page: %s", error)
-        return f"<!doctype html><title>auv-fmu</title><p>No live page: {error}", str(error)
+        return f"<!doctype html><title>auv-fmu</title><p>{error}", str(error)
 
 
 def _outside_code(change: Callable[[str], str], text: str) -> str:

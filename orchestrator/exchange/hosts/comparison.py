@@ -217,7 +217,7 @@ def _ran(
         try:
             process = _process(host, python, system, experiment, folder)
         except subprocess.TimeoutExpired as error:
-            raise InputError(f"no end after {_TIMEOUT} s") from error
+            raise InputError(f"not finished after {_TIMEOUT} s") from error
         if process.returncode != 0:
             raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
         with (folder / here.ROWS).open(encoding="utf-8", newline="") as lines:
@@ -269,7 +269,7 @@ def _job(system: System, experiment: Experiment) -> dict[str, object]:
         ({source for source, _ in wires} - {*outputs}, "connections of other types than Real"),
     ):
         if found:
-            raise InputError(f"is compared only without {what}")
+            raise InputError(f"can be compared only without {what}")
     return {
         "fmus": {name: str(component.fmu) for name, component in system.components.items()},
         "wires": wires,

@@ -288,7 +288,7 @@ class _Ports:
             return
         if not component.is_settable(port.port):
             self._archive.note(
-                f"{port}: is of causality {connector.causality} and cannot be set; the value that "
+                f"{port}: has causality {connector.causality} and cannot be set; the value that "
                 "is given to it has no effect"
             )
             return

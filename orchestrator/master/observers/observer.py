@@ -6,16 +6,18 @@ step was made with.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from ctypes import Structure, c_size_t, c_void_p
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from importlib import import_module
+from importlib.util import find_spec
 from time import monotonic
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-from tqdm import tqdm
 
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
 from orchestrator.master.experiment import ROUNDING, Experiment
@@ -300,6 +302,12 @@ def matches(name: str, pattern: str) -> bool:
     return name == pattern or is_member or fnmatchcase(name, escaped)
 
 
+def progress_bar(**options: Any) -> Any:
+    """A bar of tqdm: a widget in a notebook that has widgets, else a line on a terminal."""
+    is_widget = "ipykernel" in sys.modules and find_spec("ipywidgets") is not None
+    return import_module("tqdm.notebook" if is_widget else "tqdm").tqdm(**options)
+
+
 class Progress:
     """An observer that shows how far a run has come, in simulated seconds, on a terminal."""
 
@@ -309,7 +317,7 @@ class Progress:
 
     def begin(self, header: Header) -> None:
         """Start the clock."""
-        self._bar: Any = tqdm(
+        self._bar: Any = progress_bar(
             total=header.experiment.stop_time,
             desc=self._name,
             unit="s",

@@ -47,6 +47,7 @@ def test_one_sentence(text: str):
         ("One.\nThe second is on\nanother line.", 2),
         ("It ends. `…` begins the next.", 2),
         ("See section 4. § 5 is next. (30) is third.", 3),
+        ("It takes 1 us. ecos takes 2 us.", 2),
         ("a. small letters follow. so they do.", 1),
     ],
 )

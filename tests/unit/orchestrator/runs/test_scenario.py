@@ -152,8 +152,8 @@ def test_other_tables_have_other_digests(tmp_path):
         ("time,plant.tau.u\n-1e308,1\n1e308,1\n", "must be less than 1e+308 s apart"),
         ("time,plant.tau.u,plant.tau.u\n0,1,1\n", "two columns have the same name"),
         ("time,plant.tau.x\n0,1\n", "did you mean"),
-        ("time,plant.eta.x\n0,1\n", "of causality output"),
-        ("time,plant.m11\n0,1\n", "of causality parameter"),
+        ("time,plant.eta.x\n0,1\n", "has causality output"),
+        ("time,plant.m11\n0,1\n", "has causality parameter"),
         ("time,plant.tau.u\n0,1\n0,1,2\n", "not a table"),
     ],
 )

@@ -41,6 +41,22 @@ def test_grid_is_every_combination_whose_last_value_changes_fastest():
     assert runs.columns == {"plant.ell": float, "controller.saturation": str, "plant.eta0.y": float}
 
 
+def test_list_for_a_group_is_a_value_for_each_member():
+    """Only the proposed controller has K2, whichever scenario comes first; the planner both."""
+    runs = space(
+        scenario=["fig5-pd", "fig5"],
+        parameters={"controller.K2": [1, 2, 3], "planner.eta0": [0, 1, -3, 0, 0.5]},
+        vary={"plant.ell": [0.3, 0.4]},
+    )
+    poses = ("x", 0.0), ("y", 1.0), ("z", -3.0), ("theta", 0.0), ("psi", 0.5)
+    shared = {f"planner.eta0.{name}": value for name, value in poses} | {"plant.ell": 0.3}
+    gains = {f"controller.K2[{i}]": float(i) for i in (1, 2, 3)}
+    assert dict(runs[0].parameters) == shared
+    assert dict(runs[1].parameters) == shared | gains
+    with pytest.raises(InputError, match=r"controller\.K1: takes 3 values, not 2"):
+        space(parameters={"controller.K1": [1, 2]}, vary={"plant.ell": [0.3, 0.4]})
+
+
 def test_each_point_is_run_with_each_scenario_that_has_what_it_has():
     runs = space(
         scenario=["fig5", "fig5-pd"],

@@ -98,8 +98,8 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ({"sample": {"n": 10, "range": {"plant.ell": [1, float("inf")]}}}, "write [low, high]"),
         ({"stop_time": float("inf")}, "stop_time = inf: write a number, or table"),
         ({"stop_time": {"base": 1, "per": {"plant.ell": 10**400}}}, "write a table of numbers"),
-        ({"vary": {"ell": [1.0]}}, "'ell': write COMPONENT.PORT, for example plant.m11"),
-        ({"parameters": {"step": 0.01}}, "'step': write COMPONENT.PORT, for example plant.m11"),
+        ({"vary": {"ell": [1.0]}}, "'ell': write COMPONENT.PORT or COMPONENT.PARAMETER"),
+        ({"parameters": {"step": 0.01}}, "'step': write COMPONENT.PORT or COMPONENT.PARAMETER"),
         (
             {"parameters": {"plant.ell": 1.0}, "vary": {"plant.ell": [1.0]}},
             "plant.ell is stated twice",

@@ -67,7 +67,7 @@ def test_name_of_no_port_is_refused(system):
 
 
 def test_output_that_is_calculated_cannot_be_set(system):
-    with pytest.raises(InputError, match=r"a\.y is of causality output and cannot be set"):
+    with pytest.raises(InputError, match=r"a\.y has causality output and cannot be set"):
         system.with_parameters({port_name("a.y"): 1.0}).check()
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,7 +12,14 @@ from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending, Header, Selection, matches, matching
+from orchestrator.master.observers.observer import (
+    Ending,
+    Header,
+    Progress,
+    Selection,
+    matches,
+    matching,
+)
 from orchestrator.master.observers.table import Table
 
 COLUMNS = ("a.x", "a.y", "b.k[1]", "b.k[2]")
@@ -65,3 +75,21 @@ def test_patterns_are_names_groups_and_wildcards():
     assert not matches("a.xy", "a.x")
     with pytest.raises(InputError, match=r"no column matches 'a\.z'; did you mean a\."):
         matching(COLUMNS, ["a.z"])
+
+
+@pytest.mark.parametrize("kernel", [False, True])
+@pytest.mark.parametrize("widgets", [False, True])
+def test_bar_is_a_widget_in_a_notebook_that_has_widgets(monkeypatch, kernel, widgets):
+    made: list[str] = []
+
+    def module(name: str) -> SimpleNamespace:
+        return SimpleNamespace(tqdm=lambda **_: made.append(name))
+
+    monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
+    if kernel:
+        monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
+    where = "orchestrator.master.observers.observer"
+    monkeypatch.setattr(f"{where}.import_module", module)
+    monkeypatch.setattr(f"{where}.find_spec", lambda _: SimpleNamespace() if widgets else None)
+    Progress("fig4").begin(Header((), Experiment(1.0, 0.1)))
+    assert made == ["tqdm.notebook" if kernel and widgets else "tqdm"]
