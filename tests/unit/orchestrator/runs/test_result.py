@@ -98,6 +98,8 @@ def test_figure_that_is_not_there_is_told(result):
     ):
         with pytest.raises(ValueError, match=complaint):
             result.figure(**asked)
+    with pytest.raises(ValueError, match="'comparison': not a result; name= takes the name"):
+        result.figure("comparison")
 
 
 class _Page(HTMLParser):
