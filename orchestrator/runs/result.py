@@ -310,7 +310,10 @@ class _OnDisk:
         """What the run wrote: the table may have fewer rows and columns."""
         path = locate(self._file.with_name(METRICS))
         with explain_errors(path, "not the indices of a run"):
-            return dict(json.loads(read_text(path, "not the indices of a run")))
+            values = json.loads(read_text(path, "not the indices of a run"))
+            if not isinstance(values, dict):
+                raise ValueError("it holds no names")
+            return values
 
     def write_ends(self, folder: Path, result: Result) -> None:
         """Write what the files hold, once more."""
