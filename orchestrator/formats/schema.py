@@ -194,6 +194,8 @@ def _problems(
         inner, path, key = place
         if key is None:
             yield _where(path) + str(error["ctx"]["error"])
+        elif error["type"] == "invalid_key":
+            yield f"{_where(path)}{key}: write names of entries as texts"
         elif error["type"] == "missing":
             missing.setdefault(place._replace(key=None), []).append(key)
         # If a value may be a table and is one, a flaw within it says more.

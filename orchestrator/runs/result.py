@@ -210,15 +210,19 @@ class Result(Table):
             others: results that are drawn with it, as in a comparison.
             name: name of the figure, such as `comparison` or `tracking-velocity`; None: the
                 scenario's.
-            vehicle: name of the vehicle, if there are several; None: the first.
+            vehicle: name of the vehicle, if there are several; empty: the first.
 
         Raises:
-            ValueError: there is no such figure, or the result lacks all of its signals.
+            ValueError: there is no such figure, the result lacks all of its signals, or one of the
+                others is not a result.
 
         """
         from orchestrator.figures.drawing import one_figure  # noqa: PLC0415
         from orchestrator.figures.plot import told_apart  # noqa: PLC0415
 
+        for other in others:
+            if not isinstance(other, Result):
+                raise InputError(f"{other!r}: not a result; name= takes the name of a figure")
         scenario = self._origin.scenario
         runs = [one._drawn() for one in (self, *others)]
         named = [run._replace(label=x) for run, x in zip(runs, told_apart(runs), strict=True)]
@@ -306,7 +310,10 @@ class _OnDisk:
         """What the run wrote: the table may have fewer rows and columns."""
         path = locate(self._file.with_name(METRICS))
         with explain_errors(path, "not the indices of a run"):
-            return dict(json.loads(read_text(path, "not the indices of a run")))
+            values = json.loads(read_text(path, "not the indices of a run"))
+            if not isinstance(values, dict):
+                raise ValueError("it holds no names")
+            return values
 
     def write_ends(self, folder: Path, result: Result) -> None:
         """Write what the files hold, once more."""

@@ -95,6 +95,8 @@ class Space:
             raise InputError(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
         self._points = draw_shares(study.sample) if study.sample else np.empty((1, 0))
         given = known.expanded(study.parameters)
+        if twice := [name for name in given if name in self.columns]:
+            raise InputError(f"{study.name}: {twice[0]} is stated twice")
         self._constants = {name: known.typed(name, value) for name, value in given.items()}
         names = {name for name in (*given, *study.varied) if name != STEP}
         self._has = {

@@ -288,7 +288,10 @@ def _several(value: object) -> list[Any] | None:
     """The values of a list, which a command line writes with commas; None: it is one value."""
     if isinstance(value, str):
         return value.strip().strip("[]").split(",") if "," in value else None
-    return list(value) if isinstance(value, list | tuple | np.ndarray) else None
+    if isinstance(value, np.ndarray):
+        # An array without dimensions is one value.
+        return list(value) if value.ndim else None
+    return list(value) if isinstance(value, list | tuple) else None
 
 
 def _can_feed(source: ModelVariable, target: ModelVariable) -> bool:

@@ -65,6 +65,14 @@ def test_stored_result_that_was_changed_is_told(result, tmp_path):
         read(tmp_path / "nothing")
 
 
+def test_indices_that_no_run_wrote_are_refused(result, tmp_path):
+    (result.save(tmp_path) / "metrics.json").write_text("[1]\n")
+    stored = read(tmp_path)
+    with pytest.raises(ValueError, match=r"metrics\.json: not the indices of a run"):
+        stored.metrics()
+    assert "<table></table>" in stored._repr_html_()
+
+
 def test_results_are_drawn_over_each_other(result):
     other = simulate("fig4", {"planner.eta0.z": -3.0}, stop_time=0.1)
     figure = result.plot("planner.y_d", other, other)
@@ -98,6 +106,8 @@ def test_figure_that_is_not_there_is_told(result):
     ):
         with pytest.raises(ValueError, match=complaint):
             result.figure(**asked)
+    with pytest.raises(ValueError, match="'comparison': not a result; name= takes the name"):
+        result.figure("comparison")
 
 
 class _Page(HTMLParser):

@@ -124,6 +124,8 @@ def test_dictionary_is_a_scenario_like_its_file(tmp_path):
     ("table", "complaint"),
     [
         ({"stop_tim": 1.0}, "unknown entry 'stop_tim'; did you mean stop_time"),
+        ({1: 1.0}, "scenario: 1: write names of entries as texts"),
+        ({"events": [{"at": 0.5, 2: 1}]}, "event 1: 2: write names of entries as texts"),
         ({"components": {"controller": 3}}, "controller': 3}: write a table of names"),
         ({"components": {"controller": "Nope"}}, "Nope.fmu: no such file"),
         ({"parameters": {"plant.eta0": [1.0]}}, "plant.eta0: takes 6 values, not 1"),

@@ -165,6 +165,10 @@ def test_points_are_told_apart_by_the_digest():
         ({"vary": {"plnt.ell": [1.0]}}, "'plnt'.*plant"),
         ({"vary": {"plant.el": [1.0]}}, "'el'.*ell"),
         ({"parameters": {"plant.el": 1.0}}, "'el'"),
+        (
+            {"parameters": {"controller.K1": [1, 2, 3]}, "vary": {"controller.K1[2]": [1.0]}},
+            r"controller\.K1\[2\] is stated twice",
+        ),
         ({"vary": {"plant.ell": ["long"]}}, "plant.ell = long"),
         ({"vary": {"plant.ell": [-1.0]}}, "plant.ell = -1.0"),
         ({"vary": {"plant.noise.seed": [1.5]}}, "plant.noise.seed = 1.5"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -103,3 +104,12 @@ def test_outputs_and_single_ports_take_no_list(several):
     for name in ("a.b.y", "a.b.w", "a.b.none", "c.v"):
         with pytest.raises(InputError):
             several.with_parameters({port_name(name): [1.0, 2.0]})
+
+
+def test_array_without_dimensions_is_one_value(several):
+    assert (
+        several.with_parameters({port_name("a.b.w"): np.array(2.0)}).value(port_name("a.b.w"))
+        == 2.0
+    )
+    with pytest.raises(InputError, match="no component"):
+        several.with_parameters({port_name("a.b.v"): np.array(2.0)})
