@@ -577,7 +577,7 @@ def test_categories_choose_messages_but_not_errors(foreign: Library):
             assert "foreign_slave.py:18: ValueError: not at one" in host.messages[-1].text
 
 
-def test_after_fatal_nobody_is_called(foreign: Library):
+def test_after_fatal_the_slave_is_not_called(foreign: Library):
     with initialised(foreign) as other:
         with initialised(foreign) as host:
             assert host.set_state(host.get_state()) == Status.Fatal
