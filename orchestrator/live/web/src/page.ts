@@ -48,6 +48,8 @@ export class Page {
   #loops: readonly LoopData[] = [];
   /** The last runs that could be made, in the order of the loops. */
   #results: (Result | undefined)[] = [];
+  /** Why what is set cannot be run; empty: it has been run. */
+  #refusal = "";
   #asked = false;
   #link: ReturnType<typeof setTimeout> | undefined;
   #said: ReturnType<typeof setTimeout> | undefined;
@@ -204,8 +206,10 @@ export class Page {
     this.#showSettings();
     try {
       this.#results = this.#runs(this.#settings);
+      this.#refusal = "";
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
+      this.#refusal = error.message;
       this.#refuse(error.message);
       // The last good runs stay; a link may have none.
       if (this.#results.length > 0) return;
@@ -329,11 +333,19 @@ export class Page {
     return result ? csv(result) : "";
   }
 
+  /** Whether the rows that are shown are the ones of the settings; if not, it says why. */
+  #isRun(): boolean {
+    if (this.#refusal) this.#say(`Not yet: ${this.#refusal}`);
+    return !this.#refusal;
+  }
+
   #copyCommand(): void {
+    if (!this.#isRun()) return;
     this.#copy(this.command(), "Command copied");
   }
 
   #download(): void {
+    if (!this.#isRun()) return;
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([this.csv()], { type: "text/csv" }));
     link.download = `${this.#meant().scenario ?? this.#preset.name}.csv`;
