@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
@@ -45,15 +45,18 @@ _FUNCTIONS = (
 _OTHERS = ("malloc", "free", "host_callbacks")
 
 
-def live_module() -> bytes:
+def live_module(hear: Callable[[str], None] = lambda line: None) -> bytes:
     """The module, compiled if that has not been done yet.
+
+    Args:
+        hear: called with a line before it is compiled.
 
     Raises:
         InputError: it cannot be compiled.
 
     """
     try:
-        [place] = made_once(CATEGORY, key_of(), compiled).values()
+        [place] = made_once(CATEGORY, key_of(), lambda: compiled(hear)).values()
     except OSError as error:
         raise InputError(f"the live page has no module: {reason(error)}") from error
     return place.read_bytes()
@@ -70,8 +73,11 @@ def key_of() -> str:
     return digest.hexdigest()[:16]
 
 
-def compiled() -> dict[str, bytes]:
+def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
     """Compile the module.
+
+    Args:
+        hear: called with a line before.
 
     Raises:
         InputError: there is no ziglang.
@@ -83,6 +89,7 @@ def compiled() -> dict[str, bytes]:
             "the live page needs ziglang, which compiles C to WebAssembly: "
             "pip install 'auv-fmu[native]'"
         )
+    hear("compiling the FMUs to WebAssembly, once: this may take some minutes")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary)
         objects = []
