@@ -115,7 +115,14 @@ export class SliderRow {
     const spoken = parameters.length > 1 ? shared(row.names) : parameter.name;
     const label = document.createElement("span");
     label.className = "label";
-    label.innerHTML = `${row.label}${only ? ` <span class="only">${only}</span>` : ""}`;
+    label.innerHTML = row.label;
+    if (only) {
+      // A scenario may name a controller as it likes: that is no HTML.
+      const note = document.createElement("span");
+      note.className = "only";
+      note.textContent = only;
+      label.append(" ", note);
+    }
     label.title = explained(parameter);
     const unit = document.createElement("span");
     unit.className = "unit";

@@ -348,7 +348,7 @@ export class Page {
     if (!this.#isRun()) return;
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([this.csv()], { type: "text/csv" }));
-    link.download = `${this.#meant().scenario ?? this.#preset.name}.csv`;
+    link.download = `${this.#preset.name}.csv`;
     link.click();
     URL.revokeObjectURL(link.href);
     this.#say(`Saved ${link.download}`);

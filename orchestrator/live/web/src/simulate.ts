@@ -110,7 +110,8 @@ class Simulation {
     const wanted = { Real: "number", Integer: "number", Boolean: "boolean", String: "string" }[
       type
     ];
-    const fits = typeof value === wanted && (type !== "Integer" || Number.isInteger(value));
+    // Integers have 32 bits: a larger one would become another without a word.
+    const fits = typeof value === wanted && (type !== "Integer" || (Number(value) | 0) === value);
     if (!fits) throw new Refusal(`${name} = ${value}: not a value of type ${type}`);
     this.parameters[name] = value;
     if (Object.is(value, parameter.default)) return;
