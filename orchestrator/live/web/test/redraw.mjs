@@ -6,7 +6,7 @@ import { chromium } from "playwright-core";
 const [page, moves = "60"] = process.argv.slice(2);
 const browser = await chromium.launch({
   executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"],
+  args: ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"],
 });
 const tab = await browser.newPage({ viewport: { width: 1280, height: 900 } });
 await tab.goto(pathToFileURL(page).href);
