@@ -19,7 +19,8 @@ from tempfile import TemporaryDirectory
 
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
-from orchestrator.live.module import live_module
+from orchestrator.live.module import LICENCES as C_LIBRARY
+from orchestrator.live.module import MODULE, live_module
 from orchestrator.live.presets import page_data
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
@@ -60,15 +61,17 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
     """
     data = page_data(opened)
     parts = {name: path.read_text(encoding="utf-8") for name, path in live_script(hear).items()}
+    module = live_module(hear)
+    library = module[C_LIBRARY].read_text(encoding="utf-8")
     titles = {one["name"]: one["title"] for one in data["presets"]}
     fields = {
         "title": html.escape(titles[data["opened"]]),
         "style": parts[STYLE],
         # What ends the script's element must not occur in it.
         "script": parts[SCRIPT].replace("</script", "<\\/script"),
-        "licences": html.escape("\n\n".join((licences(NATIVE), parts[LICENCES]))),
+        "licences": html.escape("\n\n".join((licences(NATIVE), library, parts[LICENCES]))),
         "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
-        "module": packed(live_module(hear)),
+        "module": packed(module[MODULE].read_bytes()),
     }
     before, *rest = _PAGE.read_text(encoding="utf-8").split("{{")
     return before + "".join(

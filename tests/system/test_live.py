@@ -75,7 +75,7 @@ class Parts(NamedTuple):
 def parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
     """Script, module and data."""
     folder = tmp_path_factory.mktemp("parts")
-    (folder / "loop.wasm").write_bytes(live_module())
+    (folder / "loop.wasm").write_bytes(live_module()[module.MODULE].read_bytes())
     (folder / "data.json").write_text(json.dumps(page_data("fig4")))
     return Parts(live_script()[ENGINE], folder / "loop.wasm", folder / "data.json")
 
@@ -140,7 +140,7 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
     """With the same sine and its like in both, all rows are the same bit for bit."""
     with monkeypatch.context() as patch:
         patch.setattr(module, "_FLAGS", (*module._FLAGS, "-include", str(SAME_FUNCTIONS)))
-        [content] = module.compiled().values()
+        content = module.compiled()[module.MODULE]
     (tmp_path / "loop.wasm").write_bytes(content)
     said = parts._replace(module=tmp_path / "loop.wasm").node("rows.mjs", str(tmp_path))
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
@@ -316,6 +316,8 @@ def test_table_is_accepted_by_verify(preset, events, changes, opened: Browser, t
 def test_page_stands_by_itself_and_is_light(page: Path):
     text = page.read_text(encoding="utf-8")
     assert len(text.encode()) < 700_000
+    # What is in the page of others is named with its licence.
+    assert all(name in text for name in ("uplot 1.", "ogl 1.", "wasi-libc", "musl as a whole"))
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
     assert re.search(r'Content-Security-Policy" content="default-src .none.;', text)
 

@@ -359,8 +359,13 @@ export class Page {
       await navigator.clipboard.writeText(text);
       this.#say(done);
     } catch {
-      // Pages from a disk may not be let write to the clipboard.
-      prompt("Copy this:", text);
+      // Pages from a disk may not be let write to the clipboard, but may copy what is selected.
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      this.#say(document.execCommand("copy") ? done : "This browser does not let the page copy");
+      area.remove();
     }
   }
 
