@@ -48,6 +48,8 @@ export class Page {
   #loops: readonly LoopData[] = [];
   /** The last runs that could be made, in the order of the loops. */
   #results: (Result | undefined)[] = [];
+  /** The results before them, which nothing shows. */
+  #spare: readonly (Result | undefined)[] = [];
   /** Why what is set cannot be run; empty: it has been run. */
   #refusal = "";
   #asked = false;
@@ -205,7 +207,9 @@ export class Page {
   run(): void {
     this.#showSettings();
     try {
-      this.#results = this.#runs(this.#settings);
+      const shown = this.#results;
+      this.#results = this.#runs(this.#settings, this.#spare);
+      this.#spare = shown;
       this.#refusal = "";
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
@@ -225,12 +229,12 @@ export class Page {
     this.#draw();
   }
 
-  #runs(settings: Settings): (Result | undefined)[] {
+  #runs(settings: Settings, spare: readonly (Result | undefined)[] = []): (Result | undefined)[] {
     const { values, stopTime, step, hidden } = settings;
-    return this.#loops.map((loop) => {
+    return this.#loops.map((loop, k) => {
       if (hidden.includes(loop.label)) return undefined;
       const events = eventsOf(settings, loop);
-      return this.#engine.run(loop, values, { stopTime, step, events });
+      return this.#engine.run(loop, values, { stopTime, step, events, spare: spare[k] });
     });
   }
 

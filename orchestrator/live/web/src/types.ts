@@ -189,6 +189,8 @@ export interface Options {
   /** [s] */
   readonly step: number;
   readonly events?: readonly EventData[];
+  /** A result that nothing shows any more: the run takes its memory. */
+  readonly spare?: Result | undefined;
 }
 
 /** Runs loops. `Engine.load(bytes, data)` of engine.ts makes one. */
