@@ -1,7 +1,7 @@
 // A run of a loop, from the first exchange of values to the last step.
 import { Ended, Events, parted, type Run } from "./events";
 import { Experiment, Refusal } from "./experiment";
-import { ComponentFailed, Instance, Machine } from "./fmi";
+import { ComponentFailed, Instance, Machine, REAL } from "./fmi";
 import { Gathering, Overrides, Row } from "./row";
 import { general } from "./text";
 import type {
@@ -22,8 +22,6 @@ const MOST_ROUNDS = 1000;
 
 /** Messages that are kept: an FMU may have something to say in every step. */
 const MOST_MESSAGES = 100;
-
-const REAL = 8;
 
 /** FMI's status of a value that was not taken. */
 const DISCARD = 2;
