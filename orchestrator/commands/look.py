@@ -187,7 +187,7 @@ def _live(options: argparse.Namespace) -> int:
     out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
-    text = live_page(options.scenario)
+    text = live_page(options.scenario, say)
     with _written([out], options.force) as folder:
         (folder / out.name).write_text(text, encoding="utf-8")
     return OK

@@ -12,13 +12,15 @@ import re
 import shutil
 import subprocess
 from base64 import b64encode
+from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
-from orchestrator.live.module import live_module
+from orchestrator.live.module import LICENCES as C_LIBRARY
+from orchestrator.live.module import MODULE, live_module
 from orchestrator.live.presets import page_data
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
@@ -39,17 +41,18 @@ _PAGE = WEB / "page.html"
 _NAMES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
 
 #: The line in which npm or esbuild says what is wrong, not only that something is.
-_COMPLAINT = re.compile(r"npm error (?!code)\S|.*\bERROR\b")
+_COMPLAINT = re.compile(r"npm error (?!code|syscall|errno)\S|.*\bERROR\b")
 
 #: How long npm may take [s].
 _LIMIT = 600.0
 
 
-def live_page(opened: str) -> str:
+def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> str:
     """The page.
 
     Args:
         opened: the scenario that it shows first.
+        hear: called with a line before a part is made, which takes long.
 
     Raises:
         InputError: there is no such scenario, the page cannot run it, or what makes its parts is
@@ -57,16 +60,18 @@ def live_page(opened: str) -> str:
 
     """
     data = page_data(opened)
-    parts = {name: path.read_text(encoding="utf-8") for name, path in live_script().items()}
+    parts = {name: path.read_text(encoding="utf-8") for name, path in live_script(hear).items()}
+    module = live_module(hear)
+    library = module[C_LIBRARY].read_text(encoding="utf-8")
     titles = {one["name"]: one["title"] for one in data["presets"]}
     fields = {
         "title": html.escape(titles[data["opened"]]),
         "style": parts[STYLE],
         # What ends the script's element must not occur in it.
         "script": parts[SCRIPT].replace("</script", "<\\/script"),
-        "licences": html.escape("\n\n".join((licences(NATIVE), parts[LICENCES]))),
+        "licences": html.escape("\n\n".join((licences(NATIVE), library, parts[LICENCES]))),
         "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
-        "module": packed(live_module()),
+        "module": packed(module[MODULE].read_bytes()),
     }
     before, *rest = _PAGE.read_text(encoding="utf-8").split("{{")
     return before + "".join(
@@ -79,15 +84,18 @@ def packed(content: bytes) -> str:
     return b64encode(gzip.compress(content, mtime=0)).decode()
 
 
-def live_script() -> dict[str, Path]:
+def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Path]:
     """The files by their names, bundled if that has not been done yet.
+
+    Args:
+        hear: called with a line before they are bundled.
 
     Raises:
         InputError: they cannot be bundled.
 
     """
     try:
-        return made_once(CATEGORY, key_of(), bundled)
+        return made_once(CATEGORY, key_of(), lambda: bundled(hear))
     except OSError as error:
         raise InputError(f"the live page has no script: {reason(error)}") from error
 
@@ -107,8 +115,11 @@ def _sources() -> list[Path]:
     return [path for paths in below for path in paths if path.is_file()]
 
 
-def bundled() -> dict[str, bytes]:
+def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
     """Bundle them.
+
+    Args:
+        hear: called with a line before.
 
     Raises:
         InputError: there is no npm, or it does not get what it needs.
@@ -121,6 +132,7 @@ def bundled() -> dict[str, bytes]:
             "the live page needs Node.js 20 or later and its npm, which bundle its script: "
             "https://nodejs.org"
         )
+    hear("bundling the page's script with npm, once: this may take a minute")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary, WEB.name)
         for path in _sources():
@@ -142,10 +154,6 @@ def _run(folder: Path, *command: str) -> None:
     except subprocess.TimeoutExpired:
         raise InputError(f"{command[1]} has not ended after {_LIMIT:g} s") from None
     if process.returncode != 0:
-        lines = [
-            line
-            for line in process.stderr.splitlines()
-            if line.startswith("npm error ") and "code" not in line
-        ]
+        lines = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
         said = (lines or [last_line(process.stderr)])[0]
         raise InputError(f"the live page has no script: {' '.join(command[:2])}: {said}")

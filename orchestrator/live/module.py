@@ -8,14 +8,14 @@ from __future__ import annotations
 
 import sys
 import zipfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from fmus.compilers import LIMIT_OF_ZIG, run_compiler
-from fmus.discovery import components
+from fmus.discovery import components, package_folder
 from fmus.kinds import NATIVE
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
@@ -25,7 +25,12 @@ from orchestrator.runs.bundle import current_fmus
 #: What the module is among what is kept.
 CATEGORY = "live-module"
 
-_FILE = "loop.wasm"
+#: What is made: the module, and the licences of the C library in it.
+MODULE, LICENCES = FILES = "loop.wasm", "licences.txt"
+
+#: Of that library: zig's for WebAssembly is wasi-libc, most of which is musl.
+_NOTICES = ("wasi/LICENSE", "wasi/LICENSE-MIT", "musl/COPYRIGHT")
+
 _HOST = Path(__file__).with_name("host.c")
 
 #: As the native FMUs are compiled, but for another machine.
@@ -45,23 +50,25 @@ _FUNCTIONS = (
 _OTHERS = ("malloc", "free", "host_callbacks")
 
 
-def live_module() -> bytes:
-    """The module, compiled if that has not been done yet.
+def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Path]:
+    """The files by their names, compiled if that has not been done yet.
+
+    Args:
+        hear: called with a line before it is compiled.
 
     Raises:
         InputError: it cannot be compiled.
 
     """
     try:
-        [place] = made_once(CATEGORY, key_of(), compiled).values()
+        return made_once(CATEGORY, key_of(), lambda: compiled(hear))
     except OSError as error:
         raise InputError(f"the live page has no module: {reason(error)}") from error
-    return place.read_bytes()
 
 
 def key_of() -> str:
     """Of the sources and the flags."""
-    digest = sha256("\0".join((*_TARGET, *_FLAGS, *_LINKED, *_exports())).encode())
+    digest = sha256("\0".join((*FILES, *_TARGET, *_FLAGS, *_LINKED, *_exports())).encode())
     digest.update(_HOST.read_bytes())
     for name, files in _sources().items():
         for file, content in files.items():
@@ -70,8 +77,11 @@ def key_of() -> str:
     return digest.hexdigest()[:16]
 
 
-def compiled() -> dict[str, bytes]:
+def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
     """Compile the module.
+
+    Args:
+        hear: called with a line before.
 
     Raises:
         InputError: there is no ziglang.
@@ -83,6 +93,7 @@ def compiled() -> dict[str, bytes]:
             "the live page needs ziglang, which compiles C to WebAssembly: "
             "pip install 'auv-fmu[native]'"
         )
+    hear("compiling the FMUs to WebAssembly, once: this may take some minutes")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary)
         objects = []
@@ -95,8 +106,14 @@ def compiled() -> dict[str, bytes]:
             objects.append(f"{name}.o")
         _zig(folder, *_FLAGS, "-c", str(_HOST), "-o", "host.o")
         exports = [f"-Wl,--export={name}" for name in _exports()]
-        _zig(folder, *_LINKED, *exports, "host.o", *objects, "-o", _FILE)
-        return {_FILE: (folder / _FILE).read_bytes()}
+        _zig(folder, *_LINKED, *exports, "host.o", *objects, "-o", MODULE)
+        return {MODULE: (folder / MODULE).read_bytes(), LICENCES: _licences().encode()}
+
+
+def _licences() -> str:
+    folder = package_folder("ziglang") / "lib" / "libc"
+    texts = [(folder / name).read_text(encoding="utf-8").strip() for name in _NOTICES]
+    return "\n\n".join(("C library of the WebAssembly module: wasi-libc and musl", *texts))
 
 
 def _zig(folder: Path, *arguments: str) -> None:

@@ -34,7 +34,7 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
@@ -50,6 +50,9 @@ _OTHERS = {"ObserverController": "path-pd", "PdController": "path"}
 
 #: Where a scenario names no label.
 _LABELS = {"ObserverController": "proposed", "PdController": "PD"}
+
+#: The page keeps all rows of a run in its memory, and refuses more steps: `web/src/experiment.ts`.
+_MOST_STEPS = 200_000
 
 Plain = dict[str, Any]
 
@@ -88,6 +91,12 @@ def preset(name: str) -> Plain:
     """
     both = runs_of(name)
     scenario, experiment = both[0].scenario, both[0].plan.experiment
+    loops = [_loop(one, scenario) for one in both]
+    loops[0]["scenario"] = name
+    if len({loop["label"] for loop in loops}) < len(loops):
+        # The page tells loops apart by their labels.
+        for one, loop in zip(both, loops, strict=True):
+            loop["label"] = one.scenario.name
     return {
         "name": scenario.name,
         "title": scenario.title or scenario.name,
@@ -97,10 +106,7 @@ def preset(name: str) -> Plain:
         "step": experiment.step,
         "events": scenario.name if scenario.events else "",
         "comparing": bool(read_scenario(name).compare),
-        "loops": [
-            _loop(one, scenario.name) | ({"scenario": name} if one is both[0] else {})
-            for one in both
-        ],
+        "loops": loops,
     }
 
 
@@ -150,13 +156,15 @@ def _check(prepared: Prepared) -> None:
         "changes of values on their way": any(c.transformation for c in system.connections),
         "a table of inputs": prepared.input_table is not None,
         "a start time": experiment.start_time != 0.0,
+        f"a system without the {STANDARD.vehicle}": STANDARD.vehicle not in system.components,
+        f"more than {_MOST_STEPS:,} steps": experiment.rows - 1 > _MOST_STEPS,
     }
     for what, is_there in lacking.items():
         if is_there:
             raise InputError(f"{prepared.scenario.name}: the live page cannot run {what}")
 
 
-def _loop(prepared: Prepared, owner: str) -> Plain:
+def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
     system, order = plan.system, plan.experiment.order
     sequence = stages(system, order)
@@ -245,7 +253,7 @@ def bundle() -> Mapping[str, Component]:
     return {name: read_component(name, folder / f"{name}.fmu") for name in components()}
 
 
-def _events(prepared: Prepared, owner: str) -> dict[str, list[Plain]]:
+def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
     """All events that can happen to a system, by the scenario that has them.
 
     Args:
@@ -254,17 +262,27 @@ def _events(prepared: Prepared, owner: str) -> dict[str, list[Plain]]:
 
     """
     system = replace(prepared.system, step=prepared.experiment.step)
-    tables = {name: read_scenario(name).events for name in names()}
-    tables[owner] = prepared.scenario.events
+    tables = {name: [*enumerate(read_scenario(name).events)] for name in names()}
+    # A comparison lacks some of the scenario's events, or has its own, which the page cannot edit.
+    places = {id(table): number for number, table in enumerate(owner.events)}
+    tables[owner.name] = [
+        (places.get(id(table), len(places) + number), table)
+        for number, table in enumerate(prepared.scenario.events)
+    ]
     return {
-        name: [_event(one) for one in read_events(name, shared_events(some, system), system)]
+        name: [
+            _event(number, event)
+            for number, table in some
+            for event in read_events(name, shared_events([table], system), system)
+        ]
         for name, some in tables.items()
         if some
     }
 
 
-def _event(event: Event) -> Plain:
+def _event(number: int, event: Event) -> Plain:
     found = {
+        "number": number,
         "text": event.text,
         "label": event.label,
         "at": event.at,

@@ -1,9 +1,9 @@
 // What scripts may ask of the page: `auvfmu.set({"controller.k_d": 30})`, `auvfmu.csv()`.
 
-import { csv } from "./csv";
 import { Refusal } from "./experiment";
 import { fromHash, toHash } from "./link";
 import { eventsOf, presetOf, type Settings, untouched } from "./settings";
+import { csv } from "./text";
 import type { Data, Engine, Result, Value } from "./types";
 
 export interface Api {

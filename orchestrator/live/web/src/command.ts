@@ -10,21 +10,21 @@ const END = "END";
 export function commandLine(settings: Settings, preset: Preset, loop: LoopData): string {
   if (loop.scenario === undefined) return ownScenario(settings, preset, loop);
   const names = new Set(loop.parameters.map(({ name }) => name));
-  const words = ["auv-fmu", "run", loop.scenario];
+  const words = ["auv-fmu", "run", quoted(loop.scenario)];
   for (const [name, value] of Object.entries(settings.values)) {
     if (names.has(name)) words.push("--set", quoted(`${name}=${value}`));
   }
   if (settings.stopTime !== preset.stopTime) words.push("--stop-time", String(settings.stopTime));
   if (settings.step !== preset.step) words.push("--step", String(settings.step));
   if (!hasOtherEvents(settings, preset)) return words.join(" ");
-  const file = `${preset.name}-events.toml`;
+  const file = fileName(`${preset.name}-events`);
   const events = toToml(eventsOf(settings, loop));
   return written(file, events || "events = []\n", [...words, "--events", file]);
 }
 
 /** The same for a loop that is only there to be compared: a scenario file of its own. */
 function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string {
-  const file = `${preset.name}-${loop.label}.toml`;
+  const file = fileName(`${preset.name}-${loop.label}`);
   const components = Object.entries(loop.components).map(
     ([name, type]) => `${name} = ${literal(type)}\n`,
   );
@@ -50,9 +50,14 @@ function written(file: string, text: string, command: readonly string[]): string
   return `cat > ${file} <<'${END}'\n${text}${END}\n${command.join(" ")}`;
 }
 
+/** A file of the current folder, whose name needs no quotes. */
+function fileName(stem: string): string {
+  return `${stem.replaceAll(/[^\w.-]+/g, "-").replace(/^-/, "")}.toml`;
+}
+
 /** A word of a shell's command line. */
 function quoted(word: string): string {
-  return /^[\w.=+-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
+  return /^[\w.=+/-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
 /** Events as a scenario file has them. */

@@ -1,8 +1,9 @@
 // All that can be set: sliders under headings, and every parameter in a list.
 
-import { type Changed, Field, printedUnit, SliderRow } from "./field";
-import { GROUPS } from "./rows";
+import { type Changed, Field, SliderRow } from "./field";
 import { parametersOf, type Settings } from "./settings";
+import { GROUPS } from "./sliders";
+import { printedUnit } from "./text";
 import type { Parameter, Preset, Value } from "./types";
 
 export class Controls {

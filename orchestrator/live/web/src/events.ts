@@ -251,7 +251,7 @@ export class Events {
     const progress = this.progress[event];
     progress.listed += 1;
     if (progress.listed > MOST_LISTED) return;
-    const rest = progress.listed === MOST_LISTED ? "; when it happens again is not listed" : "";
+    const rest = progress.listed === MOST_LISTED ? "; later occurrences are not listed" : "";
     this.happened.push({ time: run.experiment.time(run.made), text: text + rest, label, event });
   }
 

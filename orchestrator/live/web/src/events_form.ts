@@ -1,6 +1,7 @@
 // Which events happen, when and for how long.
 
-import type { Edit, Settings } from "./settings";
+import { isDuration, isTime } from "./link";
+import { canEnd, type Edit, eventOf, type Settings } from "./settings";
 import type { EventData, Preset } from "./types";
 
 /** What a user does here: take another set of events, or change one of them. */
@@ -35,11 +36,11 @@ export class EventsForm {
           .map((name) => new Option(name, name)),
       );
       this.#select.value = settings.events;
-      this.#list.replaceChildren(...events.map((event, number) => this.#row(event, number)));
+      this.#list.replaceChildren(...events.map((event) => this.#row(event)));
     }
     for (const input of this.#list.querySelectorAll("input")) {
       const number = Number(input.dataset.number);
-      const { at, lasts } = events[number];
+      const { at, lasts } = eventOf(preset, settings.events, number) ?? {};
       const edit = settings.edits[number] ?? {};
       const isTime = input.dataset.kind === "at";
       const own = isTime ? at : lasts;
@@ -49,7 +50,8 @@ export class EventsForm {
     }
   }
 
-  #row(event: EventData, number: number): HTMLElement {
+  #row(event: EventData): HTMLElement {
+    const { number } = event;
     const item = document.createElement("li");
     const name = document.createElement("span");
     name.className = "label";
@@ -63,10 +65,7 @@ export class EventsForm {
     } else {
       item.append(this.#field("at", number, event.label));
     }
-    // A stop and a reset have no duration.
-    if (!["reset", "stop", "release"].includes(event.action.kind)) {
-      item.append(this.#field("for", number, event.label));
-    }
+    if (canEnd(event)) item.append(this.#field("for", number, event.label));
     return item;
   }
 
@@ -86,8 +85,7 @@ export class EventsForm {
     input.addEventListener("change", () => {
       const text = input.value.trim();
       const value = text === "" ? Number.NaN : Number(text);
-      // As of scenario files: no time before the start, and no duration of nothing.
-      const isGood = kind === "at" ? value >= 0 && value < Infinity : value > 0 && value < Infinity;
+      const isGood = kind === "at" ? isTime(value) : isDuration(value);
       const isForGood = kind === "for" && text === "";
       input.setAttribute("aria-invalid", String(!isGood && !isForGood));
       if (isForGood) this.#wishes.edit(number, { lasts: null });

@@ -1,17 +1,11 @@
 // A number, choice or switch for one parameter, and a row of them with a slider.
 
 import { parsed } from "./link";
-import type { Row } from "./rows";
-import { POSITIONS, positionOf, valueAt } from "./scales";
+import { POSITIONS, positionOf, type Slider, valueAt } from "./sliders";
+import { printedUnit } from "./text";
 import type { Parameter, Value } from "./types";
 
 export type Changed = (values: Record<string, Value>) => void;
-
-/** A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s². */
-export function printedUnit(unit: string): string {
-  const raised = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-  return unit.replaceAll(".", "·").replace(/(?<=[A-Za-z])\d/g, (digit) => raised[Number(digit)]);
-}
 
 /** What a parameter means, where it may lie and what it is without a change. */
 export function explained(parameter: Parameter): string {
@@ -102,12 +96,12 @@ export class Field {
 export class SliderRow {
   readonly root: HTMLElement;
   readonly fields: readonly Field[];
-  readonly #row: Row;
+  readonly #row: Slider;
   readonly #slider: HTMLInputElement;
   readonly #reset: HTMLButtonElement;
   readonly #error: HTMLElement;
 
-  constructor(row: Row, parameters: readonly Parameter[], only: string, changed: Changed) {
+  constructor(row: Slider, parameters: readonly Parameter[], only: string, changed: Changed) {
     this.#row = row;
     this.root = document.createElement("div");
     this.root.className = "row";
@@ -115,7 +109,14 @@ export class SliderRow {
     const spoken = parameters.length > 1 ? shared(row.names) : parameter.name;
     const label = document.createElement("span");
     label.className = "label";
-    label.innerHTML = `${row.label}${only ? ` <span class="only">${only}</span>` : ""}`;
+    label.innerHTML = row.label;
+    if (only) {
+      // A scenario may name a controller as it likes: that is no HTML.
+      const note = document.createElement("span");
+      note.className = "only";
+      note.textContent = only;
+      label.append(" ", note);
+    }
     label.title = explained(parameter);
     const unit = document.createElement("span");
     unit.className = "unit";
@@ -183,7 +184,7 @@ export class SliderRow {
 }
 
 /** Positions from one press of an arrow key to the next. */
-function stepOf({ scale }: Row): number {
+function stepOf({ scale }: Slider): number {
   return scale.whole ? POSITIONS / (scale.high - scale.low) : 10;
 }
 

@@ -6,7 +6,8 @@ const WARNING = 1;
 const DISCARD = 2;
 
 const CO_SIMULATION = 1;
-const REAL = 8;
+/** Bytes of a double. */
+export const REAL = 8;
 const INT = 4;
 
 /** Types of ports, in the order of their columns. */

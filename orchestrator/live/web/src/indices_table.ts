@@ -1,5 +1,6 @@
 // The indices of section 4.2 as a table, with a row for each controller.
 
+import { printedUnit } from "./text";
 import type { IndexData, Metrics } from "./types";
 
 /** A controller in the table. */
@@ -8,11 +9,6 @@ export interface Measured {
   /** Its place among the controllers, which gives it its colour. */
   readonly place: number;
   readonly metrics: Metrics;
-}
-
-/** FMI writes N.m.s^1/2; people read N·m·√s. */
-function printed(unit: string): string {
-  return unit.replace("s^1/2", "√s").replaceAll(".", "·");
 }
 
 /** Four digits, as the terminal has them, and no zeros at the end. */
@@ -59,7 +55,7 @@ export class IndicesTable {
   #build(there: readonly IndexData[], measured: readonly Measured[]): void {
     this.#cells = [];
     const rows = there.flatMap(({ label, units, meaning }) => {
-      const found = [...new Set(Object.values(units).filter(Boolean))].map(printed).join(", ");
+      const found = [...new Set(Object.values(units).filter(Boolean))].map(printedUnit).join(", ");
       const heading = document.createElement("tr");
       heading.className = "index";
       heading.title = meaning;

@@ -1,7 +1,15 @@
 // Settings in the address of the page: after `#`, the preset and what differs from it.
 
-import { type Edit, parametersOf, presetOf, type Settings, untouched } from "./settings";
-import type { Data, Parameter, Value } from "./types";
+import {
+  canEnd,
+  type Edit,
+  eventOf,
+  parametersOf,
+  presetOf,
+  type Settings,
+  untouched,
+} from "./settings";
+import type { Data, EventData, Parameter, Value } from "./types";
 
 const PRESET = "preset";
 const STOP_TIME = "stop_time";
@@ -41,31 +49,54 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
   const unknown = wanted === preset.name ? [] : [`${PRESET}=${wanted}`];
   const values: Record<string, Value> = {};
   const edits: Record<number, Edit> = {};
+  const edited: [string, string][] = [];
   const hidden: string[] = [];
   let { stopTime, step, events } = untouched(preset);
   for (const [key, text] of fields) {
     const parameter = parameters.get(key);
-    const edit = EDIT.exec(key);
+    const edit = EDIT.test(key);
     const number = text.trim() === "" ? Number.NaN : Number(text);
     const value = parameter && parsed(parameter, text);
     if (key === PRESET) continue;
     if (parameter && value !== undefined) values[key] = value;
     else if (key === STOP_TIME && Number.isFinite(number)) stopTime = number;
     else if (key === STEP && Number.isFinite(number)) step = number;
-    else if (key === EVENTS && (text === "" || preset.loops[0].events[text])) events = text;
-    else if (edit?.[2] === "at" && Number.isFinite(number)) put(edits, edit[1], { at: number });
-    else if (edit?.[2] === "for" && text === FOR_GOOD) put(edits, edit[1], { lasts: null });
-    else if (edit?.[2] === "for" && Number.isFinite(number)) put(edits, edit[1], { lasts: number });
+    else if (key === EVENTS && (text === "" || Object.hasOwn(preset.loops[0].events, text)))
+      events = text;
+    else if (edit) edited.push([key, text]);
     else if (key === HIDDEN && preset.loops.some(({ label }) => label === text)) hidden.push(text);
+    else unknown.push(`${key}=${text}`);
+  }
+  // Which events there are is known only now.
+  for (const [key, text] of edited) {
+    const [, counted, kind] = EDIT.exec(key) ?? [];
+    const number = Number(counted) - 1;
+    const event = eventOf(preset, events, number);
+    const edit = event && editOf(event, kind, text);
+    if (edit) edits[number] = { ...edits[number], ...edit };
     else unknown.push(`${key}=${text}`);
   }
   const settings = { preset: preset.name, values, stopTime, step, events, edits, hidden };
   return { settings, unknown };
 }
 
-function put(edits: Record<number, Edit>, counted: string, edit: Edit): void {
-  const number = Number(counted) - 1;
-  edits[number] = { ...edits[number], ...edit };
+/** A change of an event's time or duration; undefined: a scenario file could not have it. */
+function editOf(event: EventData, kind: string, text: string): Edit | undefined {
+  const time = text.trim() === "" ? Number.NaN : Number(text);
+  if (kind === "at") return isTime(time) && event.at !== undefined ? { at: time } : undefined;
+  if (!canEnd(event)) return undefined;
+  if (text === FOR_GOOD) return { lasts: null };
+  return isDuration(time) ? { lasts: time } : undefined;
+}
+
+/** Whether an event can come then [s]: not before the start. */
+export function isTime(time: number): boolean {
+  return time >= 0 && time < Infinity;
+}
+
+/** Whether an event can last so long [s]. */
+export function isDuration(time: number): boolean {
+  return time > 0 && time < Infinity;
 }
 
 /** A text in the type of a parameter; undefined: it is not of this type. */

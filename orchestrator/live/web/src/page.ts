@@ -352,7 +352,7 @@ export class Page {
     if (!this.#isRun()) return;
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([this.csv()], { type: "text/csv" }));
-    link.download = `${this.#meant().scenario ?? this.#preset.name}.csv`;
+    link.download = `${this.#preset.name}.csv`;
     link.click();
     URL.revokeObjectURL(link.href);
     this.#say(`Saved ${link.download}`);
@@ -363,8 +363,13 @@ export class Page {
       await navigator.clipboard.writeText(text);
       this.#say(done);
     } catch {
-      // Pages from a disk may not be let write to the clipboard.
-      prompt("Copy this:", text);
+      // Pages from a disk may not be let write to the clipboard, but may copy what is selected.
+      const area = document.createElement("textarea");
+      area.value = text;
+      document.body.append(area);
+      area.select();
+      this.#say(document.execCommand("copy") ? done : "This browser does not let the page copy");
+      area.remove();
     }
   }
 

@@ -1,12 +1,10 @@
 // The row of all values, what inputs take from outputs, and what events do to that.
-import { Instance, type Machine } from "./fmi";
+import { Instance, type Machine, REAL } from "./fmi";
 import type { Fmu, LoopData, Stage, Value } from "./types";
 
 /** Times one, plus minus zero: every number stays what it is, minus zero, too. */
 const FACTOR = 1;
 const OFFSET = -0;
-
-const REAL = 8;
 
 /** A value as it stands in the row. */
 export const numberOf = (value: Value): number => Number(value);

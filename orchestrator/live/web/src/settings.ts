@@ -56,9 +56,19 @@ export function withValues(settings: Settings, preset: Preset, changed: Values):
   return { ...settings, values };
 }
 
+/** An event of a scenario by its number, as the preset's own loop has it. */
+export function eventOf(preset: Preset, events: string, number: number): EventData | undefined {
+  return preset.loops[0].events[events]?.find((event) => event.number === number);
+}
+
+/** Whether an event can end: a reset, a stop and a release have no duration. */
+export function canEnd({ action }: EventData): boolean {
+  return !["reset", "stop", "release"].includes(action.kind);
+}
+
 /** Settings with a change of an event; the event's own times are no change. */
 export function withEdit(settings: Settings, preset: Preset, number: number, edit: Edit): Settings {
-  const event = preset.loops[0].events[settings.events]?.[number];
+  const event = eventOf(preset, settings.events, number);
   if (!event) return settings;
   const kept: { at?: number; lasts?: number | null } = { ...settings.edits[number], ...edit };
   if (kept.at === event.at) delete kept.at;
@@ -71,8 +81,8 @@ export function withEdit(settings: Settings, preset: Preset, number: number, edi
 /** The events of a loop, at the times that are set. */
 export function eventsOf(settings: Settings, loop: LoopData): readonly EventData[] {
   const events = loop.events[settings.events] ?? [];
-  return events.map((event, number) => {
-    const { at, lasts } = settings.edits[number] ?? {};
+  return events.map((event) => {
+    const { at, lasts } = settings.edits[event.number] ?? {};
     const edited = { ...event, ...(at === undefined ? {} : { at }) };
     if (lasts === null) {
       const { lasts: _, ...forGood } = edited;

@@ -1,7 +1,7 @@
 // A run of a loop, from the first exchange of values to the last step.
 import { Ended, Events, parted, type Run } from "./events";
 import { Experiment, Refusal } from "./experiment";
-import { ComponentFailed, Instance, Machine } from "./fmi";
+import { ComponentFailed, Instance, Machine, REAL } from "./fmi";
 import { Gathering, Overrides, Row } from "./row";
 import { general } from "./text";
 import type {
@@ -22,8 +22,6 @@ const MOST_ROUNDS = 1000;
 
 /** Messages that are kept: an FMU may have something to say in every step. */
 const MOST_MESSAGES = 100;
-
-const REAL = 8;
 
 /** FMI's status of a value that was not taken. */
 const DISCARD = 2;
@@ -112,7 +110,8 @@ class Simulation {
     const wanted = { Real: "number", Integer: "number", Boolean: "boolean", String: "string" }[
       type
     ];
-    const fits = typeof value === wanted && (type !== "Integer" || Number.isInteger(value));
+    // Integers have 32 bits: a larger one would become another without a word.
+    const fits = typeof value === wanted && (type !== "Integer" || (Number(value) | 0) === value);
     if (!fits) throw new Refusal(`${name} = ${value}: not a value of type ${type}`);
     this.parameters[name] = value;
     if (Object.is(value, parameter.default)) return;

@@ -1,6 +1,7 @@
-// Numbers in words, as `%g` writes them.
+// Numbers, units and runs as texts.
+import type { Result } from "./types";
 
-/** A number with so many digits at most, and no zeros at its end. */
+/** A number with so many digits at most, and no zeros at its end, as `%g` writes it. */
 export function general(value: number, digits = 6): string {
   if (!Number.isFinite(value)) return Number.isNaN(value) ? "nan" : value > 0 ? "inf" : "-inf";
   const [mantissa, exponent] = value.toExponential(digits - 1).split("e");
@@ -9,4 +10,29 @@ export function general(value: number, digits = 6): string {
   if (power >= -4 && power < digits) return trimmed(value.toFixed(digits - 1 - power));
   const sign = power < 0 ? "-" : "+";
   return `${trimmed(mantissa)}e${sign}${String(Math.abs(power)).padStart(2, "0")}`;
+}
+
+/** A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s², s^1/2 as √s. */
+export function printedUnit(unit: string): string {
+  const raised = "⁰¹²³⁴⁵⁶⁷⁸⁹";
+  return unit
+    .replaceAll("s^1/2", "√s")
+    .replaceAll(".", "·")
+    .replace(/(?<=[A-Za-z])\d/g, (digit) => raised[Number(digit)]);
+}
+
+/** The shortest text that reads back as the same number. */
+function written(value: number): string {
+  return Object.is(value, -0) ? "-0" : String(value);
+}
+
+/** A run as result.csv has it: the same columns, numbers that read back exactly. */
+export function csv(result: Result): string {
+  const width = 1 + result.columns.length;
+  const lines = [["time", ...result.columns].join(",")];
+  for (let k = 0; k < result.rows; k++) {
+    const row = result.table.subarray(k * width, (k + 1) * width);
+    lines.push(Array.from(row, written).join(","));
+  }
+  return `${lines.join("\n")}\n`;
 }

@@ -69,6 +69,8 @@ export interface Condition {
 
 /** Something that happens from outside, at a time or when a condition becomes true. */
 export interface EventData {
+  /** Its place among the scenario's events, from 0; not all of them can happen to every loop. */
+  readonly number: number;
   /** What happens, in words. */
   readonly text: string;
   /** Its name in figures. */

@@ -1,8 +1,88 @@
-// The vehicle as WebGL draws it.
+// The vehicle as WebGL draws it: a hull and four fins, of length 1, its nose in the origin.
 
 import { Geometry, Mesh, type OGLRenderingContext, Program } from "ogl";
-import { body } from "./body";
 import type { Colour } from "./lines";
+
+interface Body {
+  /** Body frame: x ahead, y to starboard, z down. */
+  positions: Float32Array;
+  normals: Float32Array;
+  /** 0: hull, 1: upper fin, which shows the roll, 2: other fins. */
+  parts: Float32Array;
+}
+
+/** Distance from the nose and radius of the rings of the hull. */
+const RINGS: readonly (readonly [number, number])[] = [
+  [0, 0],
+  [0.02, 0.04],
+  [0.08, 0.075],
+  [0.18, 0.09],
+  [0.7, 0.09],
+  [0.9, 0.05],
+  [1, 0.02],
+];
+
+const SIDES = 20;
+
+/** Corners of the upper fin: distance from the nose, and height above the axis. */
+const FIN: readonly (readonly [number, number])[] = [
+  [0.74, 0.05],
+  [0.84, 0.22],
+  [0.94, 0.22],
+  [0.94, 0.03],
+];
+
+/** Up, to starboard, down, to port: y and z. */
+const FINS: readonly (readonly [number, number])[] = [
+  [0, -1],
+  [1, 0],
+  [0, 1],
+  [-1, 0],
+];
+
+type Point = readonly [number, number, number];
+
+function body(): Body {
+  const positions: number[] = [];
+  const normals: number[] = [];
+  const parts: number[] = [];
+  const corner = (point: Point, normal: Point, part: number) => {
+    positions.push(...point);
+    normals.push(...normal);
+    parts.push(part);
+  };
+  const ringPoint = (ring: number, side: number): [Point, Point] => {
+    const [distance, radius] = RINGS[ring];
+    const [before, wider] = RINGS[Math.max(ring - 1, 0)];
+    const [after, narrower] = RINGS[Math.min(ring + 1, RINGS.length - 1)];
+    const angle = (2 * Math.PI * side) / SIDES;
+    const slope = (narrower - wider) / (after - before);
+    const size = Math.hypot(1, slope);
+    const [c, s] = [Math.cos(angle), Math.sin(angle)];
+    return [
+      [-distance, radius * c, radius * s],
+      [slope / size, c / size, s / size],
+    ];
+  };
+  for (let ring = 0; ring + 1 < RINGS.length; ring++) {
+    for (let side = 0; side < SIDES; side++) {
+      const a = ringPoint(ring, side);
+      const b = ringPoint(ring, side + 1);
+      const c = ringPoint(ring + 1, side);
+      const d = ringPoint(ring + 1, side + 1);
+      for (const [point, normal] of [a, b, c, b, d, c]) corner(point, normal, 0);
+    }
+  }
+  FINS.forEach(([y, z], i) => {
+    const points = FIN.map(([distance, height]): Point => [-distance, height * y, height * z]);
+    for (const k of [0, 1, 2, 0, 2, 3]) corner(points[k], [0, z, y], i === 0 ? 1 : 2);
+  });
+  return {
+    positions: new Float32Array(positions),
+    normals: new Float32Array(normals),
+    parts: new Float32Array(parts),
+  };
+}
 
 const VERTEX = /* glsl */ `
   precision highp float;

@@ -3,7 +3,7 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { load } from "./load.mjs";
 
-const { valueAt, positionOf, POSITIONS } = await load("scales");
+const { valueAt, positionOf, POSITIONS } = await load("sliders");
 const { boxOf, distanceFor, drawn, eyeAxes, rotation, ticks } = await load("space");
 
 const near = (found, wanted, tolerance = 1e-12) =>

@@ -36,6 +36,7 @@ const vehicle = [
 const events = {
   fault: [
     {
+      number: 0,
       text: "override plant.tau.r = 0",
       label: "no yaw moment",
       action: { kind: "alter", effect: "override", values: [["plant.tau.r", 0]] },
@@ -43,6 +44,7 @@ const events = {
       lasts: 10,
     },
     {
+      number: 1,
       text: "freeze controller.y.x",
       label: 'a "fix"',
       action: { kind: "freeze", targets: ["controller.y.x"] },

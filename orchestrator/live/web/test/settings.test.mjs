@@ -66,6 +66,38 @@ test("what a link says wrongly is named and left out", () => {
   assert.deepEqual(unknown, ["preset=no", "controller.eps_t=x", "plant.lost=1", "stop_time="]);
 });
 
+test("a link has no events, times and durations that a scenario file could not have", () => {
+  const wrong = [
+    "events=constructor",
+    "events.1.at=-1",
+    "events.1.at=",
+    "events.1.for=0",
+    "events.1.for=Infinity",
+    "events.2.at=3",
+    "events.3.for=2",
+    "events.99999999999999999999.at=3",
+  ];
+  const { settings, unknown } = fromHash(`#${wrong.join("&")}`, data);
+  assert.deepEqual(settings, start);
+  assert.deepEqual(unknown, wrong);
+});
+
+test("an edit belongs to the same event in a loop that lacks another", () => {
+  const [, second] = preset.loops[0].events.fault;
+  const other = { ...preset.loops[1], events: { fault: [second] } };
+  const changed = withEdit(start, preset, 0, { at: 40 });
+  assert.deepEqual(eventsOf(changed, other), [second]);
+  assert.equal(eventsOf(withEdit(start, preset, 1, { lasts: 3 }), other)[0].lasts, 3);
+});
+
+test("names of a user's scenario are one word of the shell", () => {
+  const [own, other] = preset.loops;
+  const file = { ...own, scenario: "/tmp/my $(runs)/it's.toml" };
+  assert.equal(commandLine(start, preset, file), "auv-fmu run '/tmp/my $(runs)/it'\\''s.toml'");
+  const text = commandLine(start, preset, { ...other, label: "../my $(PD)" });
+  assert.equal(text.split("\n")[0], "cat > fault-..-my-PD-.toml <<'END'");
+});
+
 test("an empty link is the preset that is opened", () => {
   assert.deepEqual(fromHash("", data), { settings: start, unknown: [] });
 });

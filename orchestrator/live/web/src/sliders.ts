@@ -1,8 +1,18 @@
-// Which parameters have sliders, under which headings, and between which values.
+// Which parameters have sliders, under which headings, and how positions stand for values.
 
-import type { Scale } from "./scales";
+/** Positions of a slider, from 0. */
+export const POSITIONS = 1000;
 
-export interface Row {
+/** A range of values, evenly spaced, or by factors; `zero`: its first position is zero. */
+export interface Scale {
+  readonly low: number;
+  readonly high: number;
+  readonly log?: boolean;
+  readonly zero?: boolean;
+  readonly whole?: boolean;
+}
+
+export interface Slider {
   /** HTML. */
   readonly label: string;
   /** What the slider sets together; each also has a field. */
@@ -15,21 +25,21 @@ export interface Row {
 export interface Group {
   readonly title: string;
   readonly open?: boolean;
-  readonly rows: readonly Row[];
+  readonly rows: readonly Slider[];
 }
 
 const by = (low: number, high: number): Scale => ({ low, high, log: true });
 const from = (low: number, high: number): Scale => ({ low, high });
 
-function row(label: string, name: string, scale: Scale): Row {
+function row(label: string, name: string, scale: Scale): Slider {
   return { label, names: [name], scale };
 }
 
-function diagonal(label: string, name: string): Row {
+function diagonal(label: string, name: string): Slider {
   return { label, names: [1, 2, 3].map((k) => `controller.${name}[${k}]`), scale: by(0.1, 1000) };
 }
 
-function limit(member: string): Row {
+function limit(member: string): Slider {
   return {
     label: `&tau;<sub>${member}</sub>`,
     names: [`plant.tau_min.${member}`, `plant.tau_max.${member}`],
@@ -40,7 +50,7 @@ function limit(member: string): Row {
 
 const EULER = { theta: "&theta;", psi: "&psi;" };
 
-const posture = (component: string, low: number, high: number): Row[] => [
+const posture = (component: string, low: number, high: number): Slider[] => [
   ...["x", "y", "z"].map((axis) =>
     row(`<i>${axis}</i>`, `${component}.eta0.${axis}`, from(low, high)),
   ),
@@ -53,7 +63,7 @@ const posture = (component: string, low: number, high: number): Row[] => [
   ),
 ];
 
-const members = (letter: string, name: string, names: string, scale: Scale): Row[] =>
+const members = (letter: string, name: string, names: string, scale: Scale): Slider[] =>
   [...names].map((member) => row(`${letter}<sub>${member}</sub>`, `${name}.${member}`, scale));
 
 export const GROUPS: readonly Group[] = [
@@ -110,3 +120,24 @@ export const GROUPS: readonly Group[] = [
     ],
   },
 ];
+
+/** The value at a position, with no more digits than the position tells apart. */
+export function valueAt(scale: Scale, position: number): number {
+  const { low, high, log, zero, whole } = scale;
+  if (zero && position <= 0) return 0;
+  const share = Math.min(1, Math.max(0, position / POSITIONS));
+  if (log) return Number((low * (high / low) ** share).toPrecision(3));
+  const value = low + (high - low) * share;
+  if (whole) return Math.round(value);
+  const step = 10 ** Math.floor(Math.log10((high - low) / 200));
+  return Number((Math.round(value / step) * step).toPrecision(12));
+}
+
+export function positionOf(scale: Scale, value: number): number {
+  const { low, high, log, zero } = scale;
+  if (zero && value <= 0) return 0;
+  const share = log
+    ? Math.log(Math.max(value, low) / low) / Math.log(high / low)
+    : (value - low) / (high - low);
+  return Math.round(POSITIONS * Math.min(1, Math.max(0, share)));
+}
