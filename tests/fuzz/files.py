@@ -42,7 +42,7 @@ from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import _process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Exchange
+from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.table import Table
@@ -180,7 +180,7 @@ def _tell(observer: Observer, run: Table) -> None:
 
 
 def _replay(
-    runs: Mapping[str, Table], plan: Plan, observers: Sequence[Observer], _: Exchange
+    runs: Mapping[str, Table], plan: Plan, observers: Sequence[Observer], *_: object
 ) -> None:
     """What `verify` meets instead of a new run."""
     experiment = plan.experiment
