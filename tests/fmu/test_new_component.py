@@ -31,7 +31,10 @@ TESTS = (
     "tests/fmu/test_built_fmu.py",
     "tests/unit/fmus/native/test_translator.py",
 )
-READ = ("tests/support", "tests/fuzz", "docs/reference/fmi-answers.md", "pyproject.toml", *TESTS)
+READ = (
+    "tests/support", "tests/fuzz", "docs/reference/fmi-answers.md", "pyproject.toml",
+    "CITATION.cff", *TESTS,
+)  # fmt: skip
 
 _CONFTEST = """\
 from pathlib import Path
@@ -46,6 +49,11 @@ settings.load_profile("patient")
 @pytest.fixture
 def dist():
     return Path("dist/python").absolute()
+
+
+@pytest.fixture
+def native():
+    return Path("dist/native").absolute()
 """
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")

@@ -19,7 +19,7 @@ from fmus.compilers import FLAGS, machines_compiler
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.live import module, presets
-from orchestrator.live.assembly import ENGINE, WEB, live_page, live_script
+from orchestrator.live.assembly import ENGINE, live_page, live_script
 from orchestrator.live.module import live_module
 from orchestrator.live.presets import page_data, preset, runs_of
 from orchestrator.master.observers.table import Table
@@ -27,6 +27,9 @@ from orchestrator.runs import bundle
 from orchestrator.runs.scenario import names
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
+
+#: An installed package has no tests.
+SCRIPTS = Path(__file__).parents[2] / "orchestrator" / "live" / "web" / "test"
 
 NODE = shutil.which("node") and shutil.which("npm")
 
@@ -65,7 +68,7 @@ class Parts(NamedTuple):
 
     def node(self, script: str, *arguments: str, given: str = "") -> Any:
         """What a script of the tests says, that takes them first."""
-        command = ["node", str(WEB / "test" / script), *map(str, self), *arguments]
+        command = ["node", str(SCRIPTS / script), *map(str, self), *arguments]
         process = subprocess.run(command, input=given, capture_output=True, text=True, check=False)
         assert process.returncode == 0, process.stderr
         return json.loads(process.stdout)
