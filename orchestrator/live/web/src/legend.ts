@@ -33,13 +33,14 @@ export function buildSwitches(
   host.replaceChildren(...(legend ? [legend] : []), ...labels);
 }
 
+/** What the colours mean: of the controllers, and of `others`, such as `reference`. */
 export function fillLegend(
   host: HTMLElement,
   loops: readonly LoopData[],
-  hasReference: boolean,
+  others: readonly string[],
 ): void {
   const items = loops.map(({ label }, place) => [String(place), label]);
-  if (hasReference) items.push(["reference", "reference"]);
+  items.push(...others.map((name) => [name, name]));
   host.replaceChildren(
     ...items.map(([kind, label]) => {
       const item = document.createElement("li");

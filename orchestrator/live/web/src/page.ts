@@ -176,6 +176,7 @@ export class Page {
   #open(): void {
     this.#preset = presetOf(this.#data, this.#settings.preset) ?? this.#data.presets[0];
     this.#loops = inOrder(this.#preset);
+    document.title = this.#preset.title;
     element<HTMLSelectElement>("preset").value = this.#preset.name;
     // Names of parameters stand between backquotes.
     element("remark").replaceChildren(
@@ -279,6 +280,7 @@ export class Page {
       1e-9,
     );
     const marks = marksOf(first, end);
+    const waypoints = first && hasReference ? waypointsOf(first) : [];
     this.#charts.set(lines(shown), marks);
     this.#scene?.set({
       tracks: this.#results.map(
@@ -289,10 +291,14 @@ export class Page {
         first && hasReference
           ? interleaved(["x", "y", "z"].map((axis) => first.column(`planner.y_d.${axis}`)))
           : undefined,
+      waypoints,
       ell: Number(first?.parameters["plant.ell"] ?? 0),
       zUp: this.#preset.zUp,
     });
-    fillLegend(element("legend"), this.#loops, hasReference);
+    fillLegend(element("legend"), this.#loops, [
+      ...(hasReference ? ["reference"] : []),
+      ...(waypoints.length ? ["waypoints"] : []),
+    ]);
     this.#indices.show(
       shown.flatMap((one, place) =>
         one ? [{ label: one.loop.label, place, metrics: metrics(one.result) }] : [],
@@ -391,6 +397,14 @@ function inOrder({ loops }: Preset): readonly LoopData[] {
 
 function attitudeOf(result: Result): Float64Array {
   return interleaved(["phi", "theta", "psi"].map((angle) => result.column(`plant.eta.${angle}`)));
+}
+
+/** The points that a PathPlanner runs through [m]; other planners have none. */
+function waypointsOf({ parameters }: Result): number[] {
+  const count = Number(parameters["planner.count"] ?? 0);
+  return Array.from({ length: 3 * count }, (_, i) =>
+    Number(parameters[`planner.waypoint[${Math.floor(i / 3) + 1}].${"xyz"[i % 3]}`]),
+  );
 }
 
 /** What happens in a run: each event that begins, until its end, if it has one. */

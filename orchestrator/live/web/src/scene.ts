@@ -30,6 +30,8 @@ export interface Shown {
   /** In the order of the controllers; absent: hidden, or not there. */
   tracks: readonly (Track | undefined)[];
   reference: Float64Array | undefined;
+  /** Of the reference: three numbers each [m]. */
+  waypoints: readonly number[];
   /** Distance of the control point from the centre of mass [m]. */
   ell: number;
   zUp: boolean;
@@ -42,6 +44,9 @@ const HALF = 0.3;
 const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
+
+/** Half of the length of the lines of a waypoint's cross: a share of the scene. */
+const CROSS = 0.015;
 
 /** Half of the width of a title [px]. */
 const TITLE = 40;
@@ -65,10 +70,11 @@ export class Scene {
   readonly #vehicles: Mesh[];
   readonly #reference: PathLine;
   readonly #target: Marks;
+  readonly #waypoints: Marks;
   readonly #grid: Marks;
   readonly #labels: HTMLElement;
   readonly #turning: Turning;
-  #shown: Shown = { tracks: [], reference: undefined, ell: 0.35, zUp: false };
+  #shown: Shown = { tracks: [], reference: undefined, waypoints: [], ell: 0.35, zUp: false };
   #box: Box = { low: [-1, -1, -1], high: [1, 1, 1] };
   /** The scene is drawn with its largest extent as 1. */
   #scale = 1;
@@ -97,10 +103,11 @@ export class Scene {
     this.#grid = new Marks(gl, 400, gl.LINES);
     this.#reference = new PathLine(gl, 1.6, false);
     this.#target = new Marks(gl, 1, gl.POINTS, 7 * this.#renderer.dpr);
+    this.#waypoints = new Marks(gl, 400, gl.LINES);
     this.#paths = [new PathLine(gl, 2.6, false), new PathLine(gl, 2.6, true)];
     this.#vehicles = [vehicleMesh(gl), vehicleMesh(gl)];
-    const lines = [this.#reference, ...this.#paths];
-    for (const mesh of [this.#grid.mesh, this.#target.mesh, ...lines.map((line) => line.mesh)]) {
+    const marks = [this.#grid, this.#target, this.#waypoints];
+    for (const { mesh } of [...marks, this.#reference, ...this.#paths]) {
       mesh.setParent(this.#root);
     }
     for (const vehicle of this.#vehicles) {
@@ -136,6 +143,7 @@ export class Scene {
     });
     this.#reference.paint(reference, mixed(reference, background, 0.3));
     this.#target.paint(reference);
+    this.#waypoints.paint(reference);
     this.#grid.paint(grid);
     this.draw();
   }
@@ -144,7 +152,7 @@ export class Scene {
   set(shown: Shown): void {
     this.#shown = shown;
     const seen = shown.tracks.flatMap((track) => (track ? [track.path] : []));
-    const held = shown.reference ? [...seen, shown.reference] : seen;
+    const held = [...seen, ...(shown.reference ? [shown.reference] : []), shown.waypoints];
     const tight = boxOf(held, 0);
     const [largest, second] = extents(tight);
     this.#length = Math.max(OF_LARGEST * largest, OF_SECOND * second, LENGTH * shown.ell);
@@ -163,6 +171,7 @@ export class Scene {
     });
     this.#reference.mesh.visible = this.#target.mesh.visible = shown.reference !== undefined;
     if (shown.reference) this.#reference.place(this.#sampled(shown.reference));
+    this.#waypoints.place(this.#crosses(shown.waypoints));
     this.show(this.#row);
   }
 
@@ -216,6 +225,19 @@ export class Scene {
   #placed(x: number, y: number, z: number): Vector {
     const at = drawn(x, y, z, this.#shown.zUp);
     return at.map((value, k) => (value - this.#middle[k]) * this.#scale) as Vector;
+  }
+
+  #crosses(points: readonly number[]): number[] {
+    const lines: number[] = [];
+    for (let i = 0; i < points.length; i += 3) {
+      const at = this.#placed(points[i], points[i + 1], points[i + 2]);
+      for (const axis of [0, 1, 2]) {
+        for (const reach of [-CROSS, CROSS]) {
+          lines.push(...at.map((value, k) => (k === axis ? value + reach : value)));
+        }
+      }
+    }
+    return lines;
   }
 
   #sampled(points: Float64Array): Float32Array {

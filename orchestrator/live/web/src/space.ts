@@ -36,7 +36,7 @@ export interface Box {
 }
 
 /** A box that holds points, with a margin around them. */
-export function boxOf(sets: readonly Float64Array[], margin: number): Box {
+export function boxOf(sets: readonly ArrayLike<number>[], margin: number): Box {
   const low: Vector = [Infinity, Infinity, Infinity];
   const high: Vector = [-Infinity, -Infinity, -Infinity];
   for (const points of sets) {
