@@ -155,9 +155,11 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.get_major_locator().set_params(nbins=4, steps=None)
     axes.tick_params(labelsize="small", pad=0)
+    # Closer by, a tick and the sign of a number are one dash.
+    axes.zaxis.set_tick_params(pad=6)
     # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
-    axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat - 2
-    axes.zaxis.labelpad = 4 - 3.5 * flat
+    axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat
+    axes.zaxis.labelpad = 14 - 4 * flat
 
 
 def draw_lines(
@@ -268,7 +270,7 @@ def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit
         f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
     )
     peaks = {run.label: _peak(run.result[run.loop.commanded[k]]) for run in runs}
-    if max(peaks.values()) < _NEAR * min(upper, -lower):
+    if max(map(abs, peaks.values())) < _NEAR * min(upper, -lower):
         bottom, top = axes.get_ylim()
         axes.set_ylim(bottom, top + 0.2 * (top - bottom))
         _say(axes, f"{words} (off scale)", 0.98, axes.transAxes, "top")
@@ -278,9 +280,10 @@ def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit
     bottom, _ = axes.get_ylim()
     axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
     for label, peak in peaks.items():
-        if peak > _BEYOND * max(upper, -lower):
+        if abs(peak) > _BEYOND * max(upper, -lower):
             who = f"peak of {escape_math(label)}" if len(runs) > 1 else "peak"
-            number = f"{peak:,.0f}" if peak < _MANY else f"{peak:.2g}"
+            number = f"{peak:,.0f}" if abs(peak) < _MANY else f"{peak:.2g}"
+            number = number.replace("-", "\N{MINUS SIGN}")
             words += f", {who} {number} {unit}"
     _say(axes, words, upper, axes.get_yaxis_transform(), "bottom")
 
@@ -295,7 +298,9 @@ def _say(axes: Axes, words: str, y: float, transform: Transform, va: str) -> Non
 
 
 def _peak(values: np.ndarray) -> float:
-    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+    """The value that is the farthest from 0, with its sign."""
+    values = values[np.isfinite(values)]
+    return float(values[np.abs(values).argmax()]) if len(values) else 0.0
 
 
 PATH = Panel("path", Loop.for_control_point, _path, 3.4)

@@ -216,7 +216,11 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
         if value in entry.limits:
             label += f"\n(white line: {entry.limits[value]:g})"
         has_gaps |= bool(np.isnan(list(drawn.values())).any())
-        figure.colorbar(image, ax=list(own.flat), label=label, extend="both")
+        # A share has ends; other colours stop before the farthest values.
+        has_ends = (norm.vmin, norm.vmax) == (0.0, 1.0)
+        figure.colorbar(
+            image, ax=list(own.flat), label=label, extend="neither" if has_ends else "both"
+        )
     for axes, name in zip(panels[0], beside, strict=True):
         axes.set_title(name)
     for axes in panels[-1]:
@@ -371,6 +375,7 @@ def draw_figures(
         if (parts := len(list(runs.parts(entry.by)))) > _MOST_PARTS:
             yield f"figure {entry.name} skipped: by tells {parts} parts of the runs apart"
             continue
+        only = ", ".join(runs.named(name, value) for name, value in entry.where.items())
         with styled():
-            figure = _DRAW[entry.chart](entry, title, runs)
+            figure = _DRAW[entry.chart](entry, ": ".join(filter(None, (title, only))), runs)
         save(figure, *(folder / f"{file_name(entry.name)}.{ending}" for ending in FIGURE_FORMATS))

@@ -206,12 +206,13 @@ class Values:
 
     def _name(self, by: Sequence[str], key: Sequence[Any]) -> str:
         return ", ".join(
-            self._part(name, value)
+            self.named(name, value)
             for name, value in zip(by, key, strict=True)
             if value is not None
         )
 
-    def _part(self, name: str, value: Any) -> str:
+    def named(self, name: str, value: Any) -> str:
+        """What runs with a value in a column are called."""
         if name == SCENARIO:
             return self._legends.get(value, value)
         number = f"{value:g}" if isinstance(value, int | float) else str(value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from orchestrator.figures.study_values import Values
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import LABELS, FigureTable, read_study
@@ -30,7 +31,7 @@ SEEN = {
 def gallery() -> dict[str, str]:
     """The scenarios and the studies."""
     return {
-        "scenarios": "\n\n".join(map(_scenario, map(read_scenario, names()))),
+        "scenarios": "\n\n".join(map(_scenario, sorted(map(read_scenario, names()), key=_place))),
         "studies": "\n\n".join(map(_study, map(read_study, ready_studies()))),
     }
 
@@ -52,8 +53,8 @@ def seen(study: Study, figure: str) -> str:
 
     def words(columns: str | list[str] | None) -> str:
         named = [columns] if isinstance(columns, str) else columns or []
-        plain = (re.sub(r" \[.*\]$|[|]", "", labels.get(one, one)) for one in named)
-        return ", ".join(plain)
+        called = (labels.get(one) or Values({}).label(one) for one in named)
+        return ", ".join(re.sub(r" \[.*\]$|[|]|\$.*\$, ", "", text) for text in called)
 
     x, y, show = declared.x, declared.y, declared.show
     text = {
@@ -62,25 +63,42 @@ def seen(study: Study, figure: str) -> str:
         "front": f"{words(y)} against {words(x)}, and the runs that no other run beats in both",
         "influence": f"how much {words(x)} move {words(show)}",
     }[declared.kind]
-    return f"{study.title}: {text}"
+    only = "".join(f", {words(key)} {value}" for key, value in (declared.where or {}).items())
+    return f"{study.title}: {text}{only}"
 
 
 def _scenario(scenario: Scenario) -> str:
     title = scenario.title
-    shown = f"![{title}: {SEEN[scenario.figure]}]({PICTURES}/{scenario.name}.png)"
+    shown = f"{title}: {SEEN[scenario.figure]}", f"{PICTURES}/{scenario.name}.png"
     return _entry(title, shown, _sentence(scenario.remark), f"run {scenario.name}", scenario.name)
+
+
+def _place(scenario: Scenario) -> tuple[bool, str]:
+    """The paper's scenarios come first."""
+    return not scenario.name.startswith("fig"), scenario.name
 
 
 def _study(study: Study) -> str:
     first = next(figures(study))
-    shown = f"![{seen(study, first)}]({PICTURES}/{picture(study, first)})"
+    settings = dict(study.parameters)
+    if study.stop_time is not None and not study.stop_time.per:
+        settings["stop_time"] = study.stop_time.base
+    preset = "&".join([study.scenario[0], *(f"{key}={value}" for key, value in settings.items())])
     return _entry(
-        study.title, shown, _sentence(study.remark), f"sweep {study.name}", study.scenario[0]
+        study.title,
+        (seen(study, first), f"{PICTURES}/{picture(study, first)}"),
+        _sentence(study.remark),
+        f"sweep {study.name}",
+        preset,
     )
 
 
-def _entry(title: str, shown: str, sentence: str, command: str, preset: str) -> str:
-    return f"### {title}\n\n{shown}\n\n{sentence}\n\n`auv-fmu {command}`\n<!-- live: {preset} -->"
+def _entry(title: str, shown: tuple[str, str], sentence: str, command: str, preset: str) -> str:
+    words, file = shown
+    return (
+        f"### {title}\n\n[![{words}]({file})]({file})\n\n{sentence}\n\n"
+        f"`auv-fmu {command}`\n\n<!-- live: {preset} -->"
+    )
 
 
 def _sentence(remark: str) -> str:

@@ -48,7 +48,7 @@ BOOSTS = {
 }
 
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
-_PRESET = re.compile(r"<!-- live: ([\w-]+) -->")
+_PRESET = re.compile(r"<!-- live: (([\w-]+)\S*) -->")
 _ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
 _ROLE = re.compile(r":(class|data|func|mod):(?=<code>)")
 
@@ -89,7 +89,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
         note = f'<iframe class="live" src="{up}" title="The live page" loading="lazy"></iframe>'
     markdown = markdown.replace("<!-- the live page -->", note)
     markdown = _ROW.sub(_with_plain_bars, markdown)
-    link = "" if _why_not else rf"[Try it on the live page]({up}#preset=\1)"
+    link = "" if _why_not else rf"[`\2` on the live page]({up}#preset=\1)"
     return _PRESET.sub(link, markdown)
 
 

@@ -133,7 +133,7 @@ def test_a_command_that_is_cut_off_says_its_peak():
     figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
     axes = panel(figure, r"$\tau_u$ [N]")
     assert axes.get_ylim()[0] > -366.0
-    assert [text.get_text() for text in axes.texts] == ["limits ±80 N, peak 366 N"]
+    assert [text.get_text() for text in axes.texts] == ["limits ±80 N, peak \N{MINUS SIGN}366 N"]
 
 
 def test_a_figure_has_no_heading_where_none_is_given():
