@@ -26,22 +26,22 @@ _HTML = Path(__file__).with_name("page.html")
 _REFUSALS = """\
 ## What is refused
 
-The FMU answers with fmi2Discard:
+The FMU answers with fmi2Discard if the host
 
-- if a value to set is not finite, out of its range or not one of the choices;
-- if an output is to be set, or a fixed parameter to a new value during the run;
-- if the size of a step is negative or not finite, or its result would not be finite.
+- sets a value that is not finite, out of its range or not one of the choices;
+- sets an output, or a fixed parameter to a new value during the run;
+- asks for a step whose size is negative or not finite, or whose result would not be finite.
 
 None of the values of such a call is taken, and such a step changes nothing, not even the noise. The
 run continues with the next good call. `fault` rises, and stays true until fmi2Reset, or until a
 state without a fault is restored.
 
-The FMU answers with fmi2Error:
+The FMU answers with fmi2Error if the host
 
-- if a parameter that is set before the run cannot be taken, which also raises `fault`;
-- if a call comes in the wrong mode;
-- if a value reference does not exist or is of another type;
-- if no run can have led to a state that is to be restored.
+- sets a parameter before the run to a value that cannot be taken, which also raises `fault`;
+- makes a call in the wrong mode;
+- uses a value reference that does not exist or is of another type;
+- restores a state that no run can have led to.
 
 From then on it answers every call except a get with fmi2Error, until fmi2Reset or a good state. A
 refused get has no consequence. fmi2GetReal also gives the numbers of Integers and Booleans.
