@@ -26,28 +26,28 @@ _HTML = Path(__file__).with_name("page.html")
 _REFUSALS = """\
 ## What is refused
 
-The FMU answers with fmi2Discard:
+The FMU answers with fmi2Discard if the host
 
-- a set of a value that is not finite, out of its range or not one of the choices;
-- a set of an output, or of a new value for a fixed parameter during the run;
-- a step whose size is negative or not finite, or whose result would not be finite.
+- sets a value that is not finite, out of its range or not one of the choices;
+- sets an output, or a fixed parameter to a new value during the run;
+- asks for a step whose size is negative or not finite, or whose result would not be finite.
 
-None of the values of such a call is taken, and such a step changes nothing, not even the noise.
-`fault` rises. The run continues with the next good call. `fault` stays true until fmi2Reset, or
-until a state without a fault is restored.
+None of the values of such a call is taken, and such a step changes nothing, not even the noise. The
+run continues with the next good call. `fault` rises, and stays true until fmi2Reset, or until a
+state without a fault is restored.
 
-The FMU answers with fmi2Error:
+The FMU answers with fmi2Error if the host
 
-- a set of a parameter that cannot be taken before the run, which also raises `fault`;
-- a call in the wrong mode;
-- a value reference that does not exist or is of another type;
-- a state that no run can have led to.
+- sets a parameter before the run to a value that cannot be taken, which also raises `fault`;
+- makes a call in the wrong mode;
+- uses a value reference that does not exist or is of another type;
+- restores a state that no run can have led to.
 
-Then it answers every later call except a get with fmi2Error, until fmi2Reset or a good state. A
+From then on it answers every call except a get with fmi2Error, until fmi2Reset or a good state. A
 refused get has no consequence. fmi2GetReal also gives the numbers of Integers and Booleans.
 
-The reason is logged, even with logging off. The whole table of calls, states and bad arguments is
-`docs/reference/fmi-answers.md` of the project."""
+The reason is logged, even with logging off. `docs/reference/fmi-answers.md` of the project has the
+complete table of calls, states and bad arguments."""
 
 #: The place in a list of things that have members.
 _PLACE = re.compile(r"\[\d+\]\.")
@@ -66,7 +66,7 @@ _REFERENCE = """\
 The folder `extra/org.fmi-standard.fmi-ls-ref` in the FMU holds experiments with only this FMU:
 parameter sets, inputs over time, and the outputs to compare with. Its format follows the drafts
 FMI-LS-REF and MA-HS-Experiments of the Modelica Association. The inputs of a step are set at its
-beginning. `auv-fmu verify {name}.fmu` makes the experiments and compares the outputs."""
+beginning. `auv-fmu verify {name}.fmu` runs the experiments and compares the outputs."""
 
 _EXAMPLE = """\
 ## Example

@@ -148,7 +148,7 @@ def figure_5(controller):
 
 
 def test_surge_efforts_cannot_be_smaller():
-    text = text_of("4.2: as L2 norms, surge efforts below what the way takes")
+    text = text_of("4.2: surge efforts that are too small for L2 norms")
     least = []
     for controller in (Gains(eps_t=10.0), PdGains(eps_t=10.0)):
         impulse, square = 0.0, 0.0
