@@ -61,7 +61,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     for source, place in PAGES.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         if source == "LICENSE":
-            text = f"# Licence\n\n{text}"
+            cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+            text = f"# Licence and citation\n\n{text}\n\n## How to cite\n\n```yaml\n{cited}```\n"
         files.append(File.generated(config, place, content=text))
     for notebook in [file for file in files if file.src_uri.endswith(".ipynb")]:
         files.remove(notebook)
