@@ -20,7 +20,7 @@ _COMMAND = inputs("tau", TAU, "Commanded force and moments")
 _ROLLS = setting(
     "roll",
     _ROLL.rolls,
-    "Whether the vehicle rolls; if not, it follows (1) and (2). Not in the paper",
+    "Whether roll is free; if false, the vehicle follows (1) and (2). Not in the paper",
 )
 _CURRENT = parameters(
     "current",
@@ -33,7 +33,7 @@ _LAGS = parameters(
     "actuator.T",
     _DEFAULTS.T,
     LAG,
-    "Time constant of the actuator after its limits, 0: none; not in the paper (Remark 2)",
+    "Time constant of the actuator lag, after the limits; 0: no lag. Not in the paper (Remark 2)",
     minimum=0.0,
 )
 _INTEGRATOR = setting(
@@ -48,13 +48,13 @@ PARAMETERS = ParameterSet(
     vehicle=VEHICLE,
     roll=ParameterSet(
         RollAxis,
-        m44=parameter("m44", _ROLL.m44, "kg.m2", "Roll inertia with added inertia", POSITIVE),
+        m44=parameter("m44", _ROLL.m44, "kg.m2", "Roll inertia, including added inertia", POSITIVE),
         d44=parameter("d44", _ROLL.d44, "kg.m2/s", "Linear damping of roll", minimum=0.0),
         righting_roll=parameter(
             "righting.roll",
             _ROLL.righting_roll,
             "N.m",
-            "Righting moment in roll, not given in the paper; ours is as in pitch",
+            "Righting moment in roll, not given in the paper; by default as in pitch",
         ),
         rolls=_ROLLS,
     ),

@@ -14,9 +14,15 @@ _INPUTS = inputs("nu", NU, "Velocity in the body frame")
 
 PARAMETERS = ParameterSet(
     Disturbance,
-    A_f=parameter("A_f", _WAVES.A_f, "N", "Friction; in moments, N.m", tunable=True),
-    A_d=parameter("A_d", _WAVES.A_d, "N", "Waves and currents; in moments, N.m", tunable=True),
-    omega_d=parameter("omega_d", _WAVES.omega_d, "rad/s", "Frequency of the waves", tunable=True),
+    A_f=parameter(
+        "A_f", _WAVES.A_f, "N", "Amplitude of the friction, in N.m for moments", tunable=True
+    ),
+    A_d=parameter(
+        "A_d", _WAVES.A_d, "N", "Amplitude of waves and currents, in N.m for moments", tunable=True
+    ),
+    omega_d=parameter(
+        "omega_d", _WAVES.omega_d, "rad/s", "Angular frequency of the waves", tunable=True
+    ),
 )
 
 PORTS: tuple[Port, ...] = (

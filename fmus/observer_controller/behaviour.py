@@ -14,7 +14,8 @@ from auv_fmu.vectors import Vector3, Vector4
 
 #: What is said, at time t [s], of a measurement that is not credible.
 RESTARTED = (
-    "observer restarted at t = {t:g} s: the measured position moved further than innovation_gate"
+    "observer restarted at t = {t:g} s: the measured position is further from its estimate than "
+    "innovation_gate"
 )
 
 

@@ -27,7 +27,8 @@ _GAINS = Gains()
 _OBSERVER = setting(
     "observer",
     "euler",
-    "Form of the observer: (51) by Euler's scheme, with k_d exact over a step, or (24) as printed",
+    "Form of the observer: (51) by Euler's scheme (euler), with k_d exact over a step (exact), or "
+    "(24) as printed (integral)",
     FORMS,
 )
 

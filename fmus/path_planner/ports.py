@@ -21,7 +21,7 @@ def _of_each_waypoint(member: str, unit: str, description: str) -> tuple[Port, .
 
 
 _X, _Y, _Z = (_of_each_waypoint(axis, "m", f"Waypoint: {axis}") for axis in "xyz")
-_T = _of_each_waypoint("t", "s", "Time at which it is passed, if `timed`")
+_T = _of_each_waypoint("t", "s", "Time at which the waypoint is passed, if `timed`")
 
 _COUNT = setting(
     "count",
@@ -39,7 +39,7 @@ _CRUISE = parameter(
     "cruise", _WAYPOINTS.cruise, "m/s", "Speed between waypoints without times", POSITIVE
 )
 _ROUNDING = parameter(
-    "rounding", _WAYPOINTS.rounding, "s", "Time that the rounding of a corner takes", POSITIVE
+    "rounding", _WAYPOINTS.rounding, "s", "Duration of the rounding of a corner", POSITIVE
 )
 
 PARAMETERS = ParameterSet(

@@ -40,7 +40,7 @@ ADAPTATION: Mapping[str, Field] = {
         "gamma", _GAINS.gamma, "1", "Gamma = gamma I, in SI units", 0.0, tunable=True
     ),
     "sigma": parameter("sigma", _GAINS.sigma, "1/s", "Sigma = sigma I", 0.0, tunable=True),
-    "theta_0": parameters("theta_0", _GAINS.theta_0, THETA, "Prior of the parameters"),
+    "theta_0": parameters("theta_0", _GAINS.theta_0, THETA, "Prior estimate of the parameters"),
     "eps_t": parameter(
         "eps_t", _GAINS.eps_t, "W", "Boundary layer of tanh(nu rho r)", POSITIVE, tunable=True
     ),

@@ -185,7 +185,7 @@ FAULT = Port(
     "output",
     "discrete",
     "Boolean",
-    "True from the moment the component refused an input, a parameter or a step",
+    "True once the component has refused an input, a parameter or a step",
 )
 
 #: The independent variable. A variable only in FMI 3.0.

@@ -13,7 +13,7 @@ _VEHICLE, _LIMITS = Vehicle(), Limits()
 
 
 def _inertia(name: str, unit: str) -> Port:
-    description = f"Mass or inertia with added mass: {name[1:]}"
+    description = f"Mass or inertia including added mass: {name[1:]}"
     return parameter(name, getattr(_VEHICLE, name), unit, description, POSITIVE)
 
 
@@ -44,7 +44,9 @@ LIMITS = ParameterSet(
     tau_min=parameters("tau_min", _LIMITS.tau_min, TAU, "Lower limit of (3)", maximum=0.0),
 )
 
-CONTROL_POINT = parameter("ell", ELL, "m", "Distance of the control point", POSITIVE)
+CONTROL_POINT = parameter(
+    "ell", ELL, "m", "Distance of the control point from the centre of mass", POSITIVE
+)
 
 
 def reference(posture: str) -> tuple[Port, ...]:

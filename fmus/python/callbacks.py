@@ -163,7 +163,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             return
         self._said.add(said)
         if len(self._said) == MOST_MESSAGES:
-            message += "; what comes after this is not logged"
+            message += "; further messages are not logged"
         # FMI defines a log message as a format: a host would take a % for a directive.
         self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
 

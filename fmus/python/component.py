@@ -310,7 +310,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         groups: Any = {group: tuple(values[at]) for group, at in self._output_places.items()}
         expected = self.expected(parameters, state, groups)
         if expected is not None and not nearly_equal(self._pack(expected), values):
-            raise Refusal("its outputs do not belong to its state")
+            raise Refusal("its outputs do not match its state")
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

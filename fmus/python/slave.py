@@ -46,7 +46,7 @@ class Noisy(Component[State, Inputs, Outputs, Parameters]):
         # Some of what setstate takes it changes in silence, or only gauss finds out about.
         *_, following = hidden
         if generator.getstate() != hidden or type(following) not in (float, type(None)):
-            raise Refusal("its noise generator is in an impossible state")
+            raise Refusal("its noise generator has an invalid state")
         if not isfinite(following or 0.0):
             raise Refusal("its noise is not finite")
         self._random = generator

@@ -29,8 +29,8 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu build`."""
     describe(
         parser,
-        "Build every FMU and the bundle auv.ssp, or the FMU of a component of your own. Files that "
-        "are up to date are not built again.",
+        "Build the bundle (every FMU, and auv.ssp), or the FMU of your own component. Files that "
+        "are up to date are not rebuilt.",
         "build --kind native --out dist",
     )
     add_kind(parser)
@@ -38,15 +38,15 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--platforms",
         metavar="NAME,...|all",
-        help=f"platforms to compile for with --kind {NATIVE}, by their FMI names; platforms other "
-        "than this machine's need auv-fmu[native]; default: this machine",
+        help=f"platforms to compile for with --kind {NATIVE}, by their FMI names, or all; those "
+        "other than this machine's need auv-fmu[native]; default: this machine",
     )
     parser.add_argument(
         "script",
         nargs="?",
         type=Path,
         metavar="SCRIPT.py",
-        help="script with a PythonFMU component of your own; its FMU is written next to it; "
+        help="script with your own PythonFMU component; its FMU is written next to it; "
         "default: build the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
@@ -55,19 +55,19 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--loader",
         choices=("native", "plain"),
-        help=f"loader in the FMUs of --kind {PYTHON}: native also works in hosts that are not "
-        "Python programs and needs a C compiler; plain does not; default: native if there is a "
-        "C compiler",
+        help=f"loader in the FMUs of --kind {PYTHON}: native (for any host; needs Linux and a C "
+        "compiler) or plain (only for hosts that are Python programs); default: native if there "
+        "is a C compiler",
     )
     parser.set_defaults(action=_build)
 
 
 def add_new(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu new`."""
-    describe(parser, "Create the files of a component of your own.", "new controller my_law")
+    describe(parser, "Create the files of your own component.", "new controller my_law")
     kinds = parser.add_subparsers(required=True, metavar="KIND", help="kind of component")
     controller = kinds.add_parser(
-        "controller", help="create a folder with a controller and a scenario that run"
+        "controller", help="create a folder with a controller and a scenario, ready to run"
     )
     describe(
         controller,
@@ -84,8 +84,8 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         "--base",
         choices=CONTROLLER_BASES,
         default=CONTROLLER_BASES[0],
-        help="base class: plain uses only PythonFMU; hardened is the base of the bundle's "
-        "components and checks values, saves states and survives exceptions; default: "
+        help="base class of the controller: plain (PythonFMU only) or hardened (the base of the "
+        "bundle's components: checks values, saves states, survives exceptions); default: "
         f"{CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)
@@ -105,7 +105,10 @@ def add_gains(parser: argparse.ArgumentParser) -> None:
 def _build(options: argparse.Namespace) -> int:
     if options.script is not None:
         if options.kind != PYTHON:
-            raise InputError(f"{options.script}: only the bundle's components are translated to C")
+            raise InputError(
+                f"{options.script}: only the bundle's components are translated to C; "
+                f"use --kind {PYTHON}"
+            )
         show(build_own(options.script, options.out, options.loader, force=options.force))
         return OK
     folder = options.out or DEFAULT_FOLDERS[options.kind]
@@ -136,7 +139,7 @@ def _controller(options: argparse.Namespace) -> int:
     script, scenario, *others = new_controller(options.name, options.folder, options.base)
     for path in (script, scenario, *others):
         show(path)
-    show(f"change {script}, then build and run it:")
+    show(f"edit {script}, then build and run it:")
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

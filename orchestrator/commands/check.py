@@ -146,7 +146,7 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
             name = array_of(variable)
             other = seen.setdefault((variable.type, variable.valueReference), name)
             if other != name:
-                findings.note(f"{other} and {name} are one: setting one sets both")
+                findings.note(f"{other} and {name} share a value reference: setting one sets both")
         return component
     return None
 
@@ -190,4 +190,7 @@ def _dangling(fmu: Path) -> Iterator[str]:
     for unknown in root.iterfind("ModelStructure//Unknown"):
         for index in (unknown.get("index", ""), *unknown.get("dependencies", "").split()):
             if not (index.isascii() and index.isdecimal()) or int(index) not in known:
-                yield f"its model structure names variable {index!r}; there are {len(known)}"
+                yield (
+                    f"its model structure refers to variable {index!r}, which does not exist: "
+                    f"there are {len(known)}"
+                )

@@ -88,7 +88,7 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu hosts`."""
     describe(
         parser,
-        "Run a scenario in other co-simulation tools and compare their results with this one's.",
+        "Run a scenario in other co-simulation tools and compare their results with auv-fmu's.",
         "hosts fmpy ecos --steps 1000",
     )
     beside = [name for name, host in HOSTS.items() if not host.pins]
@@ -152,7 +152,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--events",
         metavar="SCENARIO|FILE.toml",
-        help="the scenario whose events happened in the run of the table; default: none did",
+        help="scenario whose events happened in the tool's run; default: none",
     )
     add_set(parser)
     parser.set_defaults(action=partial(_verify, parser.get_default))
@@ -233,7 +233,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
     if options.table.suffix == ".fmu":
         for name in _OF_TABLES:
             if getattr(options, name) != default(name):
-                raise InputError(f"--{name} is for a table; an FMU says itself what is compared")
+                raise InputError(f"--{name} applies only to tables: leave it out for an FMU")
         return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
     tables = read_scenario(options.events).events if options.events else ()

@@ -41,7 +41,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu plot`."""
     describe(
         parser,
-        "Draw signals of stored results over time. Several results are drawn over each other.",
+        "Plot signals of stored results over time. Several results share the axes.",
         "plot results/fig5 results/fig5/fig5-pd 'plant.y.*' --out y.png",
     )
     parser.add_argument(
@@ -51,7 +51,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         help="result folders or tables, and patterns of signals such as plant.y.*; default "
         "patterns: errors, commands and estimates",
     )
-    _add_file(parser, "picture to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
+    _add_file(parser, "image to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
 
 

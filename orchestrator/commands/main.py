@@ -23,13 +23,13 @@ from orchestrator.machine.interrupts import orderly_end
 
 #: The commands: the module that has `add_COMMAND`, and what they are for.
 COMMANDS = {
-    "build": ("build", "build every FMU and the bundle auv.ssp, or a component of your own"),
+    "build": ("build", "build the bundle (every FMU, and auv.ssp), or your own component"),
     "list": ("listing", "list the scenarios"),
     "gains": ("build", "check the conditions of Theorems 1 and 2"),
     "run": ("run_command", "run a scenario, a scenario file, an SSP or an FMU"),
     "check": ("check", "validate an FMU, an SSP, a scenario or a study without running it"),
-    "sweep": ("many_runs", "make the runs of a study"),
-    "plot": ("look", "draw signals of stored results"),
+    "sweep": ("many_runs", "run a study"),
+    "plot": ("look", "plot signals of stored results"),
     "view": ("look", "write a page that plays a stored result in 3D"),
     "live": ("look", "write a page in which a scenario runs while you change its settings"),
     "animate": ("look", "write a film of a scenario"),

@@ -21,8 +21,7 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu sweep`."""
     describe(
         parser,
-        "Make the runs of a study and draw its figures. Started again on the same folder, it makes "
-        "only the missing runs.",
+        "Run a study and draw its figures. Runs that are already in its folder are not made again.",
         "sweep noise --engine batch",
     )
     ready = ", ".join(ready_studies())

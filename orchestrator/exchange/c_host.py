@@ -81,7 +81,9 @@ def compile_host(
 def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     """What the host is compiled with: FMUs and members in the order of the stages."""
     if system.steps or any(connection.transformation for connection in system.connections):
-        raise InputError("the C program has one step for all components, and no transformations")
+        raise InputError(
+            "the C program supports neither longer steps of components nor transformations"
+        )
     parts = stages(system, experiment.order)
     columns: dict[PortName, int] = {}
     references: list[int] = []

@@ -116,7 +116,7 @@ class Carried:
     @property
     def version(self) -> str:
         """Of the standard, as the manifest says."""
-        return self._manifest.get("fmi-ls-version", "of no version")
+        return self._manifest.get("fmi-ls-version", "without a version")
 
     @property
     def notes(self) -> Sequence[str]:
@@ -179,7 +179,7 @@ class Carried:
     def _judged(self, trial: _Trial, tolerance: float | None) -> Judgement:
         """Make an experiment, if there are results to compare with."""
         if trial.element.find(_REFERENCES) is None:
-            return Judgement(trial.name, "not made: it names no results to compare with", None)
+            return Judgement(trial.name, "not run: it names no results to compare with", None)
         findings = Findings()
         try:
             text = self._compared(trial, tolerance, findings)
@@ -244,7 +244,7 @@ class Carried:
             if child.tag == _TRANSIENT:
                 return child
             if child.tag not in (*_TYPES, _ANNOTATIONS):
-                raise InputError(f"asks for {child.tag}; only simulations over time are made")
+                raise InputError(f"asks for {child.tag}; only simulations over time are supported")
         return element
 
     def _parametrised(self, trial: _Trial, findings: Findings) -> System:
@@ -274,7 +274,7 @@ class Carried:
         if element is None:
             return None
         if (stated := element.get("type", _TYPES[part])) != _TYPES[part]:
-            raise InputError(f"{part} of type {stated!r}; only {_TYPES[part]} is read")
+            raise InputError(f"{part} of type {stated!r}; only {_TYPES[part]} is supported")
         return self._file(element.get("source", ""), trial.folders)
 
     def _file(self, source: str, folders: Sequence[Path]) -> Path:
@@ -293,7 +293,7 @@ class Carried:
         except ValueError:
             raise InputError(f"{source!r} is not a URI") from None
         if parts.scheme or parts.netloc:
-            raise InputError(f"{source!r} is elsewhere; only files in the FMU are read")
+            raise InputError(f"{source!r} is not in the FMU; only files in the FMU are read")
         for folder in folders:
             path = Path(os.path.normpath(folder / unquote(parts.path)))
             if path.is_relative_to(self._folder) and path.is_file():
@@ -315,12 +315,12 @@ def _interval(times: np.ndarray) -> float:
     intervals = np.diff(times)
     intervals = intervals[intervals > 0.0]
     if not len(intervals):
-        raise InputError("neither the experiment nor the FMU names a step")
+        raise InputError("neither the experiment nor the FMU specifies a step")
     return float(intervals.min())
 
 
 def _note_unknown(series: Series, what: str, findings: Findings) -> None:
     if series.others:
         findings.note(
-            f"{what} has columns of other names, which are skipped: {listed(series.others)}"
+            f"{what} has columns that match no variable and are skipped: {listed(series.others)}"
         )

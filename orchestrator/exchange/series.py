@@ -59,7 +59,7 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
         }
         found = [variable.name for group in ports.values() for variable in group]
         if len({*found}) < len(found):
-            raise ValueError("two columns are of one variable")
+            raise ValueError("two columns belong to the same variable")
         times: list[float] = []
         columns: dict[str, list[float | str]] = {name: [] for name in found}
         for line, row in rows:
@@ -117,7 +117,7 @@ def comparison(
     chosen = new & (times >= ours[0] - slack) & (times <= ours[-1] + slack)
     if not chosen.any():
         raise InputError(
-            f"its results have no row from t = {ours[0]:g} to {ours[-1]:g} s, where it is made"
+            f"its results have no row from t = {ours[0]:g} to {ours[-1]:g} s, the time of the run"
         )
     if (new & (times > ours[-1] + slack) & (times <= stop_time + slack)).any():
         raise InputError(f"ended at t = {ours[-1]:g} s, before its results end")
@@ -141,11 +141,11 @@ def comparison(
         time, name, is_now, was = first
         raise InputError(
             f"{name} differs first, at t = {time:g} s: {_shown(is_now)} instead of {_shown(was)}, "
-            f"to {tolerance:g}"
+            f"with a tolerance of {tolerance:g}"
         )
     left = int((new & ~chosen).sum())
     outputs = f"{len(expected.columns)} of {len(component.having('output'))} outputs"
-    others = f", {left} rows are of other times" * bool(left)
+    others = f", {left} rows are outside the run" * bool(left)
     return (
         f"{outputs} agree in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
         f"they differ by at most {worst:.2g}, with a tolerance of {tolerance:g}"

@@ -282,7 +282,7 @@ def _listed(names: Sequence[str], verbose: bool) -> str:
     """Some names, or how many they are and the first of them."""
     if verbose or len(names) <= _FIRST:
         return ", ".join(names)
-    return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose names all)"
+    return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose lists all)"
 
 
 @dataclass(frozen=True)

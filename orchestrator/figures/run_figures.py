@@ -64,7 +64,7 @@ def _estimated_velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
     for k, axes, truth, column in zip(AXES, panels, true.T, run.loop.dy_hat, strict=True):
         estimate = partial(_estimated, column)
         has_means |= draw_signal(axes, run.result, estimate, color=COLOURS[1], label="estimated")
-        axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true, never measured")
+        axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true (not measured)")
         axes.set_ylabel(rf"$\dot{{y}}_{k}$ [m/s]")
     title(panels[0], "velocity of the control point")
     over_time(panels, runs, has_means)

@@ -313,7 +313,7 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
         axes.set_title(name)
         has_gaps |= bool(np.isnan(found).any())
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
-    legend(figure, *[_sample(_EMPTY, "one of the two never changes")] * has_gaps)
+    legend(figure, *[_sample(_EMPTY, "one of the two is constant")] * has_gaps)
     return figure
 
 
@@ -373,7 +373,10 @@ def draw_figures(
             yield f"figure {entry.name} skipped: no run has {lacking[0]}"
             continue
         if (parts := len(list(runs.parts(entry.by)))) > _MOST_PARTS:
-            yield f"figure {entry.name} skipped: by tells {parts} parts of the runs apart"
+            yield (
+                f"figure {entry.name} skipped: by splits the runs into {parts} parts, more than "
+                f"{_MOST_PARTS}"
+            )
             continue
         only = ", ".join(runs.named(name, value) for name, value in entry.where.items())
         with styled():

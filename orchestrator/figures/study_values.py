@@ -108,7 +108,7 @@ def _saturated(columns: Columns) -> np.ndarray:
 #: What is true or false of a run: of several, figures show the share of runs of which it is true.
 VERDICTS: Mapping[str, tuple[str, Callable[[Columns], np.ndarray]]] = {
     "failed": ("share of failed runs", _failed),
-    "lost": (f"share of runs not kept within {REACHED:g} m", _lost),
+    "lost": (f"share of runs with a late error above {REACHED:g} m", _lost),
     "saturated": ("share of runs that saturate", _saturated),
 }
 

@@ -336,7 +336,7 @@ def _frames(run: Drawn) -> dict[str, Any]:
         )
     if len(paths) > 1:
         traces.append(
-            _line(paths[1][:1], REFERENCE, 1, "reference (current)")
+            _line(paths[1][:1], REFERENCE, 1, "reference (now)")
             | {"mode": "markers", "marker": {"color": REFERENCE, "size": 4, "symbol": "square"}}
         )
     low, high = lower - length, upper + length

@@ -73,7 +73,7 @@ def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]
                     max_rows=ROWS_AT_ONCE, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
                 )  # fmt: skip
                 if rows.shape[1] != len(header):
-                    raise ValueError(f"rows of {rows.shape[1]} values below {len(header)} names")
+                    raise ValueError(f"rows of {rows.shape[1]} values for {len(header)} columns")
                 yield np.delete(rows, texts, axis=1) if texts else rows
 
 
@@ -133,7 +133,7 @@ def _records(reader: Any, width: int) -> Iterator[Record]:
             # A lone quote, and the next one some rows later: what is between would be one value.
             raise ValueError(f"line {line}: a value in quotes continues on the next line")
         if values and len(values) != width:
-            raise ValueError(f"line {line} has {len(values)} values below {width} names")
+            raise ValueError(f"line {line} has {len(values)} values for {width} columns")
         if values:
             yield line, values
 

@@ -97,7 +97,7 @@ def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
     try:
         return made_once(CATEGORY, key_of(), lambda: bundled(hear))
     except OSError as error:
-        raise InputError(f"the live page has no script: {reason(error)}") from error
+        raise InputError(f"the script of the live page cannot be built: {reason(error)}") from error
 
 
 def key_of() -> str:
@@ -129,10 +129,10 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
     npm = shutil.which("npm")
     if npm is None or shutil.which("node") is None:
         raise InputError(
-            "the live page needs Node.js 20 or later and its npm, which bundle its script: "
+            "the live page needs Node.js 20 or later with npm to bundle its script: "
             "https://nodejs.org"
         )
-    hear("bundling the page's script with npm, once: this may take a minute")
+    hear("bundling the script of the page with npm (only once): this may take a minute")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary, WEB.name)
         for path in _sources():
@@ -152,8 +152,10 @@ def _run(folder: Path, *command: str) -> None:
             timeout=_LIMIT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise InputError(f"{command[1]} has not ended after {_LIMIT:g} s") from None
+        raise InputError(f"{command[1]} did not finish within {_LIMIT:g} s") from None
     if process.returncode != 0:
         lines = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
         said = (lines or [last_line(process.stderr)])[0]
-        raise InputError(f"the live page has no script: {' '.join(command[:2])}: {said}")
+        raise InputError(
+            f"the script of the live page cannot be built: {' '.join(command[:2])}: {said}"
+        )

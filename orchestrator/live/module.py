@@ -63,7 +63,9 @@ def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
     try:
         return made_once(CATEGORY, key_of(), lambda: compiled(hear))
     except OSError as error:
-        raise InputError(f"the live page has no module: {reason(error)}") from error
+        raise InputError(
+            f"the module of the live page cannot be compiled: {reason(error)}"
+        ) from error
 
 
 def key_of() -> str:
@@ -93,7 +95,7 @@ def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes
             "the live page needs ziglang, which compiles C to WebAssembly: "
             "pip install 'auv-fmu[native]'"
         )
-    hear("compiling the FMUs to WebAssembly, once: this may take some minutes")
+    hear("compiling the FMUs to WebAssembly (only once): this may take a few minutes")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary)
         objects = []

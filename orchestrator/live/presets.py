@@ -153,9 +153,9 @@ def _check(prepared: Prepared) -> None:
         "rings of direct feedthroughs": rings(system),
         "linear inputs": experiment.coupling == LINEAR,
         "components with longer steps": any(n > 1 for n in plan.decimations.values()),
-        "changes of values on their way": any(c.transformation for c in system.connections),
+        "transformations of values": any(c.transformation for c in system.connections),
         "a table of inputs": prepared.input_table is not None,
-        "a start time": experiment.start_time != 0.0,
+        "a start time other than 0": experiment.start_time != 0.0,
         f"a system without the {STANDARD.vehicle}": STANDARD.vehicle not in system.components,
         f"more than {_MOST_STEPS:,} steps": experiment.rows - 1 > _MOST_STEPS,
     }

@@ -154,7 +154,7 @@ def _read(path: Path) -> bytes:
     with open(os.open(path, os.O_RDONLY | flags), "rb") as file:  # noqa: PTH123
         status = os.fstat(file.fileno())
         if not S_ISREG(status.st_mode) or not is_mine(status) or others_write(status):
-            raise PermissionError(f"{path} is not the user's file")
+            raise PermissionError(f"{path} belongs to, or is writable by, another user")
         return file.read()
 
 
@@ -192,7 +192,7 @@ def _root(category: str) -> Path:
         why = f"{path} is below the current folder: set XDG_CACHE_HOME to an absolute path"
     elif culprit := _open_to_others(path / category) or _open_to_others(path / _DIGESTS):
         why = (
-            f"{culprit} must be a folder that only you can write: `chmod -R go-w` it, or set "
+            f"{culprit} must be a folder that only you can write to: `chmod -R go-w` it, or set "
             "XDG_CACHE_HOME to another"
         )
     else:

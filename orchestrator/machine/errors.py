@@ -23,7 +23,7 @@ class StartError(InputError):
 def reason(error: BaseException) -> str:
     """What an exception says, in one line."""
     if isinstance(error, MemoryError):
-        return "memory is short"
+        return "out of memory"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     more = [f"and {len(lines) - _MOST_LINES} more lines"] * (len(lines) > _MOST_LINES)
     said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))

@@ -229,7 +229,7 @@ class Ledger:
         if found is None and os.path.lexists(path) and path.lstat().st_size:
             if not self._force:
                 raise Taken(
-                    f"{path} is damaged, or not by auv-fmu: its own files are unknown; "
+                    f"{path} is damaged or not from auv-fmu, so its own files are unknown; "
                     "choose another place (--out), or let --force move it aside"
                 )
             move_aside(path)

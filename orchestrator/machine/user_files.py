@@ -111,7 +111,8 @@ def check_file(path: Path) -> None:
         except FileNotFoundError:
             raise InputError(f"{path}: no such file") from None
     if not S_ISREG(mode):
-        raise InputError(f"{path}: {'a folder' if S_ISDIR(mode) else 'a pipe or device'}, no file")
+        what = "a folder" if S_ISDIR(mode) else "a pipe or device"
+        raise InputError(f"{path}: {what}, not a file")
 
 
 def read_text(path: Path, what: str) -> str:
@@ -301,7 +302,7 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
 
 def _check_room(whole: _Whole, files: int, size: int) -> None:
     """Refuse what fills the disk together with what there is."""
-    within = f"and {whole.archive} with everything in it to"
+    within = f"and {whole.archive} with its nested archives to"
     if (together := whole.files + files) > _MOST_FILES:
         raise ValueError(
             f"it unpacks to {files:,} files, {within} {together:,}, more than {_MOST_FILES:,}"
@@ -329,7 +330,7 @@ def _check_entries(entries: Sequence[ZipInfo]) -> None:
     for entry in entries:
         path = PurePosixPath(entry.filename.replace("\\", "/"))
         if path.is_absolute() or ".." in path.parts:
-            raise ValueError(f"it holds {entry.filename!r}, which leads out of it")
+            raise ValueError(f"it holds {entry.filename!r}, which lies outside it")
         if (depth := len(path.parts) - 1) > _MOST_FOLDERS:
             raise ValueError(
                 f"it holds {path.parts[0]:.40}/…, {depth:,} folders deep, more than {_MOST_FOLDERS}"

@@ -135,7 +135,7 @@ def _result(future: Future[Any], unit: str) -> Any:
         return future.result()
     except BrokenProcessPool as error:
         raise InputError(
-            f"a process has died while it made a {unit}: an FMU has crashed, or memory was short"
+            f"a process died while it made a {unit}: an FMU crashed, or memory ran out"
         ) from error
 
 

@@ -156,8 +156,8 @@ class _Settling:
                 return
         if restless := self._row.moving(before):
             raise ComponentFailed(
-                f"values do not come to rest: {shortened(', '.join(map(str, restless)))} in an "
-                "algebraic loop"
+                "an algebraic loop does not converge: the values that still change are "
+                f"{shortened(', '.join(map(str, restless)))}"
             )
 
     def hand_on(self, everything: bool = False) -> bool:

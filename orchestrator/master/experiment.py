@@ -220,7 +220,7 @@ def decimations(system: System, step: float) -> dict[str, int]:
         n = max(round(min(own / step, MOST_STEPS + 1.0)), 1)
         if abs(own / step - n) > ROUNDING * n:
             raise InputError(
-                f"{name} wants steps of {own:g} s, which are not a multiple of the communication "
+                f"{name} needs steps of {own:g} s, which are not a multiple of the communication "
                 f"step of {step:g} s"
             )
         found[name] = n
@@ -257,7 +257,7 @@ def _common_measure(steps: Iterable[float]) -> float:
     if min(exact) > _MOST_PARTS * common:
         listed = ", ".join(f"{float(step):g}" for step in sorted(set(exact)))
         raise InputError(
-            f"the components want steps of {listed} s, which have no common divisor; give a "
+            f"the components need steps of {listed} s, which have no common divisor; give a "
             "communication step that divides all of them"
         )
     return float(common)

@@ -99,7 +99,7 @@ def choose_loop(
     if wanted == "compiled":
         if isolation:
             raise InputError(
-                "the compiled loop cannot step isolated FMUs: leave one of the two out"
+                "the compiled loop cannot step isolated FMUs: drop --loop compiled or --isolate"
             )
         return _compiled(load_stepper() or compile_stepper())
     if wanted == "auto" and not isolation and experiment.rows > _SET_UP:

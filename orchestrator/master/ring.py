@@ -262,8 +262,8 @@ class Ring:
         if moving.any():
             ports = ", ".join(str(self._ports[i]) for i in np.flatnonzero(moving))
             raise ComponentFailed(
-                f"values do not come to rest: {shortened(ports)} in an algebraic loop; start "
-                "values closer to a solution may help"
+                f"an algebraic loop does not converge: the values that still change are "
+                f"{shortened(ports)}; start values closer to a solution may help"
             )
 
     def _exchange(self) -> None:

@@ -143,7 +143,7 @@ def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], lo
         return stepping
     log.remark(
         f"{', '.join(apart)}: runs in a separate process, since the FMU allows one instance "
-        "per process; the Python loop makes the steps"
+        "per process; the Python loop takes the steps"
     )
     return PYTHON_LOOP
 
@@ -164,7 +164,7 @@ def _parameters(
         for port in lasting:
             if not same(wanted[port], held[port]):
                 log.remark(
-                    f"{name}.{port} was set to {literal(wanted[port])}, and the FMU holds "
+                    f"{name}.{port} was set to {literal(wanted[port])}, but the FMU holds "
                     f"{literal(held[port])}"
                 )
         parameters |= {PortName(name, port): held[port] for port in own}

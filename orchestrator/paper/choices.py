@@ -78,7 +78,7 @@ class Choice(NamedTuple):
     of_proposed: bool = False
 
 
-_WAVES, _SIGN = Disturbance(), "(2): the minus of tau_w"
+_WAVES, _SIGN = Disturbance(), "(2): the sign of tau_w"
 
 #: What the reference's surge force drives it at, straight on [m/s].
 _UNDER_WAY = TAU_D[0] / Vehicle().d11
@@ -117,7 +117,7 @@ OF_RUNS = (
     Choice(
         "Jacobian",
         (
-            Option("of the whole attitude"),
+            Option("of the full attitude"),
             Option(
                 "(11) as printed",
                 {"controller.printed_jacobian": True},
@@ -128,15 +128,15 @@ OF_RUNS = (
     Choice(
         VEHICLE_CHOICE,
         (
-            Option("six degrees of freedom, 5 N·m rights the roll"),
-            Option("six, nothing rights the roll", {"plant.righting.roll": 0.0}),
+            Option("six degrees of freedom, righting moment in roll 5 N·m"),
+            Option("six, no righting moment in roll", {"plant.righting.roll": 0.0}),
         ),
     ),
     Choice(
         "plant",
         (
             Option("Euler's scheme"),
-            Option("Runge-Kutta, fourth order", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
+            Option("fourth-order Runge-Kutta", {"plant.integrator": "rk4"}, "4.1: Euler, 20 ms"),
         ),
     ),
     Choice(
@@ -148,8 +148,8 @@ OF_RUNS = (
                 {"disturbance.A_f": -_WAVES.A_f, "disturbance.A_d": -_WAVES.A_d},
                 _SIGN,
             ),
-            Option("its friction reversed", {"disturbance.A_f": -_WAVES.A_f}, _SIGN),
-            Option("its waves reversed", {"disturbance.A_d": -_WAVES.A_d}, _SIGN),
+            Option("friction reversed", {"disturbance.A_f": -_WAVES.A_f}, _SIGN),
+            Option("waves reversed", {"disturbance.A_d": -_WAVES.A_d}, _SIGN),
         ),
     ),
     Choice(
@@ -174,7 +174,7 @@ OF_RUNS = (
         "reference at t = 0",
         (
             Option("at rest"),
-            Option("under way, tau_ud / d11", {"planner.nu0.u": _UNDER_WAY}),
+            Option("in motion, at tau_ud / d11", {"planner.nu0.u": _UNDER_WAY}),
         ),
     ),
 )

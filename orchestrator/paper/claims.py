@@ -122,8 +122,8 @@ def turning(run: KeptRun) -> Finding:
     return Finding(
         f"{radius:.2f} m; its diameter {2 * radius:.3f} m",
         f"{said(abs(radius / TURNING_RADIUS - 1.0) < 0.1)}, ratio {radius / TURNING_RADIUS:.2f}: "
-        f"so the printed equations have it (reading 11). The diameter is {2 * radius:.1f} m to the "
-        "digit that is printed",
+        f"this is the radius that the printed equations give (reading 11). The diameter rounds to "
+        f"{2 * radius:.1f} m",
     )
 
 
@@ -214,7 +214,7 @@ def effort_as_a_sum(five: KeptRun, pd: KeptRun) -> Finding:
 
 
 @claim(
-    "4.2: the surge efforts as L2 norms, against the impulse that the way to the reference takes",
+    "4.2: the surge efforts as L2 norms, against the impulse needed to reach the reference",
     f"{EFFORT_PROPOSED[0]:g}, and {EFFORT_PD[0]:g} N{_SQUARED}",
     FIVE,
     FIVE_PD,
@@ -234,8 +234,8 @@ def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
     step = five.table.header.experiment.step
     free = [found.contradicts_until(effort, step) for found, effort in pairs]
     return Finding(
-        f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} (Cauchy and "
-        "Schwarz)",
+        f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} "
+        "(Cauchy-Schwarz inequality)",
         f"{said(all(np.less_equal(least, published)))}: the printed L2 norms give these impulses "
         f"in {numbers(soonest)} s at the soonest. As sums without the step they contradict nothing "
         f"from T_f = {numbers(free)} s on",
@@ -303,7 +303,7 @@ def pd_chatters(five: KeptRun, pd: KeptRun) -> Finding:
 
 
 @claim(
-    "Fig. 5: the PD controller ends more accurate (e_f, x, y, z)",
+    "Fig. 5: the PD controller is more accurate at the end (e_f, x, y, z)",
     f"{numbers(np.divide(FINAL_ERROR_PROPOSED, FINAL_ERROR_PD).tolist())} times",
     FIVE,
     FIVE_PD,
@@ -360,7 +360,7 @@ def more_effort(*sevens: KeptRun) -> Finding:
 
 
 @claim(
-    "4.3: under very large disturbances the chattering is more than the actuators bear",
+    "4.3: under very large disturbances the chattering exceeds what the actuators tolerate",
     "not tolerable and feasible",
     SEVEN[-1],
 )
@@ -398,7 +398,7 @@ def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
     )
 
 
-@claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not said")
+@claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not stated")
 def gains_meet_the_conditions() -> Finding:
     """With the gains as printed, which needs no run."""
     found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
@@ -422,6 +422,6 @@ def region_is_arbitrarily_large() -> Finding:
     return Finding(
         f"as printed, (31) asks with any gains for more than {least:.4g} of lambda_d2, which is "
         f"{there:g}; (42) holds for |x| < {found.x_of_any_gains:.2g} at most",
-        f"{said(least < there)}: no gain enters alpha_3 with a plus "
+        f"{said(least < there)}: no gain enters alpha_3 with a positive sign "
         "([the proof](#the-region-of-attraction-does-not-grow-with-the-gains))",
     )

@@ -207,13 +207,14 @@ def step(*runs: KeptRun) -> Shown:
     spread = 100.0 * float(np.abs(proposed / proposed[0] - 1.0).max())
     steps = numbers([1e3 * step for step in STEPS])
     return Shown(
-        f"Steps of {steps} ms; dotted is what the paper prints. The PD controller's L2 effort in "
-        f"tau_q is {numbers(pd[:, 1].tolist())} N·m·√s, in tau_u {numbers(pd[:, 0].tolist())} N·√s "
-        f"and in tau_r {numbers(pd[:, 2].tolist())} N·m·√s: that its tau_q of 20 ms is near the "
-        f"printed {EFFORT_PD[1]:g} comes from Euler's scheme in the plant, not from the controller "
-        f"or its sampling: with plant.integrator = rk4 it is {exact[1]:.3g} at 20 ms. "
-        "While its surge force is at the limit the vehicle sways about its way, ever "
-        "farther, and the scheme adds to that. Efforts of the proposed controller change by "
+        f"Steps of {steps} ms; dotted lines are the printed values. The PD controller's L2 effort "
+        f"in tau_q is {numbers(pd[:, 1].tolist())} N·m·√s, in tau_u "
+        f"{numbers(pd[:, 0].tolist())} N·√s and in tau_r {numbers(pd[:, 2].tolist())} N·m·√s. That "
+        f"its tau_q of 20 ms is near the printed {EFFORT_PD[1]:g} comes from Euler's scheme in the "
+        "plant, not from the controller or its sampling: with plant.integrator = rk4 it is "
+        f"{exact[1]:.3g} at 20 ms. "
+        "While its surge force is at the limit the vehicle swings about its path, ever "
+        "wider, and the scheme adds to that. Efforts of the proposed controller change by "
         f"{spread:.2g} % at most.",
         figure,
     )

@@ -79,13 +79,13 @@ def _paragraphs(found: Found) -> Iterator[str]:
         f"{first:g} to {last:g} s. The "
         "score of a variant is the sum of |ln(ours / printed)| over the twelve numbers; the factor "
         "is the geometric mean of these ratios, or of its inverse where that is larger. "
-        "*Nearest* has the least score of all variants that contradict nothing that is printed, "
+        "*Nearest* has the lowest score of all variants that contradict nothing that is printed, "
         "*nearest of five* of those whose only contradiction is a vehicle of five degrees of "
         f"freedom: {found.five.scores.size:,} more, by medians over {len(SEARCHED)} starts each. "
-        "Ranges are of the variants with six that have come to the reference, with e_f of at most "
-        f"{REACHED:g} m, and, but in the last column, of variants that contradict nothing; where "
-        "they do not hold what is printed, they are bold. The mean of |tau| is not among the "
-        "formulas: like (59) it cannot exceed 80."
+        "Ranges are of the variants with six degrees of freedom that have reached the reference, "
+        f"with e_f of at most {REACHED:g} m, and, except in the last column, of variants that "
+        "contradict nothing; where they do not contain the printed number, they are bold. "
+        "The mean of |tau| is not among the formulas: like (59) it cannot exceed 80."
     )
     ranges = [*(f"range, {formula}" for formula in _FORMULAS), "range of all"]
     yield table(["", "printed", *_TITLES, *ranges], list(_rows(found, variants)))
@@ -212,12 +212,13 @@ def _impulses(found: Sensitivity) -> str:
     return (
         "With the L2 norm the surge efforts cannot be reached: "
         + "; ".join(_impulse(found, scenario) for scenario in PUBLISHED)
-        + ". These bounds are of Cauchy and Schwarz, (integral of tau_u)^2 <= T * integral of "
-        "tau_u^2. How long the way takes is decided by the gains and limits of section 4.1, its "
-        "impulse by the damping: 30 kg/s over 31 m are 930 N·s. As a sum over steps without the "
-        f"step, (59) is the L2 norm / sqrt(h T_f), with h = {STEP:g} s the same number at T_f = "
-        f"{1.0 / STEP:g} s and a smaller one later, so that these bounds shrink as 1 / sqrt(T_f). "
-        "That the authors coded it so is not known."
+        + ". These bounds follow from the Cauchy-Schwarz inequality, (integral of tau_u)^2 <= T * "
+        "integral of tau_u^2. The gains and limits of section 4.1 decide how long the way "
+        "takes, the damping decides its impulse: 30 kg/s over 31 m are 930 N·s. As a sum over "
+        "steps without the step, (59) is the L2 norm / sqrt(h T_f), with h = "
+        f"{STEP:g} s the same number at T_f = {1.0 / STEP:g} s and a smaller one later, so that "
+        "these bounds shrink as 1 / sqrt(T_f). "
+        "Whether the authors computed it so is not known."
     )
 
 

@@ -58,7 +58,7 @@ end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_
 millimetres, up to a centimetre, for the same reason."""
 
 _NO_VARIANTS = """\
-No choice of the open points gives all of them together: `auv-fmu table` tries every \
+No choice of the open points gives all printed numbers together: `auv-fmu table` tries every \
 combination. `auv-fmu report --studies` does so for this section."""
 
 
@@ -182,7 +182,10 @@ def _text(
     yield "## Versions and commands"
     versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
     yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
-    yield "Each of these commands makes a run of this report; what has no option is in parentheses:"
+    yield (
+        "Each of these commands makes a run of this report; settings without an option are in "
+        "parentheses:"
+    )
     yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"
 
 

@@ -36,7 +36,7 @@ _NOISE = "plant.noise.std"
 #: What the report says in place of studies.
 _WITHOUT = (
     f"Not in this report: {', '.join(ready_studies())}, each 10,000 runs or more. "
-    "`auv-fmu report --studies` makes them, or what is missing of them."
+    "`auv-fmu report --studies` makes them, or the runs that are missing."
 )
 
 

@@ -43,8 +43,8 @@ def load(
 
     Args:
         name: name of a scenario, path of a .toml file, an SSP, an FMU or libcosim's
-            OspSystemStructure.xml, or a dictionary with the entries of a scenario file. The folder
-            of an SSP or of an OspSystemStructure.xml will also do.
+            OspSystemStructure.xml, or a dictionary with the entries of a scenario file. An
+            unpacked SSP and the folder of an OspSystemStructure.xml also work.
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
         fmi: their version of FMI, `2` or `3`.
         variant: name of a system description in an SSP; None: the default.
@@ -174,7 +174,11 @@ def left_behind(scenario: Scenario) -> str | None:
     """The parts of a scenario that are lost when only its system is kept, in words."""
     has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
     names = " and ".join(name for name, there in has.items() if there)
-    return f"{scenario.name}: the system comes without the scenario's {names}" if names else None
+    return (
+        f"{scenario.name}: only the system is used, without the scenario's {names}"
+        if names
+        else None
+    )
 
 
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:

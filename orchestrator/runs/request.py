@@ -106,7 +106,9 @@ class Request:
     step: Annotated[
         float | None,
         CliOption(
-            "communication step [s]; default: from the scenario, else 0.02", type=float, metavar="S"
+            "communication step [s]; default: from the scenario, else from the FMUs, else 0.02",
+            type=float,
+            metavar="S",
         ),
     ] = None
     order: Annotated[

@@ -184,7 +184,7 @@ class Result(Table):
         return pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
 
     def plot(self, *what: str | Result) -> Figure:
-        """Draw columns over time, a group such as `plant.y` a panel.
+        """Plot columns over time, with one panel for each group such as `plant.y`.
 
         Args:
             what: names of groups or columns, or patterns such as `plant.eta.*`; without any:
@@ -235,7 +235,7 @@ class Result(Table):
         *,
         force: bool = False,
     ) -> Path:
-        """Write the table, metrics.json and run.json; :func:`read` and `auv-fmu plot` take them.
+        """Write the table, metrics.json and run.json; :func:`read` and `auv-fmu plot` read them.
 
         Args:
             folder: made if it does not exist; an earlier result in it is replaced.

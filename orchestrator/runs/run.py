@@ -305,8 +305,8 @@ class _Unfinished:
         """
         if not self._path.is_dir():
             raise InputError(
-                f"{self._folder} was moved or deleted while it was written, and the results "
-                f"went with it, in {self._path.name}"
+                f"{self._folder} was moved or deleted while it was written, along "
+                f"with the results in {self._path.name}"
             )
         self._spare.unlink()
         self._write_ends(self._done)

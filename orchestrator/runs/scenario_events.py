@@ -219,7 +219,7 @@ def _offset(system: System, port: PortName, route: Connection | None, value: Any
         case Connection(transformation=Linear(factor, _)):
             return _arrived(port, route, value, factor * float(value))
         case Connection(transformation=Mapped()):
-            raise InputError(f"{port} is mapped on its way: nothing can be added to it")
+            raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
     return float(value)
 
 

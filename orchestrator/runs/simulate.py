@@ -94,8 +94,8 @@ def simulate(
     Args:
         system: name of a scenario, path of a .toml or .ssp file, a dictionary with the entries of
             a scenario file, or a system from :func:`load`.
-        parameters: values that replace the scenario's, by `component.parameter`: numbers, truth
-            values, names, or text as on the command line; for a group, such as `plant.eta0`, a
+        parameters: values that replace the scenario's, by `component.parameter`: numbers,
+            Booleans, names, or text as on the command line; for a group, such as `plant.eta0`, a
             list with a value for each member.
         stop_time: end of the run [s]; None: the scenario's own.
         step: communication step [s]; None: the scenario's own, else the longest that divides the
@@ -134,7 +134,7 @@ def simulate(
         describes.
 
     Raises:
-        ValueError: a name, a value or a file is not usable; the text says what to change.
+        ValueError: a name, a value or a file is not usable; the message says what to change.
         KeyboardInterrupt: Ctrl-C, after the current step.
 
     """

@@ -151,7 +151,7 @@ def check_systems(systems: Mapping[str, System], kind: str = AUTO) -> None:
     """
     for name, system in systems.items():
         if why := unsupported(system, current_fmus(kind)) or _without_column(system):
-            raise InputError(f"{name}: {why}, which the batch engine cannot make; {_OTHER}")
+            raise InputError(f"{name}: {why}, which the batch engine cannot run; {_OTHER}")
         system.check()
 
 
@@ -183,7 +183,7 @@ def _job(system: System, point: Point) -> _Job:
         system.check()
     experiment = Experiment(point.stop_time, point.step, point.order)
     if point.order not in ORDERS:
-        raise InputError(f"the batch engine has the orders {' and '.join(ORDERS)}; {_OTHER}")
+        raise InputError(f"the batch engine has only the orders {' and '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
     try:

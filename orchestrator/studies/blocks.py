@@ -37,7 +37,7 @@ _MOST_RUNS = 10_000
 _LOSSES = 1
 
 #: What is said of a run that no worker has survived.
-FATAL = "every process that made it died"
+FATAL = "every process that ran it died"
 
 #: What this process makes runs with, if it is a worker of this machine.
 _engine: list[Engine] = []

@@ -112,7 +112,7 @@ def sweep(
     progress: bool = False,
     force: bool = False,
 ) -> StudyResult:
-    """Make all runs of a study, or the missing ones.
+    """Run a study: make all of its runs, or the missing ones.
 
         result = sweep("attraction")
         result["plant.eta0.z"], result["failure"], result.to_dataframe()
@@ -123,16 +123,16 @@ def sweep(
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
             study began, else native where available.
         loop: loop that makes their steps: `python`, `compiled` or `auto`.
-        scheduler: address of a Dask scheduler whose workers make the runs; None: processes of
+        scheduler: address of a Dask scheduler whose workers make the runs; None: processes on
             this machine.
-        workers: how many of these; None: one for each core.
+        workers: number of processes on this machine; None: one for each core.
         out: folder of the study; runs that are finished there are not made again. None:
             `results/NAME`.
         progress: show a bar on studies that take longer than some seconds.
         force: move aside your files with names of the study's files, and another study.
 
     Raises:
-        ValueError: something about the study is not usable; the text says what to change.
+        ValueError: the study is not usable; the message says what to change.
         KeyboardInterrupt: Ctrl-C; finished runs are kept.
 
     """

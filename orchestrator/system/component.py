@@ -109,7 +109,7 @@ def described(fmu: Path, folder: Path) -> Described:
     except InputError:
         raise
     except KeyError as error:
-        why = f"it refers to {error}, which is not there"
+        why = f"it refers to {error}, which does not exist"
         raise InputError(f"{fmu}: not a readable FMU: {why}") from error
     except Exception as error:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error

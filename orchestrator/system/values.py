@@ -180,7 +180,7 @@ def _transferable(text: str) -> str:
     """A text that FMI can carry: in UTF-8, and ended by the first zero."""
     text.encode()
     if "\0" in text:
-        raise ValueError("a text ends at a zero")
+        raise ValueError("a text cannot contain a zero character")
     return text
 
 

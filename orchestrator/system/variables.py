@@ -52,7 +52,9 @@ def variables_of(description: ModelDescription) -> Variables:
             continue
         first = next(element_names(variable.name, variable.shape or ()))
         if variable.shape and first in names:
-            left_alone[variable.name] = f"has the element {first}, as another variable"
+            left_alone[variable.name] = (
+                f"is an array, but its element {first} is another variable's name"
+            )
         elif variable.alias is not None:
             other_names[variable.name] = f"is another name of {variable.alias.name}: use that one"
         elif variable.shape:

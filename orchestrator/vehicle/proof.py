@@ -44,11 +44,11 @@ _NOTE = """\
 The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
 where they are violated. The zetas of (26) and (29) are known from below only, by states of a level
 vehicle. C_2 has a pole at the vertical, so that no finite zetas hold at all attitudes: open means
-that a condition may hold for pitches that keep off it. docs/explanation/paper.md has the
+that a condition may hold for pitches that stay away from it. docs/explanation/paper.md has the
 proofs, and so does the report under "What is wrong in the paper"."""
 
 _PAPER = """\
-These are the paper's own gains: as printed they miss (30), and (31) in any unit of speed."""
+These are the paper's own gains: as printed they violate (30), and (31) in any unit of speed."""
 
 #: Columns of :func:`certificates`.
 CERTIFICATE_COLUMNS = (
@@ -135,7 +135,7 @@ def stated(found: Theorem) -> Iterator[str]:
         else "  (33)  R_A is empty"
     )
     yield (
-        "  (42)  with (26) asked for on a ball of x only: holds for "
+        "  (42)  with (26) required on a ball of x only: holds for "
         f"|x| < {found.x_at_most:.3g} at most, with any gains for |x| < {found.x_of_any_gains:.3g}"
     )
     yield ""

@@ -259,7 +259,7 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
         raise ImpossiblePath(
             f"at ({x:.3g}, {y:.3g}, {z:.3g}) m the path turns at {sqrt(r * r + q * q):.3g} rad/s "
             f"with {speed:.3g} m/s: more tightly than the vehicle's control point can, {ell:g} m "
-            f"ahead; round for longer"
+            f"ahead; raise rounding"
         )
     u = (B + sqrt(B * B - A * C)) / A
     v, w = -sway * u, heave * u
@@ -286,13 +286,15 @@ def check(parameters: Parameters) -> None:
     """
     waypoints, vehicle, _, _, _, _ = parameters
     if not (vehicle.d22 > 0.0 and vehicle.d33 > 0.0):
-        raise ImpossiblePath("d22 and d33 must be positive: nothing else ends a drift in a turn")
+        raise ImpossiblePath(
+            "d22 and d33 must be positive: nothing else limits the drift in a turn"
+        )
     k = 1
     while k < waypoints.n:
         _check_leg(waypoints, k)
         k = k + 1
     if norm(course(waypoints, first_corner(waypoints, 0.0), _AT_REST)) == 0.0:
-        raise ImpossiblePath("all waypoints are the same: there is no way to go")
+        raise ImpossiblePath("all waypoints are the same: there is no path between them")
     _check_pitch(waypoints)
     corner = first_corner(waypoints, 0.0)
     ahead = corner
@@ -308,17 +310,17 @@ def _check_leg(waypoints: Waypoints, k: int) -> None:
     x, y, z = difference(behind, before)
     if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
         raise ImpossiblePath(
-            f"waypoint {k + 1:d} is to be passed at t = {waypoints.t[k]:g} s, and the one before "
-            f"it at {waypoints.t[k - 1]:g} s: times must grow"
+            f"waypoint {k + 1:d} has the time {waypoints.t[k]:g} s, and the one before it "
+            f"{waypoints.t[k - 1]:g} s: times must increase"
         )
     if not waypoints.timed and distance(before, behind) == 0.0:
         raise ImpossiblePath(
-            f"waypoints {k:d} and {k + 1:d} are the same; a rest takes waypoints with times"
+            f"waypoints {k:d} and {k + 1:d} are the same; only waypoints with times can rest"
         )
     climb = atan2(abs(z), sqrt(x * x + y * y))
     if climb > STEEPEST:
         raise ImpossiblePath(
-            f"the way from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
+            f"the leg from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
             f"degrees, {degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
             f"(1) has a pole at 90"
         )
@@ -380,12 +382,12 @@ def _check_pitch_between(
                     f"near waypoint {corner.k + 1:d}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path "
                     f"climbs or dives at {degrees(climb):.1f} degrees, "
                     f"{degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
-                    f"(1) has a pole at 90; a less steep leg between makes a turn of it"
+                    f"(1) has a pole at 90; insert a less steep leg"
                 )
             if share < _SHORTEST:
                 raise ImpossiblePath(
                     f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no "
-                    f"vehicle does; a waypoint beside it makes a turn of it"
+                    f"vehicle can follow; add a waypoint to one side"
                 )
 
 
@@ -453,7 +455,7 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
         ):
             raise ImpossiblePath(
                 f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no vehicle "
-                f"does; a waypoint beside it makes a turn of it"
+                f"can follow; add a waypoint to one side"
             )
         if moves:
             _check_moment(parameters, corner.k + 1, moment)
@@ -468,7 +470,7 @@ def _check_moment(parameters: Parameters, number: int, moment: Reference) -> Non
     y_d = moment.y_d
     _hold("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
     _hold("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
-    _hold("a driving force", tau_u, least[0], most[0], "N", number, y_d)
+    _hold("a surge force", tau_u, least[0], most[0], "N", number, y_d)
     _hold("a moment in pitch", tau_q, least[1], most[1], "N.m", number, y_d)
     _hold("a moment in yaw", tau_r, least[2], most[2], "N.m", number, y_d)
 
@@ -482,5 +484,5 @@ def _hold(
         raise ImpossiblePath(
             f"near waypoint {number:d}, at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m, the path "
             f"asks for {what} of {asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of "
-            f"{limit:.3g}; go slower, or round for longer"
+            f"{limit:.3g}; reduce the speed or raise rounding"
         )

@@ -122,7 +122,7 @@ def refused(library: Library, **arguments: Any) -> Message:
         ("has no name", {"name": None}),
         *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
         ("GUID is not UTF-8", {"guid": b"\xff"}),
-        ("is not the one of this FMU", {"guid": b"{}"}),
+        ("does not match this FMU's", {"guid": b"{}"}),
         ("co-simulation only", {"kind": MODEL_EXCHANGE}),
         ("co-simulation only", {"kind": 77}),
     ],

@@ -203,7 +203,7 @@ def test_an_index_of_what_is_not_computed_is_refused(monkeypatch):
     with pytest.raises(InputError) as refused:
         engines("fig4")
     assert str(refused.value) == (
-        "fig4: its index size_of_z is of controller.z.x, which the batch engine cannot make; "
+        "fig4: its index size_of_z is of controller.z.x, which the batch engine cannot run; "
         "use --engine fmu"
     )
 
@@ -258,7 +258,7 @@ def test_other_systems_are_refused_by_what_differs(tmp_path):
     for text, why in (
         ('only = ["plant"]', "it has no controller"),
         (f'[components]\nplant = "{other}"', f"its plant is {other}"),
-        ('[components]\nmore = "MotionPlanner"', "it has more besides"),
+        ('[components]\nmore = "MotionPlanner"', "it also has more"),
         ('[wires]\n"controller.y" = false', "it has no wire plant.y.x -> controller.y.x"),
         (
             '[wires]\n"controller.y_d" = "plant.y"',
@@ -269,7 +269,7 @@ def test_other_systems_are_refused_by_what_differs(tmp_path):
         with pytest.raises(InputError) as refused:
             BatchEngine({"own": load(str(own), KIND)}, KIND)
         assert str(refused.value) == (
-            f"own: {why}, which the batch engine cannot make; use --engine fmu"
+            f"own: {why}, which the batch engine cannot run; use --engine fmu"
         )
 
 

@@ -246,7 +246,7 @@ def changed(file: str, old: str, new: str) -> dict[str, str]:
         ({"fmi-ls-manifest.xml": "<fmiReferences/>"}, "no results"),
         (
             {"fmi-ls-manifest.xml": '<!DOCTYPE a [<!ENTITY b "c">]><fmiReferences/>'},
-            "fmi-ls-manifest.xml type",
+            "fmi-ls-manifest.xml DOCTYPE",
         ),
         (changed("fmi-ls-manifest.xml", "tests/smoke", "smoke"), "'smoke.exp'"),
         ({"tests/smoke.exp": "<Experiments/>"}, "tests/smoke.exp no experiment"),
@@ -264,7 +264,7 @@ def changed(file: str, old: str, new: str) -> dict[str, str]:
         (changed("tests/smoke.exp", '"out.csv"', '"../../../modelDescription.csv"'), "modelDesc"),
         (changed("tests/smoke.exp", '"out.csv"', '"../../../../secret.csv"'), "secret.csv"),
         (changed("tests/smoke.exp", '"out.csv"', '"/etc/passwd"'), "/etc/passwd"),
-        (changed("tests/smoke.exp", '"out.csv"', '"https://a.example/b.csv"'), "elsewhere"),
+        (changed("tests/smoke.exp", '"out.csv"', '"https://a.example/b.csv"'), "is not in the FMU"),
         (
             changed("tests/smoke.exp", '"out.csv"', '"o.h5" type="application/hdf5"'),
             "hdf5 text/csv",

@@ -272,7 +272,7 @@ def test_a_run_that_an_event_stops_has_not_failed(workplace: Path, capsys):
 
 
 def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, capsys):
-    left = "fault-sensor: the system comes without the scenario's events"
+    left = "fault-sensor: only the system is used, without the scenario's events"
     assert main(["export", "fault-sensor", "--kind", "native"]) == 0
     assert f"auv-fmu: warning: {left}" in capsys.readouterr().err.splitlines()
     with pytest.warns(UserWarning, match=left):

@@ -353,8 +353,8 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
     assert process.returncode == 2
     [left] = Path("moved").glob(".auv-fmu-*")
     assert line == (
-        "auv-fmu: results/fig4 was moved or deleted while it was written, and the results "
-        f"went with it, in {left.name}"
+        "auv-fmu: results/fig4 was moved or deleted while it was written, along "
+        f"with the results in {left.name}"
     )
     assert rows(left)[0, 0] == 0.0
 

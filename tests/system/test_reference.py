@@ -267,7 +267,7 @@ def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
     short = verify(path, system, 1e-9).splitlines()
     assert short[4] == (
         "not in the table: 68, such as plant.eta.y, plant.eta.z, plant.eta.phi, plant.eta.theta, "
-        "plant.eta.psi (--verbose names all)"
+        "plant.eta.psi (--verbose lists all)"
     )
     compared, *others = verify(path, system, 1e-9, verbose=True).splitlines()
     assert numbers_in(compared) == [2, 70, 1e-9, 100, 0.02, 2]

@@ -4,7 +4,7 @@
 enum { MOST_VALUES = 1 << 20 };
 
 static string wrong_size(size_t n, const void *array) {
-    if (n > MOST_VALUES) return "more values than there can be";
+    if (n > MOST_VALUES) return "too many values";
     return n > 0 && array == NULL ? "no array" : NULL;
 }
 

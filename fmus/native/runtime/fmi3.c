@@ -148,7 +148,7 @@ EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_s
 /* Values. All variables are scalars: there are as many values as references. */
 
 static string wrong_numbers(size_t n, const uint32_t r[], const void *values, size_t n_values) {
-    return n == n_values ? wrong_values(n, r, values) : "not as many values as references";
+    return n == n_values ? wrong_values(n, r, values) : "the numbers of values and of references differ";
 }
 
 #define GET(name, type, get)                                                                     \

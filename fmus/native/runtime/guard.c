@@ -35,7 +35,7 @@ static int sound(call *this, string wrong) {
 static APART void end_and_tell(call *this) {
     if (this->instance->no_memory) {
         this->instance->no_memory = 0;
-        sound(this, "no memory");
+        sound(this, "out of memory");
     }
     let_go_and_tell(this->entry);
 }
@@ -90,7 +90,7 @@ static int can_be_made(string wrong, string name, string token, message *why) {
     } else if (token != NULL && !is_utf8(token)) {
         compose(why, "the %s is not UTF-8", version.token);
     } else if (token != NULL && token[0] != '\0' && !same_token(token, MODEL_GUID)) {
-        compose(why, "%s %s is not the one of this FMU, %s", version.token, token, MODEL_GUID);
+        compose(why, "%s %s does not match this FMU's, %s", version.token, token, MODEL_GUID);
     } else {
         return 1;
     }
@@ -119,7 +119,7 @@ static void *instantiate(string function, string wrong, string name, string toke
         renew(it);
         it->last_successful_time = NAN;
         handle = new_handle(INSTANCE, it, NULL);
-        if (handle == NULL) compose(&why, "no memory");
+        if (handle == NULL) compose(&why, "out of memory");
     }
     if (handle == NULL) {
         /* Last of all: the logger need not come back. */

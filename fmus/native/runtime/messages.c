@@ -59,7 +59,7 @@ static void say(instance *it, message *said, int status, string key) {
     }
     if (it->n_said == MOST_MESSAGES) return;
     it->said[it->n_said++] = sum;
-    if (it->n_said == MOST_MESSAGES) append_text(said, "; what comes after this is not logged");
+    if (it->n_said == MOST_MESSAGES) append_text(said, "; further messages are not logged");
     tell(it, status, said->text);
 }
 

@@ -219,7 +219,7 @@ static int take_noise(reader *from, generator *noise, message *why) {
     noise->has_next = take_truth(from);
     noise->next = take_real(from);
     if (noise->place > GENERATOR_WORDS || noise->has_next < 0) {
-        return compose(why, "its noise generator is in an impossible state");
+        return compose(why, "its noise generator has an invalid state");
     }
     return isfinite(noise->next) || compose(why, "its noise is not finite");
 }
@@ -299,7 +299,7 @@ static int can_be_reached(run *it, message *why) {
     model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
     if (error.raised) return compose(why, "%s", error.why);
     if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
-        return compose(why, "its outputs do not belong to its state");
+        return compose(why, "its outputs do not match its state");
     }
     return 1;
 }
@@ -434,7 +434,7 @@ static void serialise_state(call *this, void *state, unsigned char bytes[], size
         memcpy(bytes, it->bytes, size);
     }
     let_go(held);
-    sound(this, fits ? NULL : "the state has another size");
+    sound(this, fits ? NULL : "the state has a different size");
 }
 
 static void deserialise_state(call *this, const unsigned char bytes[], size_t size, void **state) {

@@ -83,7 +83,7 @@ static component new_component(instance *it, string guid, string path, int visib
 
 EXPORT component fmi2Instantiate(string name, int type, string guid, string location,
                                  const callbacks *functions, int visible, int logging) {
-    char why[WHY] = "the slave cannot be made", *path = NULL;
+    char why[WHY] = "the slave cannot be created", *path = NULL;
     string wrong = name == NULL              ? "the instance has no name"
                    : !is_utf8(name)          ? "the name of the instance is not UTF-8"
                    : type != CO_SIMULATION   ? "this FMU is for co-simulation only"
@@ -151,7 +151,7 @@ EXPORT int fmi2Reset(component c) {
 EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names[]) {
     call this = begin(c, "fmi2SetDebugLogging", ALWAYS);
     if (GOES_ON(this, wrong_texts(n, names)) && !choose(&this.instance->host, on, n, names)) {
-        refuse(&this, "no memory");
+        refuse(&this, "out of memory");
     }
     return end(&this);
 }
@@ -206,7 +206,7 @@ static void hand_over(call *this, component owner, void *made, void **state) {
         free_state(this->instance, before);
     } else if ((*state = new_handle(STATE, made, owner)) == NULL) {
         free_state(this->instance, made);
-        refuse(this, "no memory");
+        refuse(this, "out of memory");
     }
 }
 
@@ -265,7 +265,7 @@ EXPORT int fmi2SerializeFMUstate(component c, void *state, char bytes[], size_t 
         void *object = thing_of(state, STATE);
         py.Py_IncRef(object);
         size_t needed = size_of_state(&this, object);
-        if (GOES_ON(this, size != needed ? "the state has another size" : NULL)) {
+        if (GOES_ON(this, size != needed ? "the state has a different size" : NULL)) {
             TO_PYTHONFMU(this, fmi2SerializeFMUstate, (component, void *, char *, size_t),
                          (this.instance->slave, object, bytes, size));
         }

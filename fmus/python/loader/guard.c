@@ -152,7 +152,7 @@ int end(call *this) {
     if (exception(why) && this->status < FMI_ERROR) refuse(this, why);
     if (this->status == FMI_FATAL && it->condition != LOST) {
         it->condition = LOST;
-        if (!it->told) complain(it, FMI_FATAL, "%s: failed for good", this->function);
+        if (!it->told) complain(it, FMI_FATAL, "%s: failed permanently", this->function);
     }
     it->busy = 0;
     give_back_and_tell(this);

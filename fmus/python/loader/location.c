@@ -18,7 +18,7 @@ static int read_otherwise(string path) {
 int plain_path(string uri, char **path, char *why) {
     char *end = *path = malloc(strlen(uri) + 1);
     if (end == NULL) {
-        snprintf(why, WHY, "no memory");
+        snprintf(why, WHY, "out of memory");
         return 0;
     }
     if (strncmp(uri, "file://", 7) == 0) {

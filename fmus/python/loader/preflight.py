@@ -59,7 +59,7 @@ def _check(resources: str, guid: str) -> None:
     if sound is None or sound.script not in sys.modules or _stamps(sound.files) != sound.stamps:
         sound = _sound[resources] = _examined(resources)
     if guid and guid.strip("{}").lower() != sound.guid.strip("{}").lower():
-        raise ValueError(f"GUID {guid} is not the one of this FMU, {sound.guid}")
+        raise ValueError(f"GUID {guid} does not match this FMU's, {sound.guid}")
 
 
 def _stamps(files: list[str]) -> list[tuple[int, int, int]]:

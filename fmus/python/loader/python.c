@@ -115,7 +115,7 @@ typedef struct {
 static int succeeded(python_status status) {
     if (status.type == 0) return 1;
     snprintf(process.why, WHY, "Python does not start: %s",
-             status.message != NULL ? status.message : "it gives no reason");
+             status.message != NULL ? status.message : "no reason given");
     return 0;
 }
 
@@ -154,7 +154,7 @@ static int load_pythonfmu(char *why) {
         snprintf(why, WHY, "cannot load PythonFMU's library: %s",
                  companion[0] == '\0' ? "its path is too long" : dlerror());
     } else if (dlsym(library, "finalizePythonInterpreter") == NULL) {
-        snprintf(why, WHY, "the library beside the loader is not PythonFMU's");
+        snprintf(why, WHY, "the library next to the loader is not PythonFMU's");
     } else {
         pythonfmu = library;
     }
@@ -213,7 +213,7 @@ int exception(char *why) {
     py.PyErr_Fetch(&type, &value, &trace);
     void *words = py.PyObject_Repr(value != NULL ? value : type);
     string text = words != NULL ? py.PyUnicode_AsUTF8(words) : NULL;
-    snprintf(why, WHY, "%s", text != NULL ? text : "an exception without words");
+    snprintf(why, WHY, "%s", text != NULL ? text : "an exception without a message");
     py.PyErr_Clear();
     py.Py_DecRef(words);
     py.Py_DecRef(trace);

@@ -210,7 +210,7 @@ def _ran(
         raise InputError(f"does not run FMI {fmi}")
     python = Path(sys.executable)
     if host.pins:
-        installing = f"{label} is being installed into an environment of its own"
+        installing = f"{label} is being installed into its own environment"
         python = python_with(host.pins, lambda: told(installing))
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as name:
         folder = Path(name)

@@ -106,5 +106,5 @@ def _run(command: Sequence[str]) -> None:
             raise
     if process.returncode != 0:
         unreached = any(_UNREACHED in line for line in lines)
-        why = "pip reaches no package index" if unreached else lines[-1].removeprefix("ERROR: ")
+        why = "pip cannot reach a package index" if unreached else lines[-1].removeprefix("ERROR: ")
         raise InputError(f"cannot be installed: {why}")

@@ -76,7 +76,7 @@ def check_parameters(system: System, host: str) -> None:
     """
     for name, value in system.parameters.items():
         if system.components[name.component].starts.get(name.port) != value:
-            raise InputError(f"{host} applies no parameters, and {name} is {value} here")
+            raise InputError(f"{host} cannot set parameters, and the system has {name} = {value}")
 
 
 def _names(system: System, between: str = ".") -> list[str]:
@@ -140,7 +140,7 @@ def libcosim_osp(system: System, experiment: Experiment, folder: Path) -> Ran:
 def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
     if experiment.start_time != 0.0:
         # It tells the FMUs a start time, and then steps them from 0 s.
-        raise InputError(f"ecos runs from 0 s only, not from {experiment.start_time:g} s")
+        raise InputError(f"ecos can start at 0 s only, not at {experiment.start_time:g} s")
     # ecospy needs libtbb, which the wheel tbb puts where the loader does not look.
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)

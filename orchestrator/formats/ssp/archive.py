@@ -87,8 +87,8 @@ class _Reader:
         if namespace is None and prefix:
             self._note(f"the prefix {prefix!r} is not declared")
         elif not self._open and namespace not in NAMESPACES:
-            where = f"the namespace {namespace!r}" if namespace else "no namespace"
-            self._note(f"elements are in {where}, which does not belong to SSP")
+            where = f"in the namespace {namespace!r}" if namespace else "without a namespace"
+            self._note(f"elements are {where}, which is not SSP's")
         self.builder.start(name, plain)
 
     def end(self, tag: str) -> None:
@@ -99,7 +99,7 @@ class _Reader:
 
     def doctype(self, *_: object) -> None:
         """Refuse what could name further files, or unfold into more than memory holds."""
-        raise ValueError("it has a document type, which files of an SSP must not have")
+        raise ValueError("it has a DOCTYPE, which is not allowed")
 
 
 class Archive:

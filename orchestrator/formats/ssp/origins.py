@@ -148,7 +148,7 @@ def _add(found: dict[Node, Segment], group: Group, connection: Element) -> None:
     start, end = (_End.of(group, connection, which) for which in ("start", "end"))
     named = f"{start.node} -> {end.node}"
     if (start.takes and end.takes) or (start.gives and end.gives):
-        both = "take their value from elsewhere" if start.takes else "give one"
+        both = "take a value" if start.takes else "give one"
         raise InputError(f"{named}: cannot be connected, as both {both}")
     # The standard lets a connection be written from either end.
     source, target = (end, start) if start.takes or end.gives else (start, end)
@@ -213,7 +213,7 @@ class _End:
             if isinstance(element, Leaf) and element.component is not None:
                 element.component.variable(port)
             raise InputError(
-                f"a connection to {Node(element.way, port)}, which is not there"
+                f"a connection to {Node(element.way, port)}, which does not exist"
                 f"{did_you_mean(port, element.connectors)}"
             )
         outwards, inwards = connector.causality in GIVES, connector.causality in TAKES

@@ -226,7 +226,7 @@ class _Ports:
         while at not in self._arrivals and (segment := self._segments.get(at)) is not None:
             if at in upstream or segment.source in self._circling:
                 self._circling.update(upstream, [at])
-                raise InputError(f"{node}: the connections that feed it lead in a circle")
+                raise InputError(f"{node}: the connections that feed it form a circle")
             upstream[at] = segment
             at = segment.source
         arrival = self._arrivals.get(at) or self._setting_out(at)

@@ -340,7 +340,7 @@ def _compiled(component: Component, sources: Sources) -> bytes:
     assert run is not None
     warnings.warn(
         f"{component.fmu.name} has no binary for this machine, {_platform(component)}: its C "
-        "sources are compiled now, and kept",
+        "sources are compiled now and kept for later runs",
         stacklevel=2,
     )
     cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)

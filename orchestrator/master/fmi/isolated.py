@@ -336,7 +336,7 @@ class IsolatedInstance:
         self._told = len(self._theirs)
         for status, text in messages:
             if status not in _STATUSES:
-                raise ValueError("it uses a status unknown to FMI")
+                raise ValueError("it returned a status that FMI does not define")
             self._log.take(int(status), _line(text))
         if failed is not None:
             raise ComponentFailed(_line(failed), bool(fatal))
@@ -361,7 +361,7 @@ class IsolatedInstance:
 
     def _nonsense(self, error: BaseException | None = None) -> ComponentFailed:
         why = "" if error is None else f": {reason(error)}"
-        text = f"{self.name}: its process answers nonsense in {self._doing}{why}"
+        text = f"{self.name}: its process sent an invalid answer in {self._doing}{why}"
         return ComponentFailed(text, fatal=True)
 
     def _lost(self) -> ComponentFailed:
@@ -383,7 +383,7 @@ def _line(value: str) -> str:
 
 def _how_it_ended(status: int | None) -> str:
     if status is None:
-        return "answers no more"
+        return "no longer answers"
     if status >= 0:
         return f"exited with status {status}"
     names = {number.value: number.name for number in signal.Signals}

@@ -290,13 +290,13 @@ class LoadedInstance:
             time := self._fmu.returned_at()
         ) is not None:
             return ComponentFailed(
-                f"{self.name}: has returned from its step early, at {time:.12g} s, which it was "
-                "not allowed to"
+                f"{self.name}: returned early from its step, at {time:.12g} s, without being "
+                "allowed to"
             )
         if status == fmi2Pending:
             return ComponentFailed(
-                f"{self.name}: its step continues after {function}, and its description does not "
-                "say so (canRunAsynchronuously)"
+                f"{self.name}: its step continues after {function}, although its description does "
+                "not say so (canRunAsynchronuously)"
             )
         return self._failed(FMICallException(function=function, status=status))
 

@@ -93,7 +93,7 @@ def isolate_instances(
     if not can_isolate():
         raise InputError(
             f"{', '.join(components)}: FMUs cannot be run in separate processes on Windows: leave "
-            "--isolate out; and of an FMU that allows one instance in a process, use one"
+            "out --isolate, and use an FMU that allows one instance per process only once"
         )
     with ExitStack() as stack:
         try:

@@ -179,7 +179,7 @@ class _Captured:
                 _show(shown.encode())
                 self._left -= len(text)
                 if self._left <= 0:
-                    _show(f"\nauv-fmu: {self._name}: writes more than is shown\n".encode())
+                    _show(f"\nauv-fmu: {self._name}: further output is not shown\n".encode())
 
 
 class _Children:

@@ -100,7 +100,7 @@ class Channel:
         if length == 0.0:
             return None
         if not 1.0 <= length <= longest:
-            raise ValueError(f"a note of {length:g} bytes, where {longest:,} are the most")
+            raise ValueError(f"a message of {length:g} bytes, more than {longest:,}")
         text = bytearray(int(length))
         self._move(self._connection.recv_into, memoryview(text))
         return json.loads(text, object_hook=_from_text)

@@ -88,8 +88,8 @@ class RowLog:
                 self._digest.update(rows.astype(_NUMBER, copy=False).tobytes())
         if not is_whole or self._digest.hexdigest() != digest:
             raise InputError(
-                f"{path}: missing, damaged, or of another checkpoint; move it and the checkpoint "
-                "beside it, or let --force move both aside"
+                f"{path}: missing, damaged, or from another checkpoint; move it and the checkpoint "
+                "next to it, or let --force move both aside"
             )
         self._file = path.open("r+b")
         there = (path.stat().st_size - _BEGIN) // row

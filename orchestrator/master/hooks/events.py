@@ -75,7 +75,7 @@ def _tune(run: Run, target: PortName, value: Value) -> None:
     held = instance.read([target.port])[target.port]
     if not same(value, held):
         raise ComponentFailed(
-            f"{target} was set to {literal(value)}, and the FMU holds {literal(held)}"
+            f"{target} was set to {literal(value)}, but the FMU holds {literal(held)}"
         )
 
 

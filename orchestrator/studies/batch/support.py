@@ -60,7 +60,7 @@ def unsupported(system: System, fmus: Path) -> str:
         if _contents(system.components[name]) not in choices:
             return f"its {name} is {system.components[name].fmu}"
     for name in system.components.keys() - wanted:
-        return f"it has {name} besides"
+        return f"it also has {name}"
     connections, wires = set(system.connections), set(standard.connections)
     if system.components["controller"].fmu.stem == _TOLD:
         wires |= _VELOCITY

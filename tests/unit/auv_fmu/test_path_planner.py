@@ -185,7 +185,7 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
     [
         ({"waypoints": CORNER, "speed_max": 0.4}, r"near waypoint 1, .* a speed of 0\.4.* 0\.4;"),
         ({"waypoints": CORNER, "turn_max": 0.4}, r"near waypoint 2, at \(19.* a turn of 0\.4"),
-        ({"waypoints": path((0, 0, 0), (20, 0, 0), rounding=0.2)}, "waypoint 1.* driving force of"),
+        ({"waypoints": path((0, 0, 0), (20, 0, 0), rounding=0.2)}, "waypoint 1.* surge force of"),
         ({"waypoints": CORNER._replace(rounding=1.0)}, r"at \(19\..*more tightly than .* 0.35 m"),
         ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 0))}, "back on the spot at waypoint 2"),
         ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 1e-12))}, "back on the spot"),
@@ -197,9 +197,9 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
         ({"waypoints": path((0, 0, 0), (9, 0, 0), (9, 0, 0))}, "waypoints 2 and 3 are the same"),
         (
             {"waypoints": path((0, 0, 0), (9, 0, 0), t=(3.0, 3.0))},
-            "waypoint 2 is to be passed at t = 3 s, and the one before it at 3 s",
+            "waypoint 2 has the time 3 s, and the one before it 3 s",
         ),
-        ({"waypoints": path((1, 1, 1), (1, 1, 1), t=(3.0, 9.0))}, "there is no way to go"),
+        ({"waypoints": path((1, 1, 1), (1, 1, 1), t=(3.0, 9.0))}, "there is no path between them"),
         (
             {"waypoints": path((0, 0, 0), UP_80, (0, 0, 20 * tan(radians(80.0))))},
             r"near waypoint 2, at \(9\.9, 0, 56\.7\) m, the path climbs or dives at 90\.0 degrees, "
@@ -210,7 +210,7 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
             r"near waypoint 2, .* climbs or dives at 89\.\d degrees, 4\.\d+ beyond",
         ),
         ({"waypoints": path((0, 0, 0), (1, 0, 5), (0, 0, 10))}, "waypoint 2, .* at 90.0 degrees"),
-        ({"speed_max": 0.49999999}, r"a speed of 0\.5 m/s, 1e-08 beyond the limit of 0\.5; go"),
+        ({"speed_max": 0.49999999}, r"a speed of 0\.5 m/s, 1e-08 beyond the limit of 0\.5; reduce"),
         ({"vehicle": Vehicle(d33=0.0)}, "d22 and d33 must be positive"),
     ],
 )  # fmt: skip

@@ -74,7 +74,7 @@ function tune(run: Run, target: string, value: Value): void {
   instance.set(new Map([[port, value]]));
   const held = instance.read(port);
   if (!same(value, held)) {
-    throw new ComponentFailed(`${target} was set to ${value}, and the FMU holds ${held}`);
+    throw new ComponentFailed(`${target} was set to ${value}, but the FMU holds ${held}`);
   }
 }
 

@@ -80,7 +80,7 @@ export class EventsForm {
     input.setAttribute("aria-label", kind === "at" ? `${label}: time` : `${label}: duration`);
     if (kind === "for") {
       input.placeholder = "always";
-      input.title = "how long it lasts; empty: for good";
+      input.title = "how long it lasts; empty: until the run ends";
     }
     input.addEventListener("change", () => {
       const text = input.value.trim();

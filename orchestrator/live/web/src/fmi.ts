@@ -62,7 +62,7 @@ export class Machine {
 
   allocate(bytes: number): number {
     const address = this.call("malloc")(Math.max(bytes, 1));
-    if (address === 0) throw new ComponentFailed("there is not enough memory");
+    if (address === 0) throw new ComponentFailed("out of memory");
     return address;
   }
 

@@ -102,7 +102,7 @@ export class Page {
       canvas.remove();
       const note = document.createElement("p");
       note.className = "missing";
-      note.textContent = "This browser has no WebGL: the path in space is left out.";
+      note.textContent = "This browser has no WebGL: the path in space is not shown.";
       host.append(note);
       return undefined;
     }
@@ -345,7 +345,7 @@ export class Page {
 
   /** Whether the rows that are shown are the ones of the settings; if not, it says why. */
   #isRun(): boolean {
-    if (this.#refusal) this.#say(`Not yet: ${this.#refusal}`);
+    if (this.#refusal) this.#say(`Not run: ${this.#refusal}`);
     return !this.#refusal;
   }
 
@@ -374,7 +374,7 @@ export class Page {
       area.value = text;
       document.body.append(area);
       area.select();
-      this.#say(document.execCommand("copy") ? done : "This browser does not let the page copy");
+      this.#say(document.execCommand("copy") ? done : "This browser blocks copying");
       area.remove();
     }
   }

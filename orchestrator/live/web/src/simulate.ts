@@ -142,7 +142,7 @@ class Simulation {
     let rounds = 0;
     while (handOn(false)) {
       rounds += 1;
-      if (rounds === MOST_ROUNDS) throw new Refusal("values do not come to rest");
+      if (rounds === MOST_ROUNDS) throw new Refusal("an algebraic loop does not converge");
     }
     this.checkFinite();
     for (const instance of instances.values()) instance.exitInitialization();

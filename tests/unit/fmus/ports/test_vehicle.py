@@ -26,7 +26,7 @@ def test_parameters_of_equation_2_are_declared_with_their_units_and_bounds():
             assert port.minimum is not None and port.minimum > 0.0, (
                 "accelerations are divided by it"
             )
-            assert port.description == f"Mass or inertia with added mass: {name[1:]}"
+            assert port.description == f"Mass or inertia including added mass: {name[1:]}"
         elif name.startswith("d"):
             assert port.minimum == 0.0, "damping takes energy"
             assert port.description == f"Linear damping: {name[1:]}"

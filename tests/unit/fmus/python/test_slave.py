@@ -171,7 +171,7 @@ def test_the_last_message_says_that_it_is_the_last(slave, monkeypatch):
     first, last = messages_of(slave)
     assert answers_of(slave) == [Fmi2Status.error] * 3
     assert first == "no Real has the value reference 97"
-    assert last == "no Real has the value reference 98; what comes after this is not logged"
+    assert last == "no Real has the value reference 98; further messages are not logged"
 
 
 def test_without_a_loader_only_a_state_leads_out_of_a_refused_one(slave):

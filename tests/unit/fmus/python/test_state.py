@@ -242,7 +242,7 @@ def test_reference_of_another_state_is_refused():
     driver.step()
     saved = driver.slave._get_fmu_state()
     driver.slave._set_fmu_state({**saved, "outputs": [1.0, *saved["outputs"][1:]]})
-    assert "do not belong to its state" in driver.messages()[0]
+    assert "do not match its state" in driver.messages()[0]
 
 
 def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):

@@ -128,7 +128,7 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
         folder.mkdir()
         assert list(draw_figures(entries, "A_f and A_d", columns(), folder)) == [
             "figure drift skipped: no run has largest_drift",
-            "figure many skipped: by tells 25 parts of the runs apart",
+            "figure many skipped: by splits the runs into 25 parts, more than 12",
         ]
     found = contents(tmp_path / "a")
     assert found.keys() == {"error.png", "error.svg", "effort.png", "effort.svg"}

@@ -17,7 +17,7 @@ from orchestrator.machine.errors import InputError
         ("", "it is empty"),
         ("x,y\n1,2\n", "first column is 'x'"),
         ("time,a\n1,2\n3\n", "columns changed"),
-        ("time,a\n1,2,3\n4,5,6\n", "rows of 3 values below 2 names"),
+        ("time,a\n1,2,3\n4,5,6\n", "rows of 3 values for 2 columns"),
         ("time,a\n1,much\n", "much"),
         ("time,a\n\xff\n", "decode"),
     ],

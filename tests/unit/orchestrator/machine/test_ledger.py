@@ -84,7 +84,7 @@ def test_a_forged_ledger_does_not_lead_out_of_the_folder(tmp_path: Path, name, e
     content[entry] = [name] if entry == "leaving" else {name: "0" * 64}
     (tmp_path / "r").mkdir()
     (tmp_path / "r" / LEDGER).write_text(sealed(content))
-    with pytest.raises(Taken, match="damaged, or not by auv-fmu"):
+    with pytest.raises(Taken, match="damaged or not from auv-fmu"):
         Ledger(tmp_path / "r")
 
 

@@ -52,6 +52,6 @@ def _swallow() -> None:
 
 
 def test_a_process_that_dies_is_said_in_a_line():
-    with pytest.raises(InputError, match="a process has died while it made a run"), workers() as w:
+    with pytest.raises(InputError, match="a process died while it made a run"), workers() as w:
         list(w.results({0: partial(os._exit, 3)}, "run"))
     assert active_children() == []

@@ -33,7 +33,7 @@ def test_sound_folder_is_sound_again(resources: Path, guid: str):
 
 def test_wrong_guid_is_refused_whenever_it_comes(resources: Path):
     for _ in range(2):
-        assert "is not the one of this FMU" in refusal(str(resources), "{89abcdef}")
+        assert "does not match this FMU's" in refusal(str(resources), "{89abcdef}")
         assert refusal(str(resources), GUID) == ""
 
 

@@ -65,7 +65,7 @@ class OneByOne(reader._Ports):
         nodes, ways = [node], []
         while (segment := segments.get(nodes[0])) is not None:
             if segment.source in nodes:
-                raise InputError(f"{node}: the connections that feed it lead in a circle")
+                raise InputError(f"{node}: the connections that feed it form a circle")
             nodes.insert(0, segment.source)
             ways.insert(0, segment)
 

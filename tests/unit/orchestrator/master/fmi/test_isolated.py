@@ -172,7 +172,7 @@ def test_whatever_is_answered_ends_in_a_line_with_the_rows_before_it(system, n, 
 def test_numbers_that_no_fmu_can_give_are_none(system: System, outputs, length):
     table = run(system, BEFORE + 2, length, outputs, b"")
     assert table.failure is not None
-    assert "a: its process answers nonsense in doStep" in table.failure
+    assert "a: its process sent an invalid answer in doStep" in table.failure
     assert len(table) == 3
 
 

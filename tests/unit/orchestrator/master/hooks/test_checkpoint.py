@@ -146,7 +146,7 @@ def test_what_counts_is_as_it_was(path: Path, place: int):
     content = bytearray(path.read_bytes())
     content[place] ^= 1
     path.write_bytes(content)
-    with pytest.raises(InputError, match="missing, damaged, or of another checkpoint"):
+    with pytest.raises(InputError, match="missing, damaged, or from another checkpoint"):
         RowLog(path, ID, 3, 100, digest(100))
 
 

@@ -196,7 +196,7 @@ def test_what_is_set_is_what_is_altered():
 
 def test_a_parameter_that_is_not_taken_ends_the_run():
     trial = Trial([event(Set(((GAIN, 3.0),), ()), at=0.0)], np.zeros(STEPS + 1), stubborn=True)
-    with pytest.raises(ComponentFailed, match=r"a\.gain was set to 3\.0, and the FMU holds 1\.0"):
+    with pytest.raises(ComponentFailed, match=r"a\.gain was set to 3\.0, but the FMU holds 1\.0"):
         trial.step()
 
 
