@@ -118,7 +118,7 @@ class ScenarioFile(TomlTable):
         "none",
     )
     stop_time: float = entry("End of the run [s].", "100 s")
-    step: float = entry("Communication step [s].", "0.02 s")
+    step: float = entry("Communication step [s].", "the default of the FMUs; 0.02 s in the bundle")
     steps: dict[str, float] = entry(
         "Components that take longer steps, as `component = step` [s], a multiple of "
         "the communication step. Meanwhile they hold their inputs.",
