@@ -1,7 +1,7 @@
 """What the site has beside the pages of docs/: a hook of `mkdocs build`.
 
 - Pages of the repository's root, under `contributing` and `explanation`.
-- The notebook as a page.
+- The notebook as a page, with the output of its cells.
 - The live page, where npm and a compiler can make it; otherwise a page that says why it is missing.
 
 Links work in a plain checkout too, so they name files of the repository. Here they become links to
@@ -10,16 +10,19 @@ the site's pages; a link to a file that the site does not have becomes plain tex
 
 from __future__ import annotations
 
-import json
 import logging
 import posixpath
 import re
+from base64 import b64decode
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+import nbformat
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from nbclient import NotebookClient
 
 from orchestrator.live import assembly
 from orchestrator.machine.errors import InputError
@@ -66,8 +69,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         files.append(File.generated(config, place, content=text))
     for notebook in [file for file in files if file.src_uri.endswith(".ipynb")]:
         files.remove(notebook)
-        text = notebook_text(Path(str(notebook.abs_src_path)))
-        files.append(File.generated(config, page_of(notebook.src_uri), content=text))
+        page = page_of(notebook.src_uri)
+        text, pictures = run_notebook(Path(str(notebook.abs_src_path)))
+        files.append(File.generated(config, page, content=text))
+        for name, content in pictures.items():
+            place = posixpath.join(posixpath.dirname(page), name)
+            files.append(File.generated(config, place, content=content))
     global _why_not
     page, _why_not = live_page()
     files.append(File.generated(config, LIVE, content=page))
@@ -140,15 +147,30 @@ def page_of(name: str) -> str:
     return name.removesuffix(".ipynb") + ".md" if name.endswith(".ipynb") else name
 
 
-def notebook_text(notebook: Path) -> str:
-    """A notebook as a page."""
-    cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    return "\n\n".join(
-        f"```python\n{''.join(cell['source'])}\n```"
-        if cell["cell_type"] == "code"
-        else re.sub(r"\$(\w+)\$", r"`\1`", "".join(cell["source"]))
-        for cell in cells
-    )
+def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
+    """A notebook as a page, with what its cells print and draw; and its pictures by their names."""
+    notebook = nbformat.read(path, as_version=4)
+    with TemporaryDirectory() as folder:
+        NotebookClient(notebook, resources={"metadata": {"path": folder}}).execute()
+    parts: list[str] = []
+    pictures: dict[str, bytes] = {}
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            parts.append(re.sub(r"\$(\w+)\$", r"`\1`", cell.source))
+            continue
+        parts.append(f"```python\n{cell.source}\n```")
+        for output in cell.outputs:
+            data = output.get("data", {"text/plain": output.get("text", "")})
+            if "image/png" in data:
+                name = f"{path.stem}-{len(pictures) + 1}.png"
+                pictures[name] = b64decode(data["image/png"])
+                parts.append(f"![The figure that this code draws]({name})")
+            elif "text/html" in data:
+                plain = data["text/html"].replace(' border="1" class="dataframe"', "")
+                parts.append(f"<div>\n{plain}\n</div>")
+            else:
+                parts.append(f"```text\n{data['text/plain'].rstrip()}\n```")
+    return "\n\n".join(parts), pictures
 
 
 def live_page() -> tuple[str, str]:
