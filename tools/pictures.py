@@ -40,7 +40,7 @@ def main() -> None:
         for name in () if folders else names():
             auv_fmu(["run", name, "--out", f"{drawn}/{name}"])
             picture = Image.open(Path(drawn, name, f"{name}.png")).convert("RGB")
-            _keep(picture.quantize(_COLOURS), f"{name}.png")
+            _keep(picture.quantize(_COLOURS, kmeans=1), f"{name}.png")
     for folder in folders:
         result = StudyResult(folder)
         study = read_study(result.record["study"])
