@@ -14,7 +14,6 @@ from typing import Any
 
 from fmpy.model_description import ModelVariable
 
-from auv_fmu import __version__
 from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
 from orchestrator.machine.errors import InputError
@@ -64,13 +63,15 @@ def page_data(opened: str) -> Plain:
         opened: a scenario of the bundle, or the path of a file.
 
     Raises:
-        InputError: there is no such scenario, or the page cannot run it.
+        InputError: there is no such scenario, or it or the page cannot run it.
 
     """
     first = preset(opened)
+    for run in runs_of(opened):
+        # What an FMU refuses is refused here, before there is a page.
+        run.run([])
     others = [preset(name) for name in names() if name != first["name"]]
     return {
-        "version": __version__,
         "opened": first["name"],
         "fmus": {name: _fmu(component) for name, component in bundle().items()},
         "presets": sorted([first, *others], key=itemgetter("name")),
@@ -105,7 +106,6 @@ def preset(name: str) -> Plain:
         "stopTime": experiment.stop_time,
         "step": experiment.step,
         "events": scenario.name if scenario.events else "",
-        "comparing": bool(read_scenario(name).compare),
         "loops": loops,
     }
 
@@ -174,6 +174,7 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     return {
         "label": scenario.label or label or scenario.name,
         "components": {name: _type(part) for name, part in system.components.items()},
+        "head": {"order": scenario.order, "only": [*scenario.only], "wires": {**scenario.wires}},
         "initial": [
             _stage([name], system.feeding[name])
             for names in stages(system, GAUSS_SEIDEL)
@@ -203,33 +204,26 @@ def _parameters(system: System) -> Iterator[Plain]:
                 continue
             start = component.start(variable.name)
             value = system.parameters.get(PortName(name, variable.name), start)
-            found = {
-                **_described(variable),
+            found: Plain = {
                 "name": f"{name}.{variable.name}",
+                "type": variable.type,
+                "description": variable.description or "",
                 "default": start,
                 "value": value,
-                "tunable": is_input or variable.variability == "tunable",
             }
+            if variable.unit:
+                found["unit"] = variable.unit
+            for end in ("min", "max"):
+                if (text := getattr(variable, end)) is not None:
+                    found[end] = float(text)
             if choices := ports[variable.name].choices:
                 found["choices"] = list(choices)
             yield found
 
 
-def _described(variable: ModelVariable) -> Plain:
-    """What is the same of a variable wherever it is."""
-    found: Plain = {"type": variable.type, "description": variable.description or ""}
-    if variable.unit:
-        found["unit"] = variable.unit
-    for end in ("min", "max"):
-        if (text := getattr(variable, end)) is not None:
-            found[end] = float(text)
-    return found
-
-
 def _fmu(component: Component) -> Plain:
     return {
         "guid": component.description.guid,
-        "description": component.description.description or "",
         "variables": [_variable(component, one) for one in component.variables.values()],
     }
 
@@ -237,11 +231,10 @@ def _fmu(component: Component) -> Plain:
 def _variable(component: Component, variable: ModelVariable) -> Plain:
     start = component.start(variable.name)
     return {
-        **_described(variable),
         "name": variable.name,
+        "type": variable.type,
         "reference": variable.valueReference,
         "causality": variable.causality,
-        "variability": variable.variability,
         **({} if start is None else {"start": start}),
     }
 
@@ -262,7 +255,7 @@ def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
 
     """
     system = replace(prepared.system, step=prepared.experiment.step)
-    tables = {name: [*enumerate(read_scenario(name).events)] for name in names()}
+    tables = {name: [*enumerate(events)] for name, events in _bundled_events().items()}
     # A comparison lacks some of the scenario's events, or has its own, which the page cannot edit.
     places = {id(table): number for number, table in enumerate(owner.events)}
     tables[owner.name] = [
@@ -278,6 +271,12 @@ def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
         for name, some in tables.items()
         if some
     }
+
+
+@cache
+def _bundled_events() -> Mapping[str, Sequence[Mapping[str, Any]]]:
+    """The events of the bundle's scenarios, by their names."""
+    return {name: read_scenario(name).events for name in names()}
 
 
 def _event(number: int, event: Event) -> Plain:

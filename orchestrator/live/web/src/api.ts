@@ -9,8 +9,8 @@ import type { Data, Engine, Result, Value } from "./types";
 export interface Api {
   /**
    * Changes settings, runs, and draws. The names are the ones of links: `component.parameter`,
-   * `stop_time`, `step`, `events`, `preset`, which begins as it is. Settings that are refused
-   * change nothing.
+   * `stop_time`, `step`, `events`, which begin without edits, `hide`, and `preset`, which begins as
+   * it is. Settings that are refused change nothing.
    */
   set(changes: Readonly<Record<string, Value>>): Promise<void>;
   /** The rows of the scenario's own loop, as result.csv has them. */
@@ -31,31 +31,37 @@ function changed(
 ): Settings {
   // A preset that is named begins as it is.
   const fields = new URLSearchParams("preset" in changes ? "" : toHash(settings, data).slice(1));
+  if ("events" in changes) {
+    for (const key of [...fields.keys()]) if (key.startsWith("events.")) fields.delete(key);
+  }
   for (const [name, value] of Object.entries(changes)) fields.set(name, String(value));
   const found = fromHash(fields.toString(), data);
   if (found.unknown.length > 0) throw new Refusal(`not understood: ${found.unknown.join(", ")}`);
   return found.settings;
 }
 
-/** A run of the scenario's own loop. */
-function run(data: Data, engine: Engine, settings: Settings): Result {
-  const preset = presetOf(data, settings.preset);
-  if (preset === undefined) throw new Refusal(`there is no preset ${settings.preset}`);
-  const { values, stopTime, step } = settings;
-  const [loop] = preset.loops;
-  return engine.run(loop, values, { stopTime, step, events: eventsOf(settings, loop) });
+/** A run of each loop that is shown, or of the scenario's own. */
+function* runs(data: Data, engine: Engine, settings: Settings): Generator<Result> {
+  const { preset, values, stopTime, step, hidden } = settings;
+  const { loops } = presetOf(data, preset) ?? data.presets[0];
+  const shown = loops.filter(({ label }) => !hidden.includes(label));
+  for (const loop of shown.length > 0 ? shown : loops.slice(0, 1)) {
+    yield engine.run(loop, values, { stopTime, step, events: eventsOf(settings, loop) });
+  }
 }
 
 /** The interface for scripts over whatever keeps the settings. */
 export function makeApi(data: Data, engine: Engine, keeper: Keeper): Api {
   return {
     async set(changes) {
-      const settings = changed(keeper.settings, data, changes);
-      run(data, engine, settings);
+      const settings = changed(keeper.settings, data, changes ?? {});
+      // All of them, or one of them refuses.
+      Array.from(runs(data, engine, settings));
       keeper.apply(settings);
     },
     async csv() {
-      return csv(run(data, engine, keeper.settings));
+      const [own] = runs(data, engine, { ...keeper.settings, hidden: [] });
+      return csv(own);
     },
   };
 }

@@ -2,6 +2,7 @@
 
 import uPlot from "uplot";
 import type { Lines, Panel, Section, Style } from "./panels";
+import { entered } from "./text";
 import { property } from "./theme";
 
 /** Something that happens: from, until [s], and what. */
@@ -181,6 +182,7 @@ class Chart {
       ctx.stroke();
     }
     ctx.setLineDash([]);
+    let after = -Infinity;
     for (const { from, label } of this.#marks) {
       const x = Math.round(this.#plot.valToPos(from, "x", true)) + 0.5;
       if (!(x >= bbox.left && x <= bbox.left + bbox.width)) continue;
@@ -188,13 +190,13 @@ class Chart {
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      if (this.#named) this.#name(label, x);
+      if (this.#named) after = this.#name(label, x, after);
     }
     ctx.restore();
   }
 
-  /** Writes the name of an event beside its line. */
-  #name(label: string, x: number): void {
+  /** Writes the name of an event at its line, if there is room after the last one; where it ends. */
+  #name(label: string, x: number, after: number): number {
     const { ctx, bbox } = this.#plot;
     const ratio = uPlot.pxRatio;
     ctx.save();
@@ -202,12 +204,25 @@ class Chart {
     ctx.fillStyle = property("--text");
     ctx.strokeStyle = property("--surface");
     ctx.lineWidth = 3 * ratio;
-    const isRight = x + ctx.measureText(label).width + 8 * ratio > bbox.left + bbox.width;
-    ctx.textAlign = isRight ? "right" : "left";
-    const [left, top] = [x + (isRight ? -4 : 4) * ratio, bbox.top + bbox.height - 6 * ratio];
-    ctx.strokeText(label, left, top);
-    ctx.fillText(label, left, top);
+    const width = ctx.measureText(label).width;
+    const left = Math.max(bbox.left, Math.min(x + 4 * ratio, bbox.left + bbox.width - width));
+    const top = bbox.top + bbox.height - 6 * ratio;
+    const hasRoom = left > after;
+    if (hasRoom) {
+      ctx.strokeText(label, left, top);
+      ctx.fillText(label, left, top);
+    }
     ctx.restore();
+    return hasRoom ? left + width : after;
+  }
+
+  /** Draws it even where it is out of sight. */
+  print(): void {
+    if (!this.root.hidden) this.#redraw();
+  }
+
+  destroy(): void {
+    this.#plot.destroy();
   }
 
   set(lines: Lines, marks: readonly Mark[], named: boolean): void {
@@ -289,10 +304,15 @@ export class Charts {
   constructor(host: HTMLElement, scrub: (time: number) => void) {
     this.#host = host;
     this.#scrub = scrub;
+    addEventListener("beforeprint", () => {
+      for (const chart of this.#charts.flat()) chart.print();
+    });
   }
 
-  /** Makes the charts anew. */
+  /** Makes the charts again. */
   build(sections: readonly Section[]): void {
+    // uPlot keeps every plot that is not destroyed.
+    for (const chart of this.#charts.flat()) chart.destroy();
     this.#host.replaceChildren();
     this.#charts = sections.map(({ title, note, panels }, place) => {
       const section = document.createElement("section");
@@ -324,7 +344,7 @@ export class Charts {
     input.inputMode = "decimal";
     input.value = String(this.#from);
     input.addEventListener("change", () => {
-      const from = Number(input.value);
+      const from = entered(input.value);
       input.setAttribute("aria-invalid", String(!(from >= 0)));
       if (!(from >= 0)) return;
       this.#from = from;

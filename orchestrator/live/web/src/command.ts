@@ -28,7 +28,8 @@ function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string
   const components = Object.entries(loop.components).map(
     ([name, type]) => `${name} = ${literal(type)}\n`,
   );
-  const isPd = loop.components.controller === "PdController";
+  const { order, only, wires } = loop.head;
+  const wired = Object.entries(wires).map(([to, from]) => `"${to}" = ${literal(from)}\n`);
   const parameters = loop.parameters.flatMap(({ name, value, default: own }) => {
     const wanted = settings.values[name] ?? value;
     return wanted === own ? [] : [`"${name}" = ${literal(wanted)}\n`];
@@ -37,8 +38,10 @@ function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string
     `title = ${literal(`${preset.name} with the ${loop.label} controller`)}\n`,
     `stop_time = ${literal(settings.stopTime)}\n`,
     `step = ${literal(settings.step)}\n`,
+    order === null ? "" : `order = ${typeof order === "string" ? literal(order) : list(order)}\n`,
+    only.length > 0 ? `only = ${list(only)}\n` : "",
     `\n[components]\n${components.join("")}`,
-    isPd ? '\n[wires]\n"controller.dy" = "plant.dy"\n' : "",
+    wired.length > 0 ? `\n[wires]\n${wired.join("")}` : "",
     `\n[parameters]\n${parameters.join("")}`,
     `\n${toToml(eventsOf(settings, loop))}`,
   ].join("");

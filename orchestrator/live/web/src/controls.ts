@@ -9,6 +9,7 @@ import type { Parameter, Preset, Value } from "./types";
 export class Controls {
   readonly #groups: HTMLElement;
   readonly #list: HTMLElement;
+  readonly #search: HTMLInputElement;
   readonly #changed: Changed;
   #rows: SliderRow[] = [];
   #fields: Field[] = [];
@@ -17,8 +18,9 @@ export class Controls {
   constructor(groups: HTMLElement, list: HTMLElement, search: HTMLInputElement, changed: Changed) {
     this.#groups = groups;
     this.#list = list;
+    this.#search = search;
     this.#changed = changed;
-    search.addEventListener("input", () => this.#filter(search.value));
+    search.addEventListener("input", () => this.#filter());
   }
 
   /** Makes the controls of a preset. */
@@ -50,10 +52,12 @@ export class Controls {
     this.#fields = [...parameters.values()].map((one) => new Field(one, one.name, this.#changed));
     this.#entries = this.#fields.map((field) => entry(field));
     this.#list.replaceChildren(...this.#entries.map(({ element }) => element));
+    this.#filter();
   }
 
-  #filter(text: string): void {
-    const words = text.toLowerCase().split(/\s+/).filter(Boolean);
+  /** Shows the parameters that have all words of the search. */
+  #filter(): void {
+    const words = this.#search.value.toLowerCase().split(/\s+/).filter(Boolean);
     for (const { element, text: own } of this.#entries) {
       element.hidden = !words.every((word) => own.includes(word));
     }

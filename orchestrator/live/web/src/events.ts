@@ -3,7 +3,7 @@
 // An event acts between two steps, at the first t_k that its time is not after, or after the first
 // step at whose end its condition has become true. Several events may act on one signal or
 // parameter: the latest counts, and when it ends, the one before it counts again.
-import type { Experiment } from "./experiment";
+import { type Experiment, isDuration, isTime, Refusal } from "./experiment";
 import { ComponentFailed, type Instance } from "./fmi";
 import type { Overrides, Row } from "./row";
 import type { Condition, EventData, Occurrence, Value } from "./types";
@@ -145,7 +145,7 @@ interface Progress {
   wasTrue: boolean;
   /** After how many steps it ends. */
   end: number;
-  /** How often something about it was listed. */
+  /** How often it has been listed. */
   listed: number;
 }
 
@@ -157,6 +157,10 @@ export class Events {
 
   /** Take events, in the order in which they act at the same time. */
   constructor(private readonly events: readonly EventData[]) {
+    for (const { at = 0, lasts = 1, label } of events) {
+      if (!isTime(at)) throw new Refusal(`${label}: its time must be a number, 0 or more`);
+      if (!isDuration(lasts)) throw new Refusal(`${label}: it must last for more than 0 s`);
+    }
     this.progress = events.map(() => ({ happened: false, wasTrue: true, end: NEVER, listed: 0 }));
   }
 

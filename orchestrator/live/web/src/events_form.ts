@@ -1,7 +1,8 @@
 // Which events happen, when and for how long.
 
-import { isDuration, isTime } from "./link";
+import { isDuration, isTime } from "./experiment";
 import { canEnd, type Edit, eventOf, type Settings } from "./settings";
+import { entered } from "./text";
 import type { EventData, Preset } from "./types";
 
 /** What a user does here: take another set of events, or change one of them. */
@@ -42,10 +43,14 @@ export class EventsForm {
       const number = Number(input.dataset.number);
       const { at, lasts } = eventOf(preset, settings.events, number) ?? {};
       const edit = settings.edits[number] ?? {};
-      const isTime = input.dataset.kind === "at";
-      const own = isTime ? at : lasts;
-      const now = isTime ? (edit.at ?? at) : edit.lasts === undefined ? lasts : edit.lasts;
-      if (document.activeElement !== input) input.value = now == null ? "" : String(now);
+      const isAt = input.dataset.kind === "at";
+      const own = isAt ? at : lasts;
+      const now = isAt ? (edit.at ?? at) : edit.lasts === undefined ? lasts : edit.lasts;
+      // What cannot be read stays, so that it can be mended.
+      const isKept = document.activeElement === input || Number.isNaN(now);
+      if (!isKept) input.value = now == null ? "" : String(now);
+      const isGood = now == null || (isAt ? isTime(now) : isDuration(now));
+      input.setAttribute("aria-invalid", String(!isGood));
       input.classList.toggle("changed", (now ?? null) !== (own ?? null));
     }
   }
@@ -83,13 +88,9 @@ export class EventsForm {
       input.title = "how long it lasts; empty: until the run ends";
     }
     input.addEventListener("change", () => {
-      const text = input.value.trim();
-      const value = text === "" ? Number.NaN : Number(text);
-      const isGood = kind === "at" ? isTime(value) : isDuration(value);
-      const isForGood = kind === "for" && text === "";
-      input.setAttribute("aria-invalid", String(!isGood && !isForGood));
-      if (isForGood) this.#wishes.edit(number, { lasts: null });
-      else if (isGood) this.#wishes.edit(number, kind === "at" ? { at: value } : { lasts: value });
+      const value = entered(input.value);
+      const lasts = input.value.trim() === "" ? null : value;
+      this.#wishes.edit(number, kind === "at" ? { at: value } : { lasts });
     });
     whole.append(`${kind} `, input, " s");
     return whole;

@@ -10,6 +10,16 @@ const MOST_OF_A_STEP = 1e-3;
 /** Rows of more steps than this do not fit into a page. */
 const MOST_STEPS = 200_000;
 
+/** Whether an event can come then [s]: not before the start. */
+export function isTime(time: number): boolean {
+  return time >= 0 && time < Infinity;
+}
+
+/** Whether an event can last so long [s]. */
+export function isDuration(time: number): boolean {
+  return time > 0 && time < Infinity;
+}
+
 /** A number of steps; a whole number where it is one apart from rounding. */
 function rounded(n: number): number {
   const nearest = Math.round(n);
@@ -27,11 +37,12 @@ export class Experiment {
     readonly stopTime: number,
     readonly step: number,
   ) {
-    if (!(Number.isFinite(step) && step > 0)) {
-      throw new Refusal(`step ${step} s must be positive, and finite`);
-    }
-    if (!(Number.isFinite(stopTime) && stopTime > 0)) {
-      throw new Refusal(`stop time ${stopTime} s must be positive, and finite`);
+    for (const [name, time] of [
+      ["step", step],
+      ["stop time", stopTime],
+    ] as const) {
+      if (Number.isNaN(time)) throw new Refusal(`${name}: not a number`);
+      if (!isDuration(time)) throw new Refusal(`${name} ${time} s must be positive, and finite`);
     }
     const inSteps = rounded(Math.max(stopTime / step, Number.MIN_VALUE));
     if (inSteps > MOST_STEPS) {

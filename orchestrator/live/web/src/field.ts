@@ -1,8 +1,7 @@
 // A number, choice or switch for one parameter, and a row of them with a slider.
 
-import { parsed } from "./link";
 import { POSITIONS, positionOf, type Slider, valueAt } from "./sliders";
-import { printedUnit } from "./text";
+import { entered, printedUnit } from "./text";
 import type { Parameter, Value } from "./types";
 
 export type Changed = (values: Record<string, Value>) => void;
@@ -50,17 +49,16 @@ export class Field {
     this.element.setAttribute("aria-label", label);
     this.element.dataset.name = name;
     this.element.addEventListener("change", () => {
-      const value = this.#entered();
-      this.invalid = value === undefined ? `${name}: not a number` : "";
       this.#shown = undefined;
-      if (value !== undefined) changed({ [name]: value });
+      changed({ [name]: this.#entered() });
     });
   }
 
-  #entered(): Value | undefined {
-    const { element } = this;
+  /** The value in the field; NaN: it cannot be read. */
+  #entered(): Value {
+    const { element, parameter } = this;
     if (element instanceof HTMLInputElement && element.type === "checkbox") return element.checked;
-    return parsed(this.parameter, element.value);
+    return parameter.type === "String" ? element.value : entered(element.value);
   }
 
   set value(value: Value) {
@@ -71,7 +69,8 @@ export class Field {
     if (element instanceof HTMLInputElement && element.type === "checkbox") {
       element.checked = value === true;
     } else if (document.activeElement !== element || this.#entered() !== value) {
-      element.value = String(value);
+      // What cannot be read stays, so that it can be mended.
+      if (!Number.isNaN(value)) element.value = String(value);
     }
     element.classList.toggle("changed", value !== this.parameter.value);
   }
@@ -106,7 +105,7 @@ export class SliderRow {
     this.root = document.createElement("div");
     this.root.className = "row";
     const [parameter] = parameters;
-    const spoken = parameters.length > 1 ? shared(row.names) : parameter.name;
+    const spoken = row.spoken ?? parameter.name;
     const label = document.createElement("span");
     label.className = "label";
     label.innerHTML = row.label;
@@ -136,7 +135,9 @@ export class SliderRow {
     this.#slider.max = String(POSITIONS);
     this.#slider.step = String(stepOf(row));
     this.#slider.setAttribute("aria-label", spoken);
-    this.#slider.title = explained(parameter);
+    this.#slider.title = row.spoken
+      ? `sets ${row.names.join(", ")} together`
+      : explained(parameter);
     this.#slider.dataset.names = row.names.join(" ");
     this.#slider.addEventListener("input", () => {
       const value = valueAt(row.scale, this.#slider.valueAsNumber);
@@ -165,9 +166,11 @@ export class SliderRow {
     });
     const last = values.length - 1;
     const value = Number(values[last]) * (this.#row.signs?.[last] ?? 1);
-    this.#slider.step = "any";
-    this.#slider.value = String(positionOf(this.#row.scale, value));
-    this.#slider.step = String(stepOf(this.#row));
+    if (!Number.isNaN(value)) {
+      this.#slider.step = "any";
+      this.#slider.value = String(positionOf(this.#row.scale, value));
+      this.#slider.step = String(stepOf(this.#row));
+    }
     this.#slider.setAttribute("aria-valuetext", [...new Set(values)].join(", "));
     const isChanged = this.fields.some(({ parameter }, k) => values[k] !== parameter.value);
     this.#reset.hidden = !isChanged;
@@ -186,15 +189,6 @@ export class SliderRow {
 /** Positions from one press of an arrow key to the next. */
 function stepOf({ scale }: Slider): number {
   return scale.whole ? POSITIONS / (scale.high - scale.low) : 10;
-}
-
-/** `controller.K1` of its members. */
-function shared(all: readonly string[]): string {
-  const [first] = all;
-  let length = first.length;
-  for (const name of all) while (!name.startsWith(first.slice(0, length))) length--;
-  const [, head, tail] = /^(.*?)[.[_]?(?:(?<=min|max)(\.\w))?$/.exec(first.slice(0, length)) ?? [];
-  return `${head ?? first}${tail ?? ""}`;
 }
 
 /** Whether a message says `component.parameter` or `component: parameter`. */

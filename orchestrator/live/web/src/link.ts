@@ -1,5 +1,6 @@
 // Settings in the address of the page: after `#`, the preset and what differs from it.
 
+import { isDuration, isTime } from "./experiment";
 import {
   canEnd,
   type Edit,
@@ -8,7 +9,10 @@ import {
   presetOf,
   type Settings,
   untouched,
+  withEdit,
+  withValues,
 } from "./settings";
+import { numberOf } from "./text";
 import type { Data, EventData, Parameter, Value } from "./types";
 
 const PRESET = "preset";
@@ -37,7 +41,9 @@ export function toHash(settings: Settings, data: Data): string {
     if (lasts !== undefined) fields.push([`${name}.for`, lasts === null ? FOR_GOOD : `${lasts}`]);
   }
   for (const label of settings.hidden) fields.push([HIDDEN, label]);
-  return `#${fields.map(([key, value]) => `${encode(key)}=${encode(value)}`).join("&")}`;
+  // What was typed and is no number is not sent.
+  const sent = fields.filter(([, value]) => value !== "NaN");
+  return `#${sent.map(([key, value]) => `${encode(key)}=${encode(value)}`).join("&")}`;
 }
 
 /** Settings of a link, and what of it is not understood. */
@@ -48,14 +54,13 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
   const parameters = parametersOf(preset);
   const unknown = wanted === preset.name ? [] : [`${PRESET}=${wanted}`];
   const values: Record<string, Value> = {};
-  const edits: Record<number, Edit> = {};
   const edited: [string, string][] = [];
   const hidden: string[] = [];
   let { stopTime, step, events } = untouched(preset);
   for (const [key, text] of fields) {
     const parameter = parameters.get(key);
     const edit = EDIT.test(key);
-    const number = text.trim() === "" ? Number.NaN : Number(text);
+    const number = numberOf(text);
     const value = parameter && parsed(parameter, text);
     if (key === PRESET) continue;
     if (parameter && value !== undefined) values[key] = value;
@@ -64,39 +69,32 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
     else if (key === EVENTS && (text === "" || Object.hasOwn(preset.loops[0].events, text)))
       events = text;
     else if (edit) edited.push([key, text]);
+    else if (key === HIDDEN && (text === "" || hidden.includes(text))) continue;
     else if (key === HIDDEN && preset.loops.some(({ label }) => label === text)) hidden.push(text);
     else unknown.push(`${key}=${text}`);
   }
+  const { name } = preset;
+  let settings: Settings = { preset: name, values: {}, stopTime, step, events, edits: {}, hidden };
+  settings = withValues(settings, preset, values);
   // Which events there are is known only now.
   for (const [key, text] of edited) {
     const [, counted, kind] = EDIT.exec(key) ?? [];
     const number = Number(counted) - 1;
     const event = eventOf(preset, events, number);
     const edit = event && editOf(event, kind, text);
-    if (edit) edits[number] = { ...edits[number], ...edit };
+    if (edit) settings = withEdit(settings, preset, number, edit);
     else unknown.push(`${key}=${text}`);
   }
-  const settings = { preset: preset.name, values, stopTime, step, events, edits, hidden };
   return { settings, unknown };
 }
 
 /** A change of an event's time or duration; undefined: a scenario file could not have it. */
 function editOf(event: EventData, kind: string, text: string): Edit | undefined {
-  const time = text.trim() === "" ? Number.NaN : Number(text);
+  const time = numberOf(text);
   if (kind === "at") return isTime(time) && event.at !== undefined ? { at: time } : undefined;
   if (!canEnd(event)) return undefined;
   if (text === FOR_GOOD) return { lasts: null };
   return isDuration(time) ? { lasts: time } : undefined;
-}
-
-/** Whether an event can come then [s]: not before the start. */
-export function isTime(time: number): boolean {
-  return time >= 0 && time < Infinity;
-}
-
-/** Whether an event can last so long [s]. */
-export function isDuration(time: number): boolean {
-  return time > 0 && time < Infinity;
 }
 
 /** A text in the type of a parameter; undefined: it is not of this type. */
@@ -105,7 +103,7 @@ export function parsed(parameter: Parameter, text: string): Value | undefined {
   if (parameter.type === "Boolean") {
     return text === "true" ? true : text === "false" ? false : undefined;
   }
-  const number = text.trim() === "" ? Number.NaN : Number(text);
+  const number = numberOf(text);
   return Number.isFinite(number) ? number : undefined;
 }
 

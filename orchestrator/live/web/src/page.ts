@@ -3,23 +3,27 @@
 import { Charts, type Mark, rowAt } from "./charts";
 import { commandLine } from "./command";
 import { Controls } from "./controls";
-import { controlPoint, csv, metrics, Refusal } from "./engine";
+import { controlPoint, metrics, Refusal } from "./engine";
 import { EventsForm } from "./events_form";
 import { IndicesTable } from "./indices_table";
 import { buildSwitches, fillLegend } from "./legend";
 import { fromHash, toHash } from "./link";
 import { interleaved, lines, type Shown, sections } from "./panels";
 import { Player } from "./player";
-import { Scene } from "./scene";
+import { missing, Scene } from "./scene";
 import { eventsOf, presetOf, type Settings, untouched, withEdit, withValues } from "./settings";
+import { csvLines, entered } from "./text";
 import { palette, themeButton } from "./theme";
 import type { Data, Engine, LoopData, Preset, Result, Values } from "./types";
 
-/** So long after the last change the link is written [ms]: browsers limit how often it may be. */
+/** The link is written so long after the last change [ms]: browsers limit how often it may be. */
 const LINK_AFTER = 300;
 
-/** So long a word on what was done stays [ms]. */
+/** How long a notice stays [ms]. */
 const SAID = 4000;
+
+/** How many parts of a link, or messages, are listed. */
+const NAMED = 5;
 
 function element<T extends HTMLElement>(id: string): T {
   const found = document.getElementById(id);
@@ -44,6 +48,8 @@ export class Page {
   readonly #scene: Scene | undefined;
   #settings: Settings;
   #preset: Preset;
+  /** The preset that the controls and charts were made for. */
+  #built: Preset | undefined;
   /** The preset's loops; their order gives them their colours. */
   #loops: readonly LoopData[] = [];
   /** The last runs that could be made, in the order of the loops. */
@@ -85,12 +91,15 @@ export class Page {
     );
     this.#indices = new IndicesTable(element("indices"), data.indices);
     this.#wire();
+    new ResizeObserver(([{ target }]) => {
+      document.documentElement.style.setProperty("--toolbar", `${target.clientHeight}px`);
+    }).observe(element("toolbar"));
     themeButton(element("theme"), () => {
       this.#scene?.paint(palette());
       this.#charts.repaint();
     });
     this.#open();
-    if (unknown.length) this.#say(`Not understood in the link: ${unknown.join(", ")}`);
+    this.#sayUnknown(unknown);
   }
 
   #makeScene(): Scene | undefined {
@@ -100,10 +109,7 @@ export class Page {
       return new Scene(host, canvas);
     } catch {
       canvas.remove();
-      const note = document.createElement("p");
-      note.className = "missing";
-      note.textContent = "This browser has no WebGL: the path in space is not shown.";
-      host.append(note);
+      host.append(missing("This browser has no WebGL: the path in space is not shown."));
       return undefined;
     }
   }
@@ -130,8 +136,7 @@ export class Page {
     ] as const) {
       const input = element<HTMLInputElement>(id);
       input.addEventListener("change", () => {
-        const value = input.value.trim() === "" ? Number.NaN : Number(input.value);
-        this.#take({ ...this.#settings, [key]: value });
+        this.#take({ ...this.#settings, [key]: entered(input.value) });
       });
     }
     const slider = element<HTMLInputElement>("stop-slider");
@@ -143,7 +148,7 @@ export class Page {
       const { settings, unknown } = fromHash(location.hash, this.#data);
       this.#settings = settings;
       this.#open();
-      if (unknown.length) this.#say(`Not understood in the link: ${unknown.join(", ")}`);
+      this.#sayUnknown(unknown);
     });
   }
 
@@ -185,9 +190,12 @@ export class Page {
     buildSwitches(element("loops"), this.#loops, this.#settings.hidden, (hidden) =>
       this.#take({ ...this.#settings, hidden }),
     );
-    this.#controls.build(this.#preset);
-    this.#charts.build(sections(this.#loops.map(({ label }) => label)));
-    this.#results = [];
+    if (this.#preset !== this.#built) {
+      this.#controls.build(this.#preset);
+      this.#charts.build(sections(this.#loops.map(({ label }) => label)));
+      this.#results = [];
+    }
+    this.#built = this.#preset;
     this.run();
     this.#player.seek(this.#player.time);
   }
@@ -199,13 +207,13 @@ export class Page {
     // However many moves of a slider there are, there is one run for each picture of the screen.
     this.#asked = true;
     requestAnimationFrame(() => {
-      this.#asked = false;
-      this.run();
+      if (this.#asked) this.run();
     });
   }
 
   /** Runs what is set, and shows it. */
   run(): void {
+    this.#asked = false;
     this.#showSettings();
     try {
       const shown = this.#results;
@@ -218,7 +226,8 @@ export class Page {
       this.#refuse(error.message);
       // The last good runs stay; a link may have none.
       if (this.#results.length > 0) return;
-      this.#results = this.#runs(untouched(this.#preset));
+      const { hidden } = this.#settings;
+      this.#results = this.#runs({ ...untouched(this.#preset), hidden });
       this.#draw();
       return;
     }
@@ -226,7 +235,12 @@ export class Page {
       const why = result?.failure ?? result?.remark;
       return why ? [`${this.#loops[k].label}: ${why}`] : [];
     });
-    this.#refuse(failures.join("; "));
+    const said = this.#results.flatMap((result, k) =>
+      [...new Set(result?.messages)]
+        .slice(0, NAMED)
+        .map((text) => `${this.#loops[k].label}: ${text}`),
+    );
+    this.#refuse(failures.join("; "), said.join("; "));
     this.#draw();
   }
 
@@ -239,11 +253,12 @@ export class Page {
     });
   }
 
-  #refuse(message: string): void {
+  /** Says why what is set cannot be run, or what its FMUs have said. */
+  #refuse(message: string, said = ""): void {
     const isSeen = this.#controls.refuse(message);
     const error = element("error");
-    error.hidden = message === "" || isSeen;
-    error.textContent = isSeen ? "" : message;
+    error.textContent = [isSeen ? "" : message, said].filter(Boolean).join("; ");
+    error.hidden = error.textContent === "";
     document.body.classList.toggle("refused", message !== "");
   }
 
@@ -258,7 +273,7 @@ export class Page {
     ] as const;
     for (const [input, value, own] of fields) {
       const isEntered = document.activeElement === input && Number(input.value) === value;
-      if (!isEntered && Number.isFinite(value)) input.value = String(value);
+      if (!isEntered && !Number.isNaN(value)) input.value = String(value);
       input.classList.toggle("changed", value !== own);
       input.setAttribute("aria-invalid", String(!(value > 0)));
     }
@@ -337,30 +352,27 @@ export class Page {
     return commandLine(this.#settings, this.#preset, this.#meant());
   }
 
-  /** The rows of the first controller that is shown, as result.csv has them. */
-  csv(): string {
+  /** The result of the loop that is meant, by what is set; if there is none, a notice says why. */
+  #result(): Result | undefined {
+    if (this.#asked) this.run();
     const result = this.#results[this.#loops.indexOf(this.#meant())];
-    return result ? csv(result) : "";
-  }
-
-  /** Whether the rows that are shown are the ones of the settings; if not, it says why. */
-  #isRun(): boolean {
     if (this.#refusal) this.#say(`Not run: ${this.#refusal}`);
-    return !this.#refusal;
+    else if (!result) this.#say("Show a controller first");
+    return this.#refusal ? undefined : result;
   }
 
   #copyCommand(): void {
-    if (!this.#isRun()) return;
-    this.#copy(this.command(), "Command copied");
+    if (this.#result()) this.#copy(this.command(), "Command copied");
   }
 
   #download(): void {
-    if (!this.#isRun()) return;
+    const result = this.#result();
+    if (!result) return;
     const link = document.createElement("a");
-    link.href = URL.createObjectURL(new Blob([this.csv()], { type: "text/csv" }));
+    link.href = URL.createObjectURL(new Blob(csvLines(result), { type: "text/csv" }));
     link.download = `${this.#preset.name}.csv`;
     link.click();
-    URL.revokeObjectURL(link.href);
+    setTimeout(() => URL.revokeObjectURL(link.href));
     this.#say(`Saved ${link.download}`);
   }
 
@@ -369,7 +381,7 @@ export class Page {
       await navigator.clipboard.writeText(text);
       this.#say(done);
     } catch {
-      // Pages from a disk may not be let write to the clipboard, but may copy what is selected.
+      // A page from a disk may be refused the clipboard, and may still copy a selection.
       const area = document.createElement("textarea");
       area.value = text;
       document.body.append(area);
@@ -377,6 +389,12 @@ export class Page {
       this.#say(document.execCommand("copy") ? done : "This browser blocks copying");
       area.remove();
     }
+  }
+
+  #sayUnknown(unknown: readonly string[]): void {
+    const named = unknown.slice(0, NAMED).join(", ");
+    const more = unknown.length > NAMED ? `, and ${unknown.length - NAMED} more` : "";
+    this.#say(named && `Not understood in the link: ${named}${more}`);
   }
 
   #say(text: string): void {

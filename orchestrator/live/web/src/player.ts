@@ -1,6 +1,7 @@
 // Plays a run: one time for the scene and all charts.
 
 import type { Mark } from "./charts";
+import { general } from "./text";
 
 /** Elements of the bar below the scene. */
 export interface Bar {
@@ -14,8 +15,8 @@ export interface Bar {
 /** A run is played within about as many seconds, if one of the speeds allows it. */
 const PATIENCE = 25;
 
-/** Positions of the slider in a second: arrow keys move by one, with shift by ten. */
-const FINE = 10;
+/** The slider has at least so many positions, and ten or more in a second. */
+const POSITIONS = 100;
 
 export class Player {
   readonly #bar: Bar;
@@ -23,24 +24,30 @@ export class Player {
   #end = 0;
   #time = 0;
   #started: { time: number; now: number } | undefined;
+  #frame = 0;
 
   constructor(bar: Bar, show: (time: number) => void) {
     this.#bar = bar;
     this.#show = show;
     bar.toggle.addEventListener("click", () => this.toggle());
-    bar.slider.addEventListener("input", () => this.seek(bar.slider.valueAsNumber / FINE));
+    bar.slider.addEventListener("input", () => this.seek(bar.slider.valueAsNumber / this.#fine));
     bar.speed.addEventListener("change", () => this.#restart());
     document.addEventListener("keydown", (event) => {
       const { target } = event;
       if (event.key !== " " || !(target instanceof Element)) return;
       if (target.closest("input:not([type=range]), button, select, summary, textarea, a")) return;
       event.preventDefault();
-      this.toggle();
+      if (!event.repeat) this.toggle();
     });
   }
 
   get time(): number {
     return this.#time;
+  }
+
+  /** Positions of the slider in a second, a power of ten. */
+  get #fine(): number {
+    return 10 ** Math.max(1, Math.ceil(Math.log10(POSITIONS / (this.#end || 1))));
   }
 
   get isPlaying(): boolean {
@@ -53,13 +60,13 @@ export class Player {
     // At rest a run is shown as a whole.
     const isAtEnd = this.#time >= this.#end && !this.isPlaying;
     this.#end = end;
-    this.#bar.slider.max = String(Math.round(end * FINE));
+    this.#bar.slider.max = String(Math.round(end * this.#fine));
     this.#bar.marks.replaceChildren(
       ...marks.map(({ from, until, label }) => {
         const mark = document.createElement("span");
         mark.style.left = `${(100 * from) / end}%`;
         mark.style.width = `${(100 * (Math.min(until, end) - from)) / end}%`;
-        mark.title = `${label}, at ${from} s`;
+        mark.title = `${label}, at ${general(from)} s`;
         return mark;
       }),
     );
@@ -81,12 +88,13 @@ export class Player {
   }
 
   toggle(): void {
+    cancelAnimationFrame(this.#frame);
     if (this.#started) {
       this.#started = undefined;
     } else {
       if (this.#time >= this.#end) this.#time = 0;
       this.#started = { time: this.#time, now: performance.now() };
-      requestAnimationFrame((now) => this.#tick(now));
+      this.#frame = requestAnimationFrame((now) => this.#tick(now));
     }
     this.#bar.toggle.dataset.playing = String(this.isPlaying);
     this.#bar.toggle.setAttribute("aria-label", this.isPlaying ? "Pause" : "Play");
@@ -102,13 +110,15 @@ export class Player {
     this.#time = Math.min(this.#end, this.#started.time + Number(this.#bar.speed.value) * passed);
     this.#tell();
     if (this.#time >= this.#end) this.toggle();
-    else requestAnimationFrame((next) => this.#tick(next));
+    else this.#frame = requestAnimationFrame((next) => this.#tick(next));
   }
 
   #tell(): void {
-    this.#bar.slider.value = String(Math.round(this.#time * FINE));
-    this.#bar.slider.setAttribute("aria-valuetext", `${this.#time.toFixed(1)} seconds`);
-    this.#bar.output.textContent = `${this.#time.toFixed(1)} s`;
+    const fine = this.#fine;
+    const time = this.#time.toFixed(Math.log10(fine));
+    this.#bar.slider.value = String(Math.round(this.#time * fine));
+    this.#bar.slider.setAttribute("aria-valuetext", `${time} seconds`);
+    this.#bar.output.textContent = `${time} s`;
     this.#show(this.#time);
   }
 }

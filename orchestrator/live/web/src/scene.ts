@@ -57,6 +57,14 @@ const MARGIN = 25;
 /** Numbers along an axis that are closer together than this are left out [px]. */
 const CROWDED = 24;
 
+/** What is said where the path is missing. */
+export function missing(text: string): HTMLElement {
+  const note = document.createElement("p");
+  note.className = "missing";
+  note.textContent = text;
+  return note;
+}
+
 function mixed(a: Colour, b: Colour, share: number): Colour {
   return a.map((value, k) => value + (b[k] - value) * share) as unknown as Colour;
 }
@@ -121,7 +129,9 @@ export class Scene {
     this.#turning = new Turning(canvas, () => this.draw());
     canvas.addEventListener("webglcontextlost", () => {
       this.#lost = true;
+      host.append(missing("The browser has dropped the path in space. Reload the page to see it."));
     });
+    addEventListener("beforeprint", () => this.drawNow());
     new ResizeObserver(() => this.#resize()).observe(host);
     this.#resize();
   }

@@ -45,12 +45,13 @@ export function parametersOf(preset: Preset): ReadonlyMap<string, Parameter> {
   return found;
 }
 
-/** Settings with other values; the preset's own values are no change. */
+/** Settings with other values; a value that every loop has anyway is no change. */
 export function withValues(settings: Settings, preset: Preset, changed: Values): Settings {
-  const parameters = parametersOf(preset);
   const values: Record<string, Value> = { ...settings.values };
+  const all = preset.loops.flatMap(({ parameters }) => parameters);
   for (const [name, value] of Object.entries(changed)) {
-    if (parameters.get(name)?.value === value) delete values[name];
+    const isOwn = all.filter((one) => one.name === name).every((one) => one.value === value);
+    if (isOwn) delete values[name];
     else values[name] = value;
   }
   return { ...settings, values };

@@ -17,7 +17,7 @@ import type {
   Values,
 } from "./types";
 
-/** Values go along all connections so often, until they rest. */
+/** At most so many rounds of values along all connections. */
 const MOST_ROUNDS = 1000;
 
 /** Messages that are kept: an FMU may have something to say in every step. */
@@ -81,10 +81,15 @@ class Simulation {
       if (this.messages.length < MOST_MESSAGES) this.messages.push(text);
       if (status === DISCARD) this.refusals.push(text);
     };
-    for (const [name, type] of Object.entries(loop.components)) {
-      const instance = new Instance(machine, name, type, data.fmus[type], hear);
-      this.instances.set(name, instance);
-      instance.tie(data.fmus[type], this.row.address, this.row.firsts.get(name) ?? 0);
+    try {
+      for (const [name, type] of Object.entries(loop.components)) {
+        const instance = new Instance(machine, name, type, data.fmus[type], hear);
+        this.instances.set(name, instance);
+        instance.tie(data.fmus[type], this.row.address, this.row.firsts.get(name) ?? 0);
+      }
+    } catch (error) {
+      this.free();
+      throw error instanceof ComponentFailed ? new Refusal(error.message) : error;
     }
   }
 
@@ -110,6 +115,7 @@ class Simulation {
     const wanted = { Real: "number", Integer: "number", Boolean: "boolean", String: "string" }[
       type
     ];
+    if (Number.isNaN(value)) throw new Refusal(`${name}: not a number`);
     // Integers have 32 bits: a larger one would become another without a word.
     const fits = typeof value === wanted && (type !== "Integer" || (Number(value) | 0) === value);
     if (!fits) throw new Refusal(`${name} = ${value}: not a value of type ${type}`);

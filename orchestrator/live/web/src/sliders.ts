@@ -15,6 +15,8 @@ export interface Scale {
 export interface Slider {
   /** HTML. */
   readonly label: string;
+  /** What readers of the screen say, where the slider sets several parameters. */
+  readonly spoken?: string;
   /** What the slider sets together; each also has a field. */
   readonly names: readonly string[];
   /** What the slider's value is multiplied by, for each of them. */
@@ -36,12 +38,14 @@ function row(label: string, name: string, scale: Scale): Slider {
 }
 
 function diagonal(label: string, name: string): Slider {
-  return { label, names: [1, 2, 3].map((k) => `controller.${name}[${k}]`), scale: by(0.1, 1000) };
+  const all = `controller.${name}`;
+  return { label, spoken: all, names: [1, 2, 3].map((k) => `${all}[${k}]`), scale: by(0.1, 1000) };
 }
 
 function limit(member: string): Slider {
   return {
     label: `&tau;<sub>${member}</sub>`,
+    spoken: `limits of plant.tau.${member}`,
     names: [`plant.tau_min.${member}`, `plant.tau_max.${member}`],
     signs: [-1, 1],
     scale: from(0, 200),

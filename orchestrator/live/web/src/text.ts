@@ -12,13 +12,23 @@ export function general(value: number, digits = 6): string {
   return `${trimmed(mantissa)}e${sign}${String(Math.abs(power)).padStart(2, "0")}`;
 }
 
+/** The number that a text is; NaN: it is none. */
+export function numberOf(text: string): number {
+  return text.trim() === "" ? Number.NaN : Number(text);
+}
+
+/** The number in a field, in which a comma may stand for the point. */
+export function entered(text: string): number {
+  return numberOf(text.replace(/^([^.,]*),([^.,]*)$/, "$1.$2"));
+}
+
 /** A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s², s^1/2 as √s. */
 export function printedUnit(unit: string): string {
   const raised = "⁰¹²³⁴⁵⁶⁷⁸⁹";
   return unit
     .replaceAll("s^1/2", "√s")
     .replaceAll(".", "·")
-    .replace(/(?<=[A-Za-z])\d/g, (digit) => raised[Number(digit)]);
+    .replace(/(?<=[A-Za-z])\d+/g, (power) => [...power].map((d) => raised[Number(d)]).join(""));
 }
 
 /** The shortest text that reads back as the same number. */
@@ -26,13 +36,18 @@ function written(value: number): string {
   return Object.is(value, -0) ? "-0" : String(value);
 }
 
-/** A run as result.csv has it: the same columns, numbers that read back exactly. */
-export function csv(result: Result): string {
+/** A run as the lines of result.csv: the same columns, numbers that read back exactly. */
+export function csvLines(result: Result): string[] {
   const width = 1 + result.columns.length;
   const lines = [["time", ...result.columns].join(",")];
   for (let k = 0; k < result.rows; k++) {
     const row = result.table.subarray(k * width, (k + 1) * width);
     lines.push(Array.from(row, written).join(","));
   }
-  return `${lines.join("\n")}\n`;
+  return lines.map((line) => `${line}\n`);
+}
+
+/** The same as one text. */
+export function csv(result: Result): string {
+  return csvLines(result).join("");
 }

@@ -14,18 +14,12 @@ export interface Variable {
   readonly reference: number;
   readonly type: FmiType;
   readonly causality: "input" | "output" | "parameter";
-  readonly variability: string;
   readonly start?: Value;
-  readonly unit?: string;
-  readonly min?: number;
-  readonly max?: number;
-  readonly description: string;
 }
 
 /** A component type; its functions in the module have its name as their prefix. */
 export interface Fmu {
   readonly guid: string;
-  readonly description: string;
   readonly variables: readonly Variable[];
 }
 
@@ -44,8 +38,6 @@ export interface Parameter {
   /** The value in this preset. */
   readonly value: Value;
   readonly description: string;
-  /** Whether an event may change it while the loop runs. */
-  readonly tunable: boolean;
 }
 
 /** Names of ports with values. */
@@ -100,6 +92,13 @@ export interface LoopData {
   readonly scenario?: string;
   /** FMUs by the names of the components, in the order of the table's columns. */
   readonly components: Readonly<Record<string, string>>;
+  /** Entries of a scenario file with this loop. */
+  readonly head: {
+    readonly order: string | readonly string[] | null;
+    /** Empty: all components. */
+    readonly only: readonly string[];
+    readonly wires: Readonly<Record<string, string | boolean>>;
+  };
   /** In the order in which they hand on values before the first step. */
   readonly initial: readonly Stage[];
   readonly stages: readonly Stage[];
@@ -122,8 +121,6 @@ export interface Preset {
   readonly step: number;
   /** The scenario whose events happen; `""`: none. */
   readonly events: string;
-  /** Whether `auv-fmu run NAME` runs the second loop, too. */
-  readonly comparing: boolean;
   /** The scenario's own loop, and the one that it is compared with, if there is one. */
   readonly loops: readonly LoopData[];
 }
@@ -139,8 +136,6 @@ export interface IndexData {
 
 /** All that Python writes into the page, besides script and module. */
 export interface Data {
-  /** Of auv-fmu. */
-  readonly version: string;
   /** The preset that is shown first. */
   readonly opened: string;
   readonly fmus: Readonly<Record<string, Fmu>>;
@@ -155,7 +150,7 @@ export interface Occurrence {
   readonly text: string;
   /** Empty: it is only the end of an event. */
   readonly label: string;
-  /** The number of the event. */
+  /** Which of the loop's events it is. */
   readonly event: number;
 }
 
@@ -171,7 +166,7 @@ export interface Result {
   /** A column by its name; made once. */
   column(name: string): Float64Array;
   has(name: string): boolean;
-  /** Values of all parameters as the FMUs hold them. */
+  /** Values of all parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
   /** What FMUs have said, once each: `plant: ...`. */

@@ -20,7 +20,6 @@ const parameter = (name, value, more = {}) => ({
   default: value,
   value,
   description: "",
-  tunable: true,
   ...more,
 });
 
@@ -61,6 +60,7 @@ const components = (controller) => ({
 const loop = (label, controller, more) => ({
   label,
   components: components(controller),
+  head: { order: null, only: [], wires: {} },
   initial: [],
   stages: [],
   parameters: [...gains, ...vehicle],
@@ -77,13 +77,14 @@ export const preset = {
   stopTime: 100,
   step: 0.02,
   events: "fault",
-  comparing: true,
   loops: [
     loop("proposed", "ObserverController", {
       scenario: "fault",
       parameters: [...gains, parameter("controller.k_d", 50), ...vehicle],
     }),
-    loop("PD", "PdController"),
+    loop("PD", "PdController", {
+      head: { order: "jacobi", only: [], wires: { "controller.dy": "plant.dy" } },
+    }),
   ],
 };
-export const data = { version: "0", opened: "fault", fmus: {}, presets: [preset], indices: [] };
+export const data = { opened: "fault", fmus: {}, presets: [preset], indices: [] };

@@ -148,6 +148,7 @@ test("a loop without a scenario is a scenario file", () => {
 title = "fault with the PD controller"
 stop_time = 100
 step = 0.02
+order = "jacobi"
 
 [components]
 plant = "AuvPlant"
