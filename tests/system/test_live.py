@@ -367,6 +367,7 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ("stop_time = 1e6\n", "more than 200,000 steps"),
         ('coupling = "linear"\n', "linear"),
         ("[steps]\nplanner = 0.1\n", "longer steps"),
+        ("[parameters]\nplant.m11 = -1.0\n", "m11 = -1"),
     ],
 )
 def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, capsys):

@@ -164,6 +164,16 @@ def test_link_opens_the_same_run(opened):
     assert opened.run(f"{EVENT}.value") == "20"
 
 
+#: What is copied and downloaded stays in the page.
+CATCH = (
+    "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; };"
+    "URL.createObjectURL = (blob) => { globalThis.saved = blob; return 'blob:'; };"
+    "HTMLAnchorElement.prototype.click = () => {};"
+)
+
+SAID = "document.getElementById('said').textContent"
+
+
 @pytest.mark.parametrize("hidden", ["PD", "proposed"])
 def test_command_makes_the_same_rows(opened, tmp_path, hidden):
     """What is copied, typed into a shell, with either controller."""
@@ -173,11 +183,25 @@ def test_command_makes_the_same_rows(opened, tmp_path, hidden):
     opened.type(EVENT, "15")
     opened.run(f"document.querySelector('#loops input[value={hidden}]').click()")
     opened.wait(f"/at=15&hide={hidden}/.test(location.hash)")
-    opened.run(
-        "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; };"
-        "URL.createObjectURL = (blob) => { globalThis.saved = blob; return 'blob:'; };"
-        "HTMLAnchorElement.prototype.click = () => {};"
+    compare_rows(opened, tmp_path)
+
+
+def test_command_of_a_comparison_has_the_order_and_the_wires(chromium, tmp_path):
+    (tmp_path / "mine.toml").write_text(
+        'order = "jacobi"\nstop_time = 10.0\n[wires]\n"plant.tau_w" = false\n'
     )
+    out = tmp_path / "page.html"
+    assert main(["live", str(tmp_path / "mine.toml"), "--out", str(out)]) == 0
+    chromium.open(out)
+    live = Live(chromium)
+    live.start()
+    live.run("auvfmu.set({hide: 'proposed'})")
+    compare_rows(live, tmp_path)
+
+
+def compare_rows(opened, tmp_path):
+    """Copy the command, type it into a shell, and compare its rows with what is downloaded."""
+    opened.run(CATCH)
     opened.run("document.getElementById('copy-command').click()")
     opened.run("document.getElementById('download').click()")
     programs = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -204,6 +228,111 @@ def test_value_that_is_refused_is_marked_and_nothing_else_changes(opened):
     opened.wait(f"!{field}.closest('.row').innerText.includes('-3')")
     assert opened.run(f"{field}.getAttribute('aria-invalid')") == "false"
     assert opened.run(TABLE) == table
+
+
+@pytest.mark.parametrize("text", ["abc", "1,000,5", ""])
+def test_what_is_no_number_is_refused_where_it_was_typed(opened, text):
+    opened.run(CATCH)
+    field = "document.querySelector('#groups input[data-name=\"controller.k_d\"]')"
+    opened.type(field, text)
+    opened.wait(f"{field}.closest('.row').innerText.includes('controller.k_d: not a number')")
+    assert opened.run(f"{field}.value") == text
+    opened.run("document.getElementById('copy-command').click()")
+    opened.wait(f"{SAID}.includes('not a number')")
+    assert opened.run("globalThis.copied === undefined")
+    opened.type(field, "0,5")
+    opened.wait("/controller\\.k_d=0\\.5/.test(location.hash)")
+    assert opened.run(f"{field}.getAttribute('aria-invalid')") == "false"
+
+
+def test_wrong_time_of_an_event_stays_marked_until_it_is_reset(opened):
+    opened.run('auvfmu.set({preset: "fault-thruster"})')
+    opened.run(f"{EVENT}.closest('details').open = true")
+    opened.type(EVENT, "-5")
+    error = "document.getElementById('error').textContent"
+    opened.wait(f"{error}.includes('no yaw moment')")
+    assert opened.run(f"{EVENT}.getAttribute('aria-invalid')") == "true"
+    opened.run("document.activeElement.blur()")
+    opened.run("document.getElementById('reset-all').click()")
+    opened.wait(f"{error} === ''")
+    assert opened.run(f"[{EVENT}.value, {EVENT}.getAttribute('aria-invalid')]") == ["50", "false"]
+
+
+def test_nothing_is_downloaded_while_no_controller_is_shown(opened):
+    opened.run(CATCH)
+    for box in ("PD", "proposed"):
+        opened.run(f"document.querySelector('#loops input[value={box}]').click()")
+    opened.wait("/hide=PD&hide=proposed|hide=proposed&hide=PD/.test(location.hash)")
+    opened.run("document.getElementById('download').click()")
+    assert opened.run(SAID) == "Show a controller first"
+    assert opened.run("globalThis.saved === undefined")
+    opened.run("auvfmu.set({hide: ''})")
+    assert opened.run("document.querySelectorAll('#loops input:checked').length") == 2
+
+
+def test_download_has_the_settings_of_now(opened):
+    opened.run(CATCH)
+    before = opened.run(CSV)
+    opened.run(
+        f"{SLIDER}.valueAsNumber = 700; {SLIDER}.dispatchEvent(new Event('input'));"
+        "document.getElementById('download').click()"
+    )
+    assert opened.run("saved.text()") not in (before, "")
+    assert opened.run("saved.text()") == opened.run(CSV)
+
+
+def test_script_is_refused_what_only_the_other_loop_refuses(opened):
+    opened.run('auvfmu.set({preset: "fig5-pd"})')
+    before = opened.run("location.hash")
+    why = opened.run('auvfmu.set({"controller.k_d": -1}).then(() => "", (error) => error.message)')
+    assert "k_d = -1" in why
+    assert opened.run("location.hash") == before
+
+
+def test_events_of_a_script_begin_without_edits(opened):
+    opened.run('auvfmu.set({preset: "fault-thruster", "events.1.at": 20})')
+    opened.run('auvfmu.set({events: ""})')
+    opened.wait("/events=$/.test(location.hash)")
+
+
+def test_refused_link_shows_the_preset_without_what_is_hidden(page, chromium):
+    chromium.open(page)
+    live = Live(chromium)
+    live.run("location.hash = '#preset=fault-thruster&controller.K1[1]=-3&hide=PD'")
+    live.start()
+    live.wait("document.body.classList.contains('refused')")
+    assert "PD" not in live.run(TABLE)
+
+
+def test_sliders_have_names_of_their_own(opened):
+    opened.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    names = opened.run(
+        "[...document.querySelectorAll('#groups input[type=range]')].map((one) => one.ariaLabel)"
+    )
+    assert len(names) == len(set(names)) > 20
+
+
+def test_presets_leave_nothing_behind(opened):
+    def listeners() -> int:
+        found = opened.call(
+            "Runtime.evaluate",
+            expression="Object.values(getEventListeners(window)).flat().length",
+            includeCommandLineAPI=True,
+            returnByValue=True,
+        )
+        return int(found["result"]["value"])
+
+    opened.run('auvfmu.set({preset: "fig5"})')
+    before = listeners()
+    for name in ("path", "fig3a", "fig4", "fig5"):
+        opened.run(f'auvfmu.set({{preset: "{name}"}})')
+    assert listeners() == before
+
+
+def test_path_shows_its_waypoints_and_the_scenario_is_the_title(opened):
+    opened.run('auvfmu.set({preset: "path"})')
+    assert "waypoints" in opened.run("document.getElementById('legend').innerText")
+    assert opened.run("document.title") == "A survey through waypoints: proposed and PD controller"
 
 
 def test_space_plays_and_stops(opened):

@@ -1,6 +1,7 @@
 // The charts: one small uPlot for each signal, with one cursor in all of them.
 
 import uPlot from "uplot";
+import { swatch } from "./legend";
 import type { Lines, Panel, Section, Style } from "./panels";
 import { entered } from "./text";
 import { property } from "./theme";
@@ -314,13 +315,21 @@ export class Charts {
     // uPlot keeps every plot that is not destroyed.
     for (const chart of this.#charts.flat()) chart.destroy();
     this.#host.replaceChildren();
-    this.#charts = sections.map(({ title, note, panels }, place) => {
+    this.#charts = sections.map(({ title, note, named, panels }, place) => {
       const section = document.createElement("section");
       const heading = document.createElement("h2");
       heading.textContent = title;
       const aside = document.createElement("span");
       aside.className = "note";
       aside.textContent = note;
+      const [{ names, styles }] = panels;
+      for (const [k, style] of named ? styles.entries() : []) {
+        const sample = document.createElement("span");
+        sample.className = "sample";
+        sample.innerHTML = swatch(style);
+        sample.append(names[k]);
+        aside.append(sample);
+      }
       heading.append(aside);
       if (place === 0) heading.append(this.#beginning());
       const row = document.createElement("div");

@@ -2,7 +2,8 @@
 
 import type { LoopData } from "./types";
 
-function swatch(kind: string): string {
+/** A sample of a line. */
+export function swatch(kind: string): string {
   return `<span class="swatch of-${kind}"></span>`;
 }
 

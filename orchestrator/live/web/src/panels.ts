@@ -18,6 +18,8 @@ export interface Panel {
 export interface Section {
   readonly title: string;
   readonly note: string;
+  /** Whether the heading names the lines: they are not the controllers'. */
+  readonly named?: boolean;
   readonly panels: readonly Panel[];
 }
 
@@ -60,11 +62,12 @@ export function sections(labels: readonly string[]): readonly Section[] {
     },
     {
       title: "Velocity of the control point",
-      note: "the observer's estimate, and the true one",
+      note: "",
+      named: true,
       panels: AXES.map((axis) => ({
         styles: ["first", "reference"],
-        names: ["estimated", "true"],
-        title: `velocity in <i>${axis}</i>`,
+        names: ["estimated by the observer", "true"],
+        title: `<i>y&#775;<sub>${axis}</sub></i>`,
         unit: "m/s",
       })),
     },

@@ -131,7 +131,6 @@ export class Scene {
       this.#lost = true;
       host.append(missing("The browser has dropped the path in space. Reload the page to see it."));
     });
-    addEventListener("beforeprint", () => this.drawNow());
     new ResizeObserver(() => this.#resize()).observe(host);
     this.#resize();
   }
