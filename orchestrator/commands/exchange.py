@@ -29,7 +29,7 @@ from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import INITIAL, ORDERS, read_order
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.loading import brings_its_own, left_behind, load
+from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_scenario
@@ -45,7 +45,7 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 
 
 #: Options of `verify` that are for a table only.
-_OF_TABLES = ("scenario", "order", "initial", "verbose", "events", "set")
+_OF_TABLES = ("scenario", "step", "order", "initial", "verbose", "events", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
@@ -129,6 +129,13 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         type=float,
         help="largest allowed deviation, relative to the larger of 1 and the port's largest value; "
         f"default: {TOLERANCE:g}; for an FMU, as its experiment states",
+    )
+    parser.add_argument(
+        "--step",
+        type=float,
+        metavar="S",
+        help="communication step of the tool's run [s]; default: the scenario's or FMU's, else "
+        f"{DEFAULT_STEP:g}",
     )
     parser.add_argument(
         "--order",
@@ -236,6 +243,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
                 raise InputError(f"--{name} applies only to tables: leave it out for an FMU")
         return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
+    system = replace(system, step=first_given(options.step, system.step))
     tables = read_scenario(options.events).events if options.events else ()
     certificate = verify(
         options.table,

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.exchange.verify import places_of_time, port_of
-from orchestrator.formats.tables import records
+from orchestrator.formats.tables import places_of_time, port_of, records
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.master.observers.table import Table

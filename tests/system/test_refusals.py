@@ -127,6 +127,7 @@ def test_bad_file_is_refused_in_one_line(
         ["animate", "fig4", "--step"],
         ["animate", "fig4", "--stop-time"],
         ["verify", "file.csv", "--tolerance"],
+        ["verify", "file.csv", "--step"],
     ],
 )
 def test_number_that_makes_no_sense_is_refused(workplace, refused, arguments, number):
