@@ -45,7 +45,7 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 
 
 #: Options of `verify` that are for a table only.
-_OF_TABLES = ("scenario", "step", "order", "initial", "verbose", "events", "set")
+_OF_TABLES = ("scenario", "step", "order", "initial", "events", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
@@ -154,7 +154,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         f"values); default: {INITIAL[0]}",
     )
     parser.add_argument(
-        "--verbose", action="store_true", help="list every column that was not compared"
+        "--verbose", action="store_true", help="name everything that was not compared"
     )
     parser.add_argument(
         "--events",
@@ -260,7 +260,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
 
 def _verify_carried(options: argparse.Namespace) -> int:
     """Verify an FMU by what it carries; nothing less than agreement in all of it will do."""
-    carried = Carried(options.table)
+    carried = Carried(options.table, options.verbose)
     show(f"{options.table.name}: FMI-LS-REF {carried.version}")
     for note in carried.notes:
         say(f"warning: {note}")

@@ -143,10 +143,11 @@ def comparison(
             f"with a tolerance of {tolerance:g}"
         )
     left = int((new & ~chosen).sum())
-    outputs = f"{len(expected.columns)} of {len(component.having('output'))} outputs"
+    n = len(expected.columns)
+    outputs = f"{n} outputs agree" if n > 1 else f"{n} output agrees"
     others = f", {left} rows are outside the run" * bool(left)
     return (
-        f"{outputs} agree in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
+        f"{outputs} in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
         f"they differ by at most {worst:.2g}, with a tolerance of {tolerance:g}"
     )
 

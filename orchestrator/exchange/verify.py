@@ -288,13 +288,13 @@ def _certificate(
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are not outputs: {_listed(table.others, verbose)}"
+        yield f"not compared: columns that are not outputs: {enumerated(table.others, verbose)}"
     if absent := [name for name in outputs if name not in table.columns]:
-        yield f"not in the table: {_listed(absent, verbose)}"
+        yield f"not in the table: {enumerated(absent, verbose)}"
 
 
-def _listed(names: Sequence[str], verbose: bool) -> str:
-    """Some names, or how many they are and the first of them."""
+def enumerated(names: Sequence[str], verbose: bool) -> str:
+    """All names, or how many they are and the first of them."""
     if verbose or len(names) <= _FIRST:
         return ", ".join(names)
     return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose lists all)"
