@@ -129,8 +129,10 @@ def assignments(options: argparse.Namespace) -> dict[PortName, object]:
     values: dict[PortName, object] = {}
     for text in options.set:
         name, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
+        if not equals or "." not in name:
+            raise InputError(
+                f"--set {text}: write COMPONENT.PARAMETER=VALUE, for example plant.noise.std=0"
+            )
         port = port_name(name.strip())
         # The last one wins, also over a group before it.
         values.pop(port, None)

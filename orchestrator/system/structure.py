@@ -85,6 +85,10 @@ class System:
         new = {}
         for name, value in self.expanded(values).items():
             target = self.named(name)
+            ports = [] if self.has(name) else self.members(str(name), ("parameter", "input"))
+            if ports:
+                members = listed([str(port) for port in ports])
+                raise InputError(f"{name}: takes a list of {len(ports)} values, for {members}")
             variable = self.component(target.component).variable(target.port)
             new[target] = typed(str(target), variable, value)
         return replace(self, parameters={**self.parameters, **new})
