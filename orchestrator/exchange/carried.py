@@ -237,8 +237,8 @@ class Carried:
         said = f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"
         outputs = (variable.name for variable in self._component.having("output"))
         absent = [name for name in outputs if name not in expected.columns]
-        names = enumerated(absent, self._verbose)
-        return f"{said}; no reference result: {names}" if absent else said
+        lacking = f"; no reference result: {enumerated(absent, self._verbose)}" if absent else ""
+        return f"{said}{lacking}"
 
     @staticmethod
     def _settings(element: Element) -> Element:

@@ -29,7 +29,6 @@ from orchestrator.master.hooks.events import Event, Events
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
-from orchestrator.runs.loading import first_given
 from orchestrator.runs.preparation import DEFAULT_STEP
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
@@ -123,8 +122,8 @@ def verify(
             f"{path}: no column is named after an output; outputs are named like {min(outputs)}"
             f"{_of_one(system, outputs, table.others)}"
         )
-    step, start_time = first_given(system.step, DEFAULT_STEP), system.start_time or 0.0
-    experiment = Experiment(float(table.time[-1]), step, start_time=start_time)
+    step = DEFAULT_STEP if system.step is None else system.step
+    experiment = Experiment(float(table.time[-1]), step, start_time=system.start_time or 0.0)
     complaints = []
     for way in algorithms:
         complaint = _complaint(table, system, experiment, events, way, tolerance)
