@@ -67,6 +67,13 @@ def test_name_of_no_port_is_refused(system):
         system.with_parameters({port_name("a.b.x"): 1})
 
 
+def test_name_without_a_component_is_refused_with_those_that_have_it(system):
+    with pytest.raises(InputError, match=r"'k': .*; did you mean a\.k or a\.b\.k or c d\.k\?"):
+        system.with_parameters({"k": 1})
+    with pytest.raises(InputError, match=r"'z': write COMPONENT\.PORT or COMPONENT\.PARAMETER$"):
+        system.with_parameters({"z": 1})
+
+
 def test_output_that_is_calculated_cannot_be_set(system):
     with pytest.raises(InputError, match=r"a\.y has causality output and cannot be set"):
         system.with_parameters({port_name("a.y"): 1.0}).check()
