@@ -357,6 +357,9 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
 
     """
     fed = {connection.target for connection in system.connections}
+    feeding = {
+        (connection.source.component, connection.target.port) for connection in system.connections
+    }
     taken = {*fed, *system.parameters, *system.left_open, *settled}
     labels: list[str] = []
     wires: list[str] = []
@@ -370,10 +373,13 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
                 labels += [f"{name}.{variable.name}" for variable in found]
                 continue
             labels.append(f"{name}.{group}.*")
+            # What feeds the same inputs of another component is that one's.
             sources = [
                 other
                 for other, source in system.components.items()
-                if other != name and all(_could_feed(source, variable) for variable in members)
+                if other != name
+                and all(_could_feed(source, variable) for variable in members)
+                and not any((other, variable.name) in feeding for variable in members)
             ]
             if len(sources) == 1:
                 wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')
