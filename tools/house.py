@@ -34,7 +34,6 @@ REASONS = {
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
     "fmus/python/own.py": "a program of its own: python -m fmus.python.own",
     "orchestrator/commands/listing.py": "imports nothing that takes longer than the command",
-    "orchestrator/commands/run_command.py": "needs no studies, which other commands import",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/exchange/hosts/drivers.py": "a function for each tool, and nothing of ours",
     "orchestrator/paper/claims.py": "a function for each claim of the paper",

@@ -215,7 +215,7 @@ def paper() -> dict[str, str]:
         return ball(theta, eps_t, Gains().sigma)
 
     return {
-        "theorem": "```\n" + "\n".join(stated(found)) + "\n```",
+        "theorem": "```text\n" + "\n".join(stated(found)) + "\n```",
         "missing_force": f"{0.1 * turning * vehicle.m11 / vehicle.m33:.1f}",
         "skew_part": f"{0.2 * skew:.0f}",
         "power_of_p2_2": f"{-0.5 * vehicle.m66 / ELL**3:.0f}",

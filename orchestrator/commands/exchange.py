@@ -29,7 +29,7 @@ from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import INITIAL, ORDERS, read_order
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.loading import brings_its_own, left_behind, load
+from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_scenario
@@ -45,7 +45,7 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 
 
 #: Options of `verify` that are for a table only.
-_OF_TABLES = ("scenario", "order", "initial", "verbose", "events", "set")
+_OF_TABLES = ("scenario", "step", "order", "initial", "events", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
@@ -131,6 +131,13 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         f"default: {TOLERANCE:g}; for an FMU, as its experiment states",
     )
     parser.add_argument(
+        "--step",
+        type=float,
+        metavar="S",
+        help="communication step of the tool's run [s]; default: the scenario's or FMU's, else "
+        f"{DEFAULT_STEP:g}",
+    )
+    parser.add_argument(
         "--order",
         type=read_order,
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
@@ -147,7 +154,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         f"values); default: {INITIAL[0]}",
     )
     parser.add_argument(
-        "--verbose", action="store_true", help="list every column that was not compared"
+        "--verbose", action="store_true", help="name everything that was not compared"
     )
     parser.add_argument(
         "--events",
@@ -236,6 +243,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
                 raise InputError(f"--{name} applies only to tables: leave it out for an FMU")
         return _verify_carried(options)
     system = load(options.scenario).with_parameters(assignments(options))
+    system = replace(system, step=first_given(options.step, system.step))
     tables = read_scenario(options.events).events if options.events else ()
     certificate = verify(
         options.table,
@@ -252,7 +260,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
 
 def _verify_carried(options: argparse.Namespace) -> int:
     """Verify an FMU by what it carries; nothing less than agreement in all of it will do."""
-    carried = Carried(options.table)
+    carried = Carried(options.table, options.verbose)
     show(f"{options.table.name}: FMI-LS-REF {carried.version}")
     for note in carried.notes:
         say(f"warning: {note}")

@@ -122,7 +122,7 @@ def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="auv-fmu",
         description="Co-simulate an autonomous underwater vehicle with limited torque and "
-        "without velocity sensors, from FMI 2.0 components.",
+        "without velocity sensors, from FMI components.",
         epilog="Exit status: 0 on success; 1 if a simulation failed (its rows are kept); 2 for bad "
         "usage or input; 130 after Ctrl-C. `auv-fmu COMMAND --help` shows the options of a command "
         "and an example.",

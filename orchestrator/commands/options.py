@@ -14,7 +14,6 @@ from orchestrator.master.observers.observer import Ending
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.request import Request, flag, option_fields
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 
 T = TypeVar("T")
@@ -124,15 +123,14 @@ def status(name: str, ending: Ending) -> int:
     return FAILED
 
 
-def assignments(options: argparse.Namespace) -> dict[PortName, object]:
+def assignments(options: argparse.Namespace) -> dict[str, object]:
     """The values of --set."""
-    values: dict[PortName, object] = {}
+    values: dict[str, object] = {}
     for text in options.set:
-        name, equals, value = text.partition("=")
+        name, equals, value = map(str.strip, text.partition("="))
         if not equals:
             raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
-        port = port_name(name.strip())
         # The last one wins, also over a group before it.
-        values.pop(port, None)
-        values[port] = value.strip()
+        values.pop(name, None)
+        values[name] = value
     return values

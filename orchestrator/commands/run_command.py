@@ -49,15 +49,20 @@ def add_run(parser: argparse.ArgumentParser) -> None:
 def _run(options: argparse.Namespace) -> int:
     wanted = request(options)
     runs = with_companion(prepare(*read_system(options), wanted), wanted)
-    findings = Findings(options.strict)
+    files, findings = from_options(Files, options), Findings(options.strict)
     for prepared in runs:
         for doubt in prepared.doubts():
             findings.note(f"{prepared.scenario.name}: {doubt}")
+    step = runs[0].experiment.step
+    if files.interval is not None and files.interval < step:
+        findings.note(
+            f"--interval {files.interval:g}: shorter than the step of {step:g} s, so that the "
+            "table has a row for each step"
+        )
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
-    files = from_options(Files, options)
     draw = None if files.no_figures else _drawing()
     # Until all is written: a user who stops a run several times wants to know where its rows are.
     with held_interrupts(_answer, is_last=True):

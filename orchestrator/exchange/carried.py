@@ -18,7 +18,7 @@ import numpy as np
 
 from fmus.discovery import RELATED, RELATED_MANIFEST
 from orchestrator.exchange.series import Series, comparison, read_series
-from orchestrator.exchange.verify import TOLERANCE, check_tolerance
+from orchestrator.exchange.verify import TOLERANCE, check_tolerance, enumerated
 from orchestrator.formats.ssp.archive import read_document
 from orchestrator.formats.ssp.reader import bind_parameter_set
 from orchestrator.machine.errors import Findings, InputError
@@ -91,14 +91,18 @@ class _Trial(NamedTuple):
 class Carried:
     """The experiments that an FMU carries."""
 
-    def __init__(self, fmu: Path) -> None:
+    def __init__(self, fmu: Path, verbose: bool = False) -> None:
         """Read the manifest.
+
+        Args:
+            fmu: the file.
+            verbose: whether all outputs without a result are named.
 
         Raises:
             InputError: there is no FMU, or nothing in it that it could be verified with.
 
         """
-        self._fmu = fmu
+        self._fmu, self._verbose = fmu, verbose
         self._findings = Findings()
         self._system = read_fmu(fmu, self._findings)
         [self._component] = self._system.components.values()
@@ -230,7 +234,11 @@ class Carried:
         plan = make_plan(system, Experiment(stop, step, start_time=start))
         simulate_to_end(plan, [table], hooks=hooks)
         _note_unknown(expected, "the table of results", findings)
-        return f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"
+        said = f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"
+        outputs = (variable.name for variable in self._component.having("output"))
+        absent = [name for name in outputs if name not in expected.columns]
+        lacking = f"; no reference result: {enumerated(absent, self._verbose)}" if absent else ""
+        return f"{said}{lacking}"
 
     @staticmethod
     def _settings(element: Element) -> Element:

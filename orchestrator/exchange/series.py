@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.exchange.verify import places_of_time, port_of
-from orchestrator.formats.tables import records
+from orchestrator.formats.tables import places_of_time, port_of, records
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.master.observers.table import Table
@@ -144,10 +143,11 @@ def comparison(
             f"with a tolerance of {tolerance:g}"
         )
     left = int((new & ~chosen).sum())
-    outputs = f"{len(expected.columns)} of {len(component.having('output'))} outputs"
+    n = len(expected.columns)
+    outputs = f"{n} outputs agree" if n > 1 else f"{n} output agrees"
     others = f", {left} rows are outside the run" * bool(left)
     return (
-        f"{outputs} agree in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
+        f"{outputs} in {len(times)} rows from t = {times[0]:g} to {times[-1]:g} s{others}; "
         f"they differ by at most {worst:.2g}, with a tolerance of {tolerance:g}"
     )
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.formats.tables import SEPARATORS, Record, records
+from orchestrator.formats.tables import SEPARATORS, Record, places_of_time, port_of, records
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import (
     DELAY,
@@ -42,18 +41,12 @@ TOLERANCE = 1e-6
 #: How many names of a list are said where not all are.
 _FIRST = 5
 
-#: Columns that name the time, in lower case.
-_TIME = ("time", "t")
-
 #: What is said of the exchange before the first step.
 _STARTS = {
     FULL: "",
     NONE: ", no values exchanged in initialisation mode",
     ZERO: ", no values exchanged before the first step",
 }
-
-#: What ecos puts after a name.
-_TYPE = re.compile(r"\[[A-Z]+\]$")
 
 
 class Algorithm(NamedTuple):
@@ -127,14 +120,32 @@ def verify(
     if not table.columns:
         raise InputError(
             f"{path}: no column is named after an output; outputs are named like {min(outputs)}"
+            f"{_of_one(system, outputs, table.others)}"
         )
+    step = DEFAULT_STEP if system.step is None else system.step
+    experiment = Experiment(float(table.time[-1]), step, start_time=system.start_time or 0.0)
     complaints = []
     for way in algorithms:
-        complaint = _complaint(table, system, events, way, tolerance)
+        complaint = _complaint(table, system, experiment, events, way, tolerance)
         if complaint is None:
             return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
         complaints.append(f"{way.words} {complaint}")
     raise InputError(f"{path}: {'; '.join(complaints)}")
+
+
+def _of_one(system: System, outputs: Collection[str], columns: Sequence[str]) -> str:
+    """A hint for the table of a tool that ran one component only; empty: it is none."""
+    longest = max(map(len, outputs), default=0)
+    found = {
+        component.fmu.name: sum(
+            port_of(f"{name}.{column.strip()}", outputs, longest) is not None for column in columns
+        )
+        for name, component in system.components.items()
+    }
+    fmu = max(found, key=lambda name: found[name])
+    if not found[fmu]:
+        return ""
+    return f"; for the table of a tool that ran only {fmu}, add --scenario {fmu}"
 
 
 def check_tolerance(tolerance: float) -> None:
@@ -176,14 +187,17 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
 
 
 def _complaint(
-    table: ForeignTable, system: System, events: Sequence[Event], way: Algorithm, tolerance: float
+    table: ForeignTable,
+    system: System,
+    experiment: Experiment,
+    events: Sequence[Event],
+    way: Algorithm,
+    tolerance: float,
 ) -> str | None:
     """What is wrong with a table, seen from our own run; None: nothing."""
-    stop_time = float(table.time[-1])
     ours = _Samples(table.time, tuple(table.columns))
     try:
-        step, start_time = system.step or DEFAULT_STEP, system.start_time or 0.0
-        experiment = Experiment(stop_time, step, way.order, start_time, way.coupling)
+        experiment = replace(experiment, order=way.order, coupling=way.coupling)
         hooks = [Events(events)] if events else []
         simulate_to_end(make_plan(system, experiment), [ours], way.exchange, hooks)
     except InputError as error:
@@ -273,13 +287,13 @@ def _certificate(
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are not outputs: {_listed(table.others, verbose)}"
+        yield f"not compared: columns that are not outputs: {enumerated(table.others, verbose)}"
     if absent := [name for name in outputs if name not in table.columns]:
-        yield f"not in the table: {_listed(absent, verbose)}"
+        yield f"not in the table: {enumerated(absent, verbose)}"
 
 
-def _listed(names: Sequence[str], verbose: bool) -> str:
-    """Some names, or how many they are and the first of them."""
+def enumerated(names: Sequence[str], verbose: bool) -> str:
+    """All names, or how many they are and the first of them."""
     if verbose or len(names) <= _FIRST:
         return ", ".join(names)
     return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose lists all)"
@@ -369,29 +383,6 @@ def _table(
         others,
         len(times) - int(new.sum()),
     )
-
-
-def places_of_time(names: Sequence[str]) -> list[int]:
-    """Where a table has its times; several places, or none, are a mistake."""
-    lowered = [name.strip().lower() for name in names]
-    found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
-    return next(filter(None, found), [])
-
-
-def port_of(name: str, known: Collection[str], longest: int) -> str | None:
-    """Our name of a column: some tools write component::port, [REAL] after it, or systems before.
-
-    Args:
-        name: of the column.
-        known: our names; of those that it ends with, the longest counts.
-        longest: length of the longest of them.
-
-    """
-    name = name.strip()
-    plain = _TYPE.sub("", name).replace("::", ".")
-    end = plain[-longest - 1 :]
-    ends = (end[i + 1 :] for i, character in enumerate(end) if character == ".")
-    return next((ours for ours in (name, plain, *ends) if ours in known), None)
 
 
 def _value(text: str, fmi_type: str, where: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
@@ -21,6 +22,12 @@ ROWS_AT_ONCE = 8192
 
 #: What separates the values of a row.
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
+
+#: Columns that name the time, in lower case.
+_TIME = ("time", "t")
+
+#: What ecos puts after a name.
+_TYPE = re.compile(r"\[[A-Z]+\]$")
 
 #: What a file is not that cannot be read.
 _NO_RUN = "not a table of a run"
@@ -107,6 +114,29 @@ def records(
             yield names, _records(reader, len(names))
         except csv.Error as error:
             raise ValueError(f"line {reader.line_num}: {error}") from error
+
+
+def places_of_time(names: Sequence[str]) -> list[int]:
+    """Where a table has its times; several places, or none, are a mistake."""
+    lowered = [name.strip().lower() for name in names]
+    found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
+    return next(filter(None, found), [])
+
+
+def port_of(name: str, known: Collection[str], longest: int) -> str | None:
+    """Our name of a column: some tools write component::port, [REAL] after it, or systems before.
+
+    Args:
+        name: of the column.
+        known: our names; of those that it ends with, the longest counts.
+        longest: length of the longest of them.
+
+    """
+    name = name.strip()
+    plain = _TYPE.sub("", name).replace("::", ".")
+    end = plain[-longest - 1 :]
+    ends = (end[i + 1 :] for i, character in enumerate(end) if character == ".")
+    return next((ours for ours in (name, plain, *ends) if ours in known), None)
 
 
 def parquet() -> Any:

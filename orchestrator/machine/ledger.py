@@ -107,9 +107,12 @@ class Ledger:
         for name in names:
             while taken := self._taken(name):
                 if not self._force:
+                    what = "not a file that auv-fmu wrote, or was changed since"
+                    if taken.is_dir() and not taken.is_symlink():
+                        what = "a folder"
                     raise Taken(
-                        f"{taken} is not a file that auv-fmu wrote, or was changed since: move it, "
-                        "choose another place (--out), or let --force move it aside"
+                        f"{taken} is {what}: move it, choose another place (--out), or let --force "
+                        "move it aside"
                     )
                 move_aside(taken)
 

@@ -43,7 +43,7 @@ _TITLE = "# Section 4 reproduced"
 
 _INTRODUCTION = """\
 *Three-dimensional tracking control of autonomous underwater vehicles with limited torque and \
-without velocity sensors*, simulated from FMI 2.0 components. Differences from the paper are \
+without velocity sensors*, simulated from FMI components. Differences from the paper are \
 stated; no parameter was chosen to bring the results closer. The paper gives neither the level of \
 its measurement noise nor the end times of its figures: the scenarios have ours, and all but Fig. \
 4 run without noise, so that roughness in a signal comes from the controller itself. In every run \

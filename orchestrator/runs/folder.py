@@ -159,15 +159,14 @@ def lock_folder(folder: Path) -> Iterator[None]:
             yield
     except BlockingIOError:
         raise InputError(
-            f"another run is writing into {folder}; wait for it, or choose another folder "
-            "(--out DIR)"
+            f"another run is writing into {folder}; wait for it, or choose another place (--out)"
         ) from None
 
 
 def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
     if isinstance(error, Taken):
         return f"{error}{rest}"
-    hint = "; choose another folder (--out DIR)" if isinstance(error, OSError) else ""
+    hint = "; choose another place (--out)" if isinstance(error, OSError) else ""
     return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
 
 

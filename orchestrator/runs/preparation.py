@@ -132,7 +132,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         InputError: something about the request cannot be done.
 
     """
-    findings, values = Findings(request.strict), system.expanded(request.values)
+    findings, values = Findings(request.strict), system.expanded(request.parameters)
     system = system.with_parameters(values)
     input_table = None
     if request.inputs is not None:
@@ -189,7 +189,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
     inputs = scenario.inputs or companion.inputs
     followed = set(map(system.named, inputs.content[0])) if inputs else ()
-    given = prepared.system.expanded(request.values)
+    given = prepared.system.expanded(request.parameters)
     shared = {
         target: value
         for target, value in {**scenario.parameters, **given}.items()

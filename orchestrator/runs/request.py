@@ -26,7 +26,6 @@ from orchestrator.master.hooks.checkpoint import check_every
 from orchestrator.master.loop import LOOPS, LoopName
 from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
 from orchestrator.master.observers.observer import check_interval
-from orchestrator.system.names import PortName, port_name
 from orchestrator.system.values import literal
 
 
@@ -168,11 +167,6 @@ class Request:
     ] = None
     strict: Annotated[bool, CliOption("treat warnings as errors", action="store_true")] = False
     steps: Mapping[str, float] = field(default_factory=dict, hash=False)
-
-    @property
-    def values(self) -> dict[PortName, object]:
-        """The parameters, by names of ports."""
-        return {port_name(str(name)): value for name, value in self.parameters.items()}
 
     @property
     def label(self) -> str:

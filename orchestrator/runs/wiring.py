@@ -47,7 +47,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
     for target, source in wires.items():
         with findings.collecting():
             connections += _wire(components, target, source)
-    groups = {**wiring["wires"], **scenario.wires}
+    groups = {*wiring["wires"], *scenario.wires, *_left_open(chosen, wiring)}
     left_open = {
         PortName(name, variable.name)
         for name, component in components.items()
@@ -68,6 +68,15 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
             system = system.with_parameters({port: value})
     findings.refuse()
     return system
+
+
+def _left_open(chosen: Mapping[str, str], wiring: Mapping[str, Any]) -> Iterator[str]:
+    """The groups of inputs that the closed loop leaves open, of all components of the same FMU."""
+    for target, source in wiring["wires"].items():
+        if source is False:
+            component, group = target.split(".")
+            standard = wiring["components"][component]
+            yield from (f"{name}.{group}" for name, fmu in chosen.items() if fmu == standard)
 
 
 def _changed(

@@ -14,9 +14,12 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
-from orchestrator.system.names import PortName, listed, plain_file_names, splits
+from orchestrator.system.names import PortName, listed, plain_file_names, port_name, splits
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
 from orchestrator.system.values import EXACT, TYPES, Value, typed, unit_of
+
+#: Values by the names of ports or of groups, taken apart or as text.
+Values = Mapping[PortName, object] | Mapping[str, object]
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -71,7 +74,7 @@ class System:
         """One line: a system's descriptions are long."""
         return f"<System {self.name}: {', '.join(self.components)}>"
 
-    def with_parameters(self, values: Mapping[PortName, object]) -> System:
+    def with_parameters(self, values: Values) -> System:
         """The same system with further values, which win over its own.
 
         Args:
@@ -85,23 +88,38 @@ class System:
         new = {}
         for name, value in self.expanded(values).items():
             target = self.named(name)
+            ports = [] if self.has(name) else self.members(str(name), ("parameter", "input"))
+            if ports:
+                members = listed([str(port) for port in ports])
+                raise InputError(f"{name}: takes a list of {len(ports)} values, for {members}")
             variable = self.component(target.component).variable(target.port)
             new[target] = typed(str(target), variable, value)
         return replace(self, parameters={**self.parameters, **new})
 
-    def expanded(self, values: Mapping[PortName, object]) -> dict[PortName, object]:
+    def expanded(self, values: Values) -> dict[PortName, object]:
         """Values by ports only: a list for a group has a value for each member. The last one wins.
 
         Raises:
-            InputError: a list is not as long as its group.
+            InputError: a name is not one of a port, or a list is not as long as its group.
 
         """
         found: dict[PortName, object] = {}
-        for name, value in values.items():
+        for said, value in values.items():
+            name = said if isinstance(said, PortName) else self._port_name(str(said))
             several = None if self.has(name) else _several(value)
             ports = [] if several is None else self.members(str(name), ("parameter", "input"))
             found |= dict(paired(name, ports, several)) if several and ports else {name: value}
         return found
+
+    def _port_name(self, text: str) -> PortName:
+        """The name of a port; where it lacks a component, the message says which ones have it."""
+        try:
+            return port_name(text)
+        except InputError as error:
+            whole = (f"{name}.{text}" for name in self.components)
+            having = [name for name in whole if self.has(port_name(name))]
+            hint = f"; did you mean {' or '.join(having)}?" if having else ""
+            raise InputError(f"{error}{hint}") from None
 
     def members(self, text: str, causalities: Sequence[str]) -> list[PortName]:
         """The ports of a group `component.group`, in their order; none: there is no such group."""
@@ -339,6 +357,9 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
 
     """
     fed = {connection.target for connection in system.connections}
+    feeding = {
+        (connection.source.component, connection.target.port) for connection in system.connections
+    }
     taken = {*fed, *system.parameters, *system.left_open, *settled}
     labels: list[str] = []
     wires: list[str] = []
@@ -352,10 +373,13 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
                 labels += [f"{name}.{variable.name}" for variable in found]
                 continue
             labels.append(f"{name}.{group}.*")
+            # What feeds the same inputs of another component is that one's.
             sources = [
                 other
                 for other, source in system.components.items()
-                if other != name and all(_could_feed(source, variable) for variable in members)
+                if other != name
+                and all(_could_feed(source, variable) for variable in members)
+                and not any((other, variable.name) in feeding for variable in members)
             ]
             if len(sources) == 1:
                 wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')

@@ -5,7 +5,7 @@ Among the former: which velocities reach a controller that is to do without.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching
-from orchestrator.system.names import PortName, port_name
+from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import type_of, unit_of
+from orchestrator.system.values import literal, type_of, unit_of
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, real_parameter, value_of, vehicle
 
 #: References that are farther apart are not the same [m].
@@ -157,7 +157,31 @@ def cautions_beside(
         loops: that both have.
 
     """
-    return [line for loop in loops for line in _of_the_reference(table, name, other, loop)]
+    references = (line for loop in loops for line in _of_the_reference(table, name, other, loop))
+    return [*references, *_of_the_surroundings(table, name, other, loops)]
+
+
+def _of_the_surroundings(
+    table: Table, name: str, other: Table, loops: Sequence[Loop]
+) -> Iterator[str]:
+    """Which parameters differ, besides those of the controllers that are compared."""
+    controllers = {loop.controller for loop in loops}
+    ours, theirs = (
+        {port for port in one.parameters if port.component in controllers} for one in (table, other)
+    )
+    if ours == theirs:
+        # Something else is compared.
+        return
+    differing = [
+        f"{port} = {literal(value)}, not {literal(other.parameters[port])}"
+        for port, value in table.parameters.items()
+        if port not in ours and other.parameters.get(port, value) != value
+    ]
+    if differing:
+        yield (
+            f"its parameters are not {name}'s: {listed(differing, '; ')}; a value that {name} sets "
+            "applies to both"
+        )
 
 
 def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list[str]:

@@ -70,13 +70,13 @@ def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) ->
 def test_scenario_of_a_guide_runs_and_is_drawn(
     page: Path, number: int, capsys: pytest.CaptureFixture[str]
 ):
-    """What it says of its stop time holds, unless the command line says another."""
+    """Nothing in it is doubtful; its stop time holds, unless the command line says another."""
     [table] = [text for _, text in blocks(EVENTS, "text") if text.startswith("time")]
     Path("inputs.csv").write_text(table)
     executed(SCENARIOS, capsys)
     Path("survey.csv").write_text("x,y,z\n3,6,0\n15,6,4\n15,10,4\n")
     Path("mine.toml").write_text(blocks(page, "toml")[number].text)
-    assert main(["run", "mine.toml", "--stop-time", "2", "--kind", "native"]) == 0
+    assert main(["run", "mine.toml", "--stop-time", "2", "--kind", "native", "--strict"]) == 0
     assert [*Path("results/mine").glob("mine*.png")]
     assert json.loads(Path("results/mine/metrics.json").read_text())["stop_time"] == 2.0
 

@@ -9,6 +9,7 @@ from importlib import import_module
 from pathlib import Path
 
 import pytest
+from markdown_it import MarkdownIt
 
 from auv_fmu import __version__
 from orchestrator.commands.main import main, parser
@@ -60,6 +61,13 @@ def test_links_lead_somewhere(page: Path):
     for target in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
         if "://" not in target:
             assert (page.parent / target).exists(), target
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_code_is_fenced_and_names_its_language(page: Path):
+    tokens = MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
+    code = [token for token in tokens if token.type in ("code_block", "fence")]
+    assert all(token.info for token in code)
 
 
 def test_packages_say_that_they_are_typed():

@@ -37,7 +37,7 @@ def text_of(title):
 def test_gains_prints_the_lines_of_the_page(dist):
     lines = "\n".join(stated(theorem_of(loop_of(dist))))
     assert lines in gain_check(loop_of(dist))
-    assert f"```\n{lines}\n```" in PAGE.read_text(encoding="utf-8")
+    assert f"```text\n{lines}\n```" in PAGE.read_text(encoding="utf-8")
 
 
 def test_every_point_of_the_page_names_the_tests_that_show_it():

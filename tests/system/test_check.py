@@ -19,7 +19,8 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names
 from orchestrator.runs.simulate import simulate
 from orchestrator.system.component import read_component
-from orchestrator.system.structure import System, unfed_inputs
+from orchestrator.system.names import PortName
+from orchestrator.system.structure import Connection, System, unfed_inputs
 from support.others import build
 
 SCENARIO = """
@@ -140,7 +141,10 @@ def test_a_forgotten_connection_of_an_archive_is_named(workplace, capsys):
 
 
 def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
-    """A wire has a group of ports on each side; two that have the outputs are one too many."""
+    """A wire has a group of ports on each side; two that have the outputs are one too many.
+
+    What feeds the group of another component is not proposed.
+    """
     change = ('name="u"', 'name="y.y"'), ('name="y"', 'name="y.y"')
     taking, giving = (tmp_path / name for name in ("taking", "giving"))
     for folder in (taking, giving):
@@ -154,6 +158,10 @@ def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
     assert unfed_inputs(system) == f'{ours}; wire "a.y" = "b.y"'
     twice = replace(system, components={"a": a, "b": b, "c": replace(b, name="c")})
     assert "wire" not in str(unfed_inputs(twice))
+    fed = Connection(PortName("b", "y.y"), PortName("d", "y.y"))
+    other = replace(system, components={"a": a, "b": b, "d": replace(a, name="d")})
+    assert '"a.y" = "b.y"' in str(unfed_inputs(other))
+    assert "wire" not in str(unfed_inputs(replace(other, connections=(fed,))))
 
 
 @pytest.mark.parametrize(

@@ -15,6 +15,7 @@ from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import STANDARD
 from support.markdown import DOCS, blocks
 from support.texts import mentions
@@ -116,6 +117,38 @@ def test_references_that_differ_are_said(workplace, capsys):
         assert read_scenario(name).compare
         assert main(["run", name, "--stop-time", "1", "--no-figures", "--kind", "native"]) == 0
         assert "its reference" not in capsys.readouterr().err
+
+
+def test_parameters_that_differ_are_said(workplace, capsys):
+    """Not those of the controllers, which are compared, and nothing where it is one controller."""
+    command = ["run", "mine.toml", "--stop-time", "0.1", "--no-figures", "--kind", "native"]
+    for text, said in (
+        ("", "fig5-pd: mine's plant.noise.std = 0.0, 0.001;"),
+        ("parameters.plant.noise.std = 0.0\nparameters.controller.k_d = 9.0\n", ""),
+        (f"{PD}[parameters]\ncontroller.eps_t = 5.0\n", ""),
+    ):
+        Path("mine.toml").write_text(f'compare = "fig5-pd"\n{text}')
+        assert main(command) == 0
+        warned = [line for line in capsys.readouterr().err.splitlines() if "warning: fig5" in line]
+        assert len(warned) == bool(said)
+        assert mentions("".join(warned), said)
+
+
+@pytest.mark.parametrize("name", [name for name in names() if read_scenario(name).compare])
+def test_the_ready_scenarios_give_their_companions_the_same_parameters(name):
+    ours, theirs = (
+        {
+            port: system.value(port)
+            for component in system.components.values()
+            for variable in component.having("parameter")
+            if (port := PortName(component.name, variable.name)).component != STANDARD.controller
+        }
+        for system in (
+            one.system
+            for one in with_companion(prepare(*load_scenario(name), Request()), Request())
+        )
+    )
+    assert ours == theirs
 
 
 def test_an_event_of_the_scenario_leaves_a_table_of_the_companion_alone(workplace):

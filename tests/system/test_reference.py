@@ -59,6 +59,27 @@ def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
     assert "in gauss-seidel order" in verify(path, system, 1e-12)
 
 
+def test_own_table_of_another_step_is_verified_with_that_step(workplace, capsys):
+    """The last step is shorter."""
+    command = "run fig4 --kind native --step 0.03 --stop-time 1 --no-figures --out ours"
+    assert main(command.split()) == 0
+    assert main(["verify", "ours/result.csv"]) == 2
+    capsys.readouterr()
+    assert main(["verify", "ours/result.csv", "--step", "0.03", "--tolerance", "0"]) == 0
+    assert tells(capsys.readouterr().out, (70, 70, 0, 34, 0.03, 1))
+
+
+def test_table_of_one_fmu_is_told_from_that_of_a_system(system: System, tmp_path: Path):
+    """Most of its columns are the plant's; others have a `fault`, too."""
+    path = tmp_path / "table.csv"
+    path.write_text("time,fault,eta.x[REAL], y.x\n0,false,2,2\n1,false,2,2\n")
+    with pytest.raises(InputError, match=r"only AuvPlant\.fmu, add --scenario AuvPlant\.fmu$"):
+        verify(path, system, 1e-6)
+    path.write_text("time,depth\n0,2\n1,2\n")
+    with pytest.raises(InputError, match=r"named like [\w.]+$"):
+        verify(path, system, 1e-6)
+
+
 @pytest.mark.parametrize("name", ["MotionPlanner", "DisturbanceGenerator"])
 def test_table_of_a_tool_that_runs_one_fmu_is_verified(dist, tmp_path, capsys, name):
     """Its columns have the names of ports, without a component."""

@@ -127,6 +127,7 @@ def test_bad_file_is_refused_in_one_line(
         ["animate", "fig4", "--step"],
         ["animate", "fig4", "--stop-time"],
         ["verify", "file.csv", "--tolerance"],
+        ["verify", "file.csv", "--step"],
     ],
 )
 def test_number_that_makes_no_sense_is_refused(workplace, refused, arguments, number):
@@ -147,6 +148,9 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
     [
         ("run fig99", "'fig99'; fig4"),
         ("run fig4 --set plant.m11", "COMPONENT.PARAMETER=VALUE"),
+        ("run fig4 --set m11=3", "'m11' COMPONENT.PARAMETER; plant.m11"),
+        ("run fig4 --set controller.K1=5", "controller.K1 3 controller.K1[1], controller.K1[3]"),
+        ("run fig4 --strict --interval 0.001", "--interval 0.001 0.02"),
         ("run fig4 --set plant.noise.seed=4294967297", "plant.noise.seed"),
         ("run fig4 --set plant.noise.seed=1_0", "integer"),
         ("run fig4 --set plant.m11=\u0662", "real"),

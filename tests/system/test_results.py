@@ -54,6 +54,14 @@ def test_interval_and_columns_choose_from_the_same_numbers():
     }
 
 
+def test_interval_below_the_step_is_said(capsys):
+    for interval, wanted in (("0.019", True), ("0.02", False)):
+        given = ["--stop-time", "0.1", "--no-figures", "--interval", interval]
+        assert main(["run", "fig4", *given]) == 0
+        assert mentions(capsys.readouterr().err, "--interval 0.019 0.02") == wanted
+        assert len(rows("results/fig4/result.csv")) == 6
+
+
 def test_a_companion_without_a_column_does_without_it():
     arguments = ["--stop-time", "0.1", "--no-figures", "--columns", "controller.y_hat,plant.y"]
     assert main(["run", "fig5", *arguments]) == 0

@@ -241,7 +241,7 @@ def test_what_is_left_alone_is_said_and_refused_where_it_is_asked_for(fmu, tmp_p
     assert mentions(table.ending.messages[0], "a bytes, clock")
     for name, words in (
         ("bytes", "a.bytes Binary"), ("clock", "a.clock Clock"), ("n", "a.n structuralParameter"),
-        ("v", "a.v array v[1]"), ("v[4]", "a v[4]"),
+        ("v", "a.v list 3 a.v[1]"), ("v[4]", "a v[4]"),
     ):  # fmt: skip
         with pytest.raises(InputError) as error:
             run(typed.system_of(fmu, parameters={f"a.{name}": 1}))

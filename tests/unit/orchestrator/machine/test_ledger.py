@@ -42,6 +42,14 @@ def test_what_was_written_is_replaced_and_what_was_changed_is_not(tmp_path: Path
     assert contents(tmp_path) == {"a": b"third", "below/b": b"third", "below/b.~1~": b"mine"}
 
 
+def test_folder_that_is_in_the_way_is_called_one(tmp_path: Path):
+    (tmp_path / "a").mkdir()
+    with pytest.raises(Taken, match="/a is a folder: move it"):
+        write(tmp_path, "ours", "a")
+    write(tmp_path, "ours", "a", force=True)
+    assert (tmp_path / "a.~1~").is_dir()
+
+
 def test_what_was_changed_is_not_removed(tmp_path: Path):
     ledger = write(tmp_path, "ours", "a", "b", "below/c")
     (tmp_path / "a").write_text("mine")

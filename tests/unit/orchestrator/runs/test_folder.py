@@ -122,7 +122,7 @@ def test_a_failing_disk_keeps_what_was_there_and_what_is_worth_it(tmp_path: Path
     write(tmp_path / "r", "a.csv", text="old")
     before = contents(tmp_path)
     full = OSError(errno.ENOSPC, "No space left on device")
-    with pytest.raises(InputError, match="No space left on device; choose another folder"):
+    with pytest.raises(InputError, match="No space left on device; choose another place"):
         write_half(tmp_path / "r", full)
     assert contents(tmp_path) == before
     for name in ("incomplete", "incomplete-2"):
@@ -296,7 +296,7 @@ def test_a_run_that_came_to_no_end_takes_the_place_of_another_such(tmp_path: Pat
 def test_a_folder_in_the_way_changes_nothing(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="old")
     (tmp_path / "r" / "z.csv").mkdir()
-    with pytest.raises(InputError, match=r"z\.csv is not a file that auv-fmu wrote"):
+    with pytest.raises(InputError, match=r"z\.csv is a folder"):
         write(tmp_path / "r", "a.csv", "z.csv")
     assert (tmp_path / "r" / "a.csv").read_text() == "old"
     assert (tmp_path / "r" / RECORD).is_file()

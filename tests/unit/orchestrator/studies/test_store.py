@@ -168,7 +168,7 @@ def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
     (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)
     check_refused(r"unfinished\.sqlite is not a file that auv-fmu wrote", tmp_path / "study")
     (tmp_path / "file").touch()
-    check_refused("cannot write into .*choose another folder", tmp_path / "file")
+    check_refused("cannot write into .*choose another place", tmp_path / "file")
 
 
 BLOCK = 50

@@ -67,6 +67,13 @@ def test_name_of_no_port_is_refused(system):
         system.with_parameters({port_name("a.b.x"): 1})
 
 
+def test_name_without_a_component_is_refused_with_those_that_have_it(system):
+    with pytest.raises(InputError, match=r"'k': .*; did you mean a\.k or a\.b\.k or c d\.k\?"):
+        system.with_parameters({"k": 1})
+    with pytest.raises(InputError, match=r"'z': write COMPONENT\.PORT or COMPONENT\.PARAMETER$"):
+        system.with_parameters({"z": 1})
+
+
 def test_output_that_is_calculated_cannot_be_set(system):
     with pytest.raises(InputError, match=r"a\.y has causality output and cannot be set"):
         system.with_parameters({port_name("a.y"): 1.0}).check()
@@ -86,8 +93,8 @@ def test_list_for_a_group_has_a_value_for_each_member(several, values, as_text):
     else:
         # One number as text is no list.
         is_one = as_text and len(values) == 1
-        what = "no component" if is_one else rf"a\.b\.v: takes 3 values, not {len(values)}"
-        with pytest.raises(InputError, match=what):
+        what = r"a list of 3 values, for a\.b\.v\[3\]" if is_one else f"3 values, not {len(values)}"
+        with pytest.raises(InputError, match=rf"a\.b\.v: takes {what}"):
             several.with_parameters({name: given})
 
 
@@ -111,5 +118,5 @@ def test_array_without_dimensions_is_one_value(several):
         several.with_parameters({port_name("a.b.w"): np.array(2.0)}).value(port_name("a.b.w"))
         == 2.0
     )
-    with pytest.raises(InputError, match="no component"):
+    with pytest.raises(InputError, match="a list of 3 values"):
         several.with_parameters({port_name("a.b.v"): np.array(2.0)})
