@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from orchestrator.figures.drawing import Plot, styled
+from orchestrator.figures.drawing import Plot, legend_columns, name_lines, styled
 from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.style import (
@@ -32,14 +32,11 @@ from orchestrator.system.names import PortName
 #: What is drawn where nothing is asked for, as far as it is there.
 DEFAULT_PATTERNS = ("controller.e", "plant.tau", "controller.theta_hat")
 
-#: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
-_PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
+#: Height of a panel, and of what stands above and below all of them [in].
+_PANEL, _MARGIN = 1.9, 0.6
 
 #: Runs of one scenario are told apart by so many parameters.
 _FEW = 2
-
-#: Letters in a row of a legend, of which the line of an entry takes some.
-_LETTERS, _LINE = 100, 6
 
 #: Of the lines, so many that few runs look alike.
 _STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
@@ -92,9 +89,7 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
                 _line(label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
                 for i, (label, _) in enumerate(runs)
             ]
-            columns = _columns(lines)
-            figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
-            figure.legend(handles=lines, loc="outside upper left", ncols=columns)
+            name_lines(figure, lines)
     return figure
 
 
@@ -180,7 +175,7 @@ def _draw_panel(
             for j, part in enumerate(parts)
         ]
         axes.legend(
-            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(lines)
+            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=legend_columns(lines)
         )
     return has_means
 
@@ -192,9 +187,3 @@ def _line(label: str, colour: str, style: int) -> Line2D:
 
 def _style(i: int) -> Any:
     return _STYLES[i % len(_STYLES)]
-
-
-def _columns(lines: Sequence[Line2D]) -> int:
-    """How many entries of a legend have room beside each other."""
-    longest = max(len(str(line.get_label())) for line in lines)
-    return max(1, _LETTERS // (longest + _LINE))
