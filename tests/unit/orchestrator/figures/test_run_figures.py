@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.figures.drawing import compose, draw, overlay, save
+from orchestrator.figures.drawing import compose, draw, overlay
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
@@ -129,7 +129,7 @@ def test_colours_belong_to_runs():
 
 @pytest.mark.parametrize("kind", ["comparison", "overlay", "tracking"])
 @pytest.mark.parametrize("n", [2, 7])
-def test_long_names_leave_the_panels_their_room(kind, n, tmp_path):
+def test_long_names_leave_the_panels_their_room(kind, n):
     """They stand above all panels, in sight, and nothing lies upon them."""
     names = [f"my controller with a notch filter, no. {i}" for i in range(n)]
     table = loop_table()
@@ -137,7 +137,7 @@ def test_long_names_leave_the_panels_their_room(kind, n, tmp_path):
     figure, _ = compose(
         "A long heading, " * 8, FIGURES[kind][""], [Drawn(name, table) for name in names]
     )
-    save(figure, tmp_path / "figure.png")
+    figure.draw_without_rendering()
     page, [legend] = figure.bbox, figure.legends
     assert [text.get_text() for text in legend.texts] == names
     box = legend.get_window_extent()
@@ -166,7 +166,7 @@ def test_a_command_that_is_cut_off_says_its_peak():
     figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
     axes = panel(figure, r"$\tau_u$ [N]")
     assert axes.get_ylim()[0] > -366.0
-    assert [text.get_text() for text in axes.texts] == ["limits ±80 N, peak \N{MINUS SIGN}366 N"]
+    assert {text.get_text() for text in axes.texts} == {"limits ±80 N", "peak \N{MINUS SIGN}366 N"}
 
 
 def test_a_figure_has_no_heading_where_none_is_given():
