@@ -150,7 +150,7 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     box = np.maximum(extent, 0.5 * extent.max())
     flat = float(box.max() / box[2]) - 1.0
     # A tall box would reach into the panel below, a flat one into that beside it.
-    zoom = min(0.95 - 0.17 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
+    zoom = min(0.95 - 0.2 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
     axes.set_box_aspect(box, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.get_major_locator().set_params(nbins=4, steps=None)
@@ -159,7 +159,7 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     axes.zaxis.set_tick_params(pad=6)
     # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
     axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat
-    axes.zaxis.labelpad = 14 - 4 * flat
+    axes.zaxis.labelpad = 14 - 7 * flat
 
 
 def draw_lines(
