@@ -159,7 +159,7 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     axes.zaxis.set_tick_params(pad=6)
     # Below a flat box the names of the axes would lie upon their numbers, and beside it far away.
     axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat
-    axes.zaxis.labelpad = 14 - 7 * flat
+    axes.zaxis.labelpad = 14 - 4 * flat
 
 
 def draw_lines(
