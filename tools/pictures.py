@@ -44,12 +44,20 @@ def main() -> None:
     for folder in folders:
         result = StudyResult(folder)
         study = read_study(result.record["study"])
-        space = Space(study, {scenario: load_scenario(scenario) for scenario in study.scenario})
+        systems = {name: load_scenario(name) for name in study.scenario}
+        space = Space(study, systems)
+        legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
         entries = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
         with TemporaryDirectory() as drawn:
             list(
                 draw_figures(
-                    entries, study.title, result, Path(drawn), None, space.units, space.logarithmic
+                    entries,
+                    study.title,
+                    result,
+                    Path(drawn),
+                    legends,
+                    space.units,
+                    space.logarithmic,
                 )
             )
             for file in sorted(Path(drawn).glob("*.png")):

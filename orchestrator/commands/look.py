@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 
 from orchestrator.commands.options import (
@@ -123,10 +124,9 @@ def _plot(options: argparse.Namespace) -> int:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
     for path in paths:
         _warn(table_in(path))
-    runs = [read_result(path, lambda columns: wanted_columns(columns, patterns)) for path in paths]
-    runs = _named(runs, paths)
-    tables = (run.result for run in runs)
-    figure = plot(list(zip(told_apart(runs, paths), tables, strict=True)), patterns)
+    wanted = partial(wanted_columns, patterns=patterns)
+    runs = _named([read_result(path, wanted) for path in paths], paths)
+    figure = plot(told_apart(runs, paths), patterns)
     with _written([options.out], options.force) as folder:
         save(figure, folder / options.out.name)
     return OK

@@ -6,22 +6,33 @@ What only looks a figure up imports :mod:`.run_figures`: matplotlib takes as lon
 from __future__ import annotations
 
 import logging
+import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BytesIO
+from itertools import cycle
 from math import lcm
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from tqdm import tqdm
 
 from orchestrator.figures.event_marks import list_events
-from orchestrator.figures.panels import Cell, Panel, Rows
+from orchestrator.figures.panels import Cell, Panel, Rows, run_line
 from orchestrator.figures.run_figures import FIGURES
-from orchestrator.figures.style import FIGURE_FORMATS, FIGURE_WIDTH, SETTINGS, Drawn, heading
+from orchestrator.figures.style import (
+    COLOURS,
+    FIGURE_FORMATS,
+    FIGURE_WIDTH,
+    SETTINGS,
+    Drawn,
+    escape_math,
+    heading,
+)
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.vehicle.signals import Loop, suffixes
 
@@ -32,8 +43,11 @@ _NO_DATE: dict[str, Any] = {
     ".pdf": {"CreationDate": None},
 }
 
-#: Room for a heading [in].
-_HEADING = 0.3
+#: Room for a heading, and for a row of a legend [in].
+_HEADING, _ROW = 0.3, 0.2
+
+#: Letters in a row of a heading, and of a legend, of which the line of an entry takes some.
+_HEADING_LETTERS, _LETTERS, _LINE = 74, 100, 6
 
 #: Seconds before a bar appears on a terminal.
 _PATIENCE = 2.0
@@ -86,6 +100,41 @@ def save(figure: Figure, *paths: Path) -> None:
             figure.savefig(path, metadata=_NO_DATE[path.suffix])
 
 
+def legend_columns(lines: Sequence[Line2D]) -> int:
+    """How many entries of a legend have room beside each other."""
+    longest = max(len(str(line.get_label())) for line in lines)
+    return max(1, _LETTERS // (longest + _LINE))
+
+
+def name_lines(figure: Figure, lines: Sequence[Line2D], title: str = "") -> None:
+    """Say above all panels which line is which run, and make room for it.
+
+    Args:
+        figure: without a heading.
+        lines: one for each run.
+        title: heading; empty for none.
+
+    """
+    columns = legend_columns(lines)
+    figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
+    # A heading by itself would lie upon the legend.
+    legend = figure.legend(
+        handles=lines, loc="outside upper center", ncols=columns, title_fontsize="large",
+        title=heading(textwrap.fill(title, _HEADING_LETTERS)),
+    )  # fmt: skip
+    legend.get_title().set_multialignment("center")
+
+
+def name_runs(figure: Figure, runs: Sequence[Drawn], title: str = "") -> None:
+    """Name several runs by the lines that they have in panels: see :func:`name_lines`."""
+    colours = enumerate(zip(runs, cycle(COLOURS), strict=False))
+    lines = [
+        Line2D([], [], **run_line(i, colour), label=escape_math(run.label))
+        for i, (run, colour) in colours
+    ]
+    name_lines(figure, lines, title)
+
+
 def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | None, list[str]]:
     """A figure of all that can be drawn.
 
@@ -109,7 +158,9 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
     heights = [max(panel.height for panel in row) for row in drawn]
     with styled():
         figure = Plot(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
-        if title:
+        if len(runs) > 1 and not all(panel.of_one for panel in shown):
+            name_runs(figure, runs, title)
+        elif title:
             figure.suptitle(heading(title), wrap=True)
         columns = lcm(*map(len, drawn))
         grid = figure.add_gridspec(len(drawn), columns, height_ratios=heights)

@@ -19,7 +19,6 @@ from orchestrator.figures.style import (
     STYLES,
     Drawn,
     earth_axes,
-    escape_math,
     printed_unit,
     runs_with,
 )
@@ -92,6 +91,7 @@ class Panel(NamedTuple):
         needs: columns and parameters that a run must have, by the loop that is drawn.
         draw: fills a cell with the runs that have them.
         height: of the cell [in].
+        of_one: whether it shows only the first of the runs.
 
     """
 
@@ -99,6 +99,7 @@ class Panel(NamedTuple):
     needs: Callable[[Loop], Needs]
     draw: Callable[[Cell, Sequence[Drawn]], None]
     height: float = 2.6
+    of_one: bool = False
 
 
 #: The rows of a figure.
@@ -122,8 +123,7 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
     for i, (run, colour) in enumerate(shown):
         y = true_control_point(run.result, run.loop)
         paths.append(y)
-        label = escape_math(run.label) if len(shown) > 1 else "control point"
-        axes.plot(*y.T, color=colour, linewidth=_THIN if i else _THICK, label=label)
+        axes.plot(*y.T, **run_line(i, colour), label=None if len(shown) > 1 else "control point")
         # Rings around each other: vehicles that start together stay to be seen.
         axes.scatter(
             *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
@@ -150,7 +150,7 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     box = np.maximum(extent, 0.5 * extent.max())
     flat = float(box.max() / box[2]) - 1.0
     # A tall box would reach into the panel below, a flat one into that beside it.
-    zoom = min(0.95 - 0.17 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
+    zoom = min(0.95 - 0.2 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
     axes.set_box_aspect(box, zoom=zoom)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.get_major_locator().set_params(nbins=4, steps=None)
@@ -163,7 +163,7 @@ def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
 
 
 def draw_lines(
-    axes: Axes, time: np.ndarray, values: np.ndarray, labels: Sequence[str], twin: str | None = None
+    axes: Axes, time: np.ndarray, values: np.ndarray, labels: Sequence[str], number: int = 0
 ) -> None:
     """One line for each column of values.
 
@@ -172,22 +172,24 @@ def draw_lines(
         time: of the rows of values [s].
         values: (rows, lines).
         labels: of the lines.
-        twin: the name of a run whose lines are thin and black; None: the run itself.
+        number: of the run; from 1 on they are those that another is compared with, thin and black.
 
     """
     for i, (column, label) in enumerate(zip(values.T, labels, strict=True)):
-        if twin is None:
-            line: Any = {"color": COLOURS[i], "linestyle": STYLES[i], "label": label}
+        if number == 0:
+            axes.plot(time, column, color=COLOURS[i], linestyle=STYLES[i], label=label)
         else:
-            line = {"color": "black", "linewidth": 0.7, "label": None if i else escape_math(twin)}
-        axes.plot(time, column, **line)
+            is_first = (number, i) == (1, 0)
+            axes.plot(
+                time, column, color="black", linewidth=0.7, label="other run" if is_first else None
+            )
 
 
 def draw_all_errors(axes: Axes, runs: Sequence[Drawn]) -> None:
     """The three tracking errors of some runs in one panel."""
     for i, (run, _) in enumerate(runs_with(runs, Loop.for_tracking)):
-        errors, twin = tracking_error(run.result, run.loop), run.label if i else None
-        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], twin)
+        errors = tracking_error(run.result, run.loop)
+        draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], i)
     axes.set_ylabel("error [m]")
     title(axes, "tracking errors")
 
@@ -222,7 +224,7 @@ def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> Non
     for i, (run, colour) in enumerate(runs_with(runs, Loop.for_tracking)):
         errors = tracking_error(run.result, run.loop)
         for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
-            axes.plot(run.result.time, error, **_line(i, run, colour))
+            axes.plot(run.result.time, error, **run_line(i, colour))
     for k, axes in zip(AXES, panels, strict=True):
         axes.set_ylabel(f"$|e_{k}|$ [m]" if logarithmic else f"$e_{k}$ [m]")
         if logarithmic:
@@ -234,9 +236,9 @@ def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> Non
     over_time(panels, runs)
 
 
-def _line(i: int, run: Drawn, colour: str) -> dict[str, Any]:
-    """Of the run a figure is about, and, thin upon it, of those it is compared with."""
-    return {"color": colour, "linewidth": _THIN if i else _THICK, "label": escape_math(run.label)}
+def run_line(i: int, colour: str) -> dict[str, Any]:
+    """The line of the run a figure is about, and, thin upon it, of those it is compared with."""
+    return {"color": colour, "linewidth": _THIN if i else _THICK}
 
 
 def draw_commands(
@@ -249,10 +251,10 @@ def draw_commands(
     for k, axes, unit in zip(range(3), panels, map(printed_unit, TAU.values()), strict=True):
         for i, (run, colour) in enumerate(shown):
             command = partial(_command, run.loop.commanded[k])
-            has_means |= draw_signal(axes, run.result, command, **_line(i, run, colour))
+            has_means |= draw_signal(axes, run.result, command, **run_line(i, colour))
         axes.set_ylabel(rf"$\tau_{ACTUATORS[k]}$ [{unit}]")
         if limited:
-            _show_limits(axes, k, [run for run, _ in shown], limited[0], unit)
+            _show_limits(axes, k, shown, limited[0], unit)
     title(panels[0], name)
     over_time(panels, runs, has_means)
 
@@ -263,38 +265,46 @@ def _command(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
     return np.append(table.step_start, table.time[-1]), np.append(command, command[-1])
 
 
-def _show_limits(axes: Axes, k: int, runs: Sequence[Drawn], limited: Drawn, unit: str) -> None:
-    """Limits of an actuator, and how far commands go that are cut off."""
+def _show_limits(
+    axes: Axes, k: int, runs: Sequence[tuple[Drawn, str]], limited: Drawn, unit: str
+) -> None:
+    """Limits of an actuator; of commands that are cut off the largest, in the colour of its run."""
     lower, upper = (float(limit[k]) for limit in limits(limited.result, limited.loop))
     words = (
         f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
     )
-    peaks = {run.label: _peak(run.result[run.loop.commanded[k]]) for run in runs}
-    if max(map(abs, peaks.values())) < _NEAR * min(upper, -lower):
+    peaks = ((_peak(run.result[run.loop.commanded[k]]), colour) for run, colour in runs)
+    peak, colour = max(peaks, key=lambda one: abs(one[0]))
+    if abs(peak) < _NEAR * min(upper, -lower):
         bottom, top = axes.get_ylim()
         axes.set_ylim(bottom, top + 0.2 * (top - bottom))
-        _say(axes, f"{words} (off scale)", 0.98, axes.transAxes, "top")
+        _say(axes, [(f"{words} (off scale)", "black")], 0.98, axes.transAxes, "top")
         return
     for limit in (lower, upper):
         axes.axhline(limit, color="black", linewidth=0.8)
     bottom, _ = axes.get_ylim()
     axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
-    for label, peak in peaks.items():
-        if abs(peak) > _BEYOND * max(upper, -lower):
-            who = f"peak of {escape_math(label)}" if len(runs) > 1 else "peak"
-            number = f"{peak:,.0f}" if abs(peak) < _MANY else f"{peak:.2g}"
-            number = number.replace("-", "\N{MINUS SIGN}")
-            words += f", {who} {number} {unit}"
-    _say(axes, words, upper, axes.get_yaxis_transform(), "bottom")
+    said = [(words, "black")]
+    if abs(peak) > _BEYOND * max(upper, -lower):
+        number = f"{peak:,.0f}" if abs(peak) < _MANY else f"{peak:.2g}"
+        number = number.replace("-", "\N{MINUS SIGN}")
+        said.append((f"peak {number} {unit}", colour))
+    _say(axes, said, upper, axes.get_yaxis_transform(), "bottom")
 
 
-def _say(axes: Axes, words: str, y: float, transform: Transform, va: str) -> None:
-    """A word at the right of a panel, legible upon lines."""
-    axes.annotate(
-        words, (1, y), xycoords=transform, xytext=(0, 2 if va == "bottom" else 0),
-        textcoords="offset points", ha="right", va=va, fontsize="small",
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
-    )  # fmt: skip
+def _say(
+    axes: Axes, words: Sequence[tuple[str, str]], y: float, transform: Transform, va: str
+) -> None:
+    """Words in their colours at the right of a panel, legible upon lines."""
+    place: tuple[Any, ...] = (1.0, y), transform, (0, 2 if va == "bottom" else 0)
+    for text, colour in reversed(words):
+        at, coordinates, offset = place
+        said = axes.annotate(
+            text, at, xycoords=coordinates, xytext=offset, textcoords="offset points",
+            ha="right", va=va, fontsize="small", color=colour,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+        )  # fmt: skip
+        place = (0.0, 0.0 if va == "bottom" else 1.0), said, (-5, 0)
 
 
 def _peak(values: np.ndarray) -> float:

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from orchestrator.figures.drawing import Plot, styled
+from orchestrator.figures.drawing import Plot, legend_columns, name_lines, styled
 from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import over_time
 from orchestrator.figures.style import (
@@ -28,35 +28,46 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName
+from orchestrator.vehicle.signals import Loop
 
-#: What is drawn where nothing is asked for, as far as it is there.
-DEFAULT_PATTERNS = ("controller.e", "plant.tau", "controller.theta_hat")
-
-#: Height of a panel, of what stands above and below all of them, of a row of a legend [in].
-_PANEL, _MARGIN, _ROW = 1.9, 0.6, 0.2
+#: Height of a panel, and of what stands above and below all of them [in].
+_PANEL, _MARGIN = 1.9, 0.6
 
 #: Runs of one scenario are told apart by so many parameters.
 _FEW = 2
-
-#: Letters in a row of a legend, of which the line of an entry takes some.
-_LETTERS, _LINE = 100, 6
 
 #: Of the lines, so many that few runs look alike.
 _STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
-def wanted_columns(columns: Sequence[str], patterns: Sequence[str]) -> list[str]:
+def wanted_columns(
+    columns: Sequence[str], loops: Sequence[Loop], patterns: Sequence[str]
+) -> list[str]:
     """The columns of a table that would be drawn."""
-    return [name for name in columns if any(matches(name, p) for p in patterns or DEFAULT_PATTERNS)]
+    patterns = patterns or _usual(loops)
+    return [name for name in columns if any(matches(name, pattern) for pattern in patterns)]
 
 
-def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Figure:
+def _usual(loops: Sequence[Loop]) -> list[str]:
+    """What is drawn where nothing is asked for, as far as it is there, of each vehicle."""
+    return [
+        pattern
+        for loop in loops
+        for pattern in (
+            f"{loop.controller}.e",
+            f"{loop.vehicle}.tau",
+            f"{loop.controller}.theta_hat",
+        )
+    ]
+
+
+def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
     """Draw columns over time, a group such as plant.y a panel, runs over each other.
 
     Args:
-        runs: labels and tables.
+        runs: with labels that tell them apart.
         patterns: such as `plant.y.*`, or the name of a group or column; none: errors, commands
-            and estimates of the loop.
+            and estimates of the loops of all vehicles.
 
     Raises:
         InputError: a pattern matches no column.
@@ -64,13 +75,13 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
     """
     if not all(isinstance(pattern, str) for pattern in patterns):
         raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
-    names = list(dict.fromkeys(name for _, table in runs for name in table.columns))
+    names = list(dict.fromkeys(name for run in runs for name in run.result.columns))
     if not patterns:
-        patterns = [pattern for pattern in DEFAULT_PATTERNS if wanted_columns(names, [pattern])]
+        patterns = wanted_columns(names, [loop for run in runs for loop in run.loops], ())
     if not patterns:
         groups = dict.fromkeys(map(group_of, names))
         raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
-    units = {name: unit for _, table in runs for name, unit in table.header.units.items()}
+    units = {name: unit for run in runs for name, unit in run.result.header.units.items()}
     panels: dict[tuple[str, str], list[str]] = {}
     for name in matching(names, patterns):
         # The members of a vector share a panel, whatever their units.
@@ -83,23 +94,22 @@ def plot(runs: Sequence[tuple[str, Table]], patterns: Sequence[str] = ()) -> Fig
             _draw_panel(place, group, unit, members, runs)
             for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
         ]
-        drawn = [Drawn(*run) for run in runs]
-        over_time(list(axes), drawn, any(has_means))
-        list_events(figure, drawn)
+        over_time(list(axes), runs, any(has_means))
+        list_events(figure, runs)
         if len(runs) > 1:
             in_colour = all(len(members) == 1 for members in panels.values())
             lines = [
-                _line(label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
-                for i, (label, _) in enumerate(runs)
+                _line(run.label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
+                for i, run in enumerate(runs)
             ]
-            columns = _columns(lines)
-            figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
-            figure.legend(handles=lines, loc="outside upper left", ncols=columns)
+            name_lines(figure, lines)
     return figure
 
 
-def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[str]:
-    """What tells runs apart: scenarios, or a few parameters, or ends of paths, or else numbers.
+def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]:
+    """Runs with labels that tell them apart.
+
+    These are scenarios, or a few parameters, or ends of paths, or else numbers.
 
     Args:
         runs: that are drawn together.
@@ -122,7 +132,8 @@ def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[str]:
     ends = [["/".join(part[-n:]) for part in parts] for n in range(1, longest)]
     numbered = [f"{name} ({number})" for number, name in enumerate(names, start=1)]
     candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends, numbered]
-    return next(labels for labels in candidates if len(set(labels)) == len(labels))
+    labels = next(labels for labels in candidates if len(set(labels)) == len(labels))
+    return [run._replace(label=label) for run, label in zip(runs, labels, strict=True)]
 
 
 def _text(values: Mapping[PortName, Any], name: PortName) -> str:
@@ -149,29 +160,34 @@ def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _draw_panel(
-    axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[tuple[str, Table]]
+    axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[Drawn]
 ) -> bool:
     """The lines of a group; whether there are means among them.
 
-    Members differ in colour, runs in style; runs of a single member in both.
+    Members differ in colour, runs in style; runs of a single member in both. A panel says which run
+    is not in it.
     """
     has_means = False
     parts = [member.removeprefix(group).strip(".[]") for member in members]
-    for i, (run, table) in enumerate(runs):
+    for i, run in enumerate(runs):
         for j, member in enumerate(members):
-            if member not in table:
+            if member not in run.result:
                 continue
             colour = (j if len(members) > 1 else i) % len(COLOURS)
             has_means |= draw_signal(
                 axes,
-                table,
+                run.result,
                 partial(_column, member),
                 color=COLOURS[colour],
                 linestyle=_style(i if len(runs) > 1 else j),
                 label=", ".join(
-                    [parts[j]] * (len(members) > 1) + [escape_math(run)] * (len(runs) > 1)
+                    [parts[j]] * (len(members) > 1) + [escape_math(run.label)] * (len(runs) > 1)
                 ),
             )
+    lacking = [run.label for run in runs if not any(name in run.result for name in members)]
+    if lacking:
+        whose = escape_math(lacking[0]) if len(lacking) == 1 else f"{len(lacking)} of the runs"
+        axes.set_title(f"not in {whose}", loc="right", fontsize="small")
     name = group if len(members) > 1 else members[0]
     axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
     if len(members) > 1:
@@ -180,7 +196,7 @@ def _draw_panel(
             for j, part in enumerate(parts)
         ]
         axes.legend(
-            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_columns(lines)
+            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=legend_columns(lines)
         )
     return has_means
 
@@ -192,9 +208,3 @@ def _line(label: str, colour: str, style: int) -> Line2D:
 
 def _style(i: int) -> Any:
     return _STYLES[i % len(_STYLES)]
-
-
-def _columns(lines: Sequence[Line2D]) -> int:
-    """How many entries of a legend have room beside each other."""
-    longest = max(len(str(line.get_label())) for line in lines)
-    return max(1, _LETTERS // (longest + _LINE))

@@ -49,7 +49,7 @@ def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
     labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in THETA.items()]
     for i, (run, _) in enumerate(runs_with(runs, Loop.for_parameter_estimates)):
         estimates = run.result.step_values(*run.loop.theta_hat)
-        draw_lines(axes, run.result.step_start, estimates, labels, run.label if i else None)
+        draw_lines(axes, run.result.step_start, estimates, labels, i)
     axes.set_ylabel("estimate")
     title(axes, "estimated parameters")
     over_time([axes], runs)
@@ -111,7 +111,7 @@ def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
         title(axes, name)
         over_time([axes], runs)
 
-    return Panel(name, needs, draw)
+    return Panel(name, needs, draw, of_one=True)
 
 
 def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -129,9 +129,9 @@ def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
 
 ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 3.4)
 ESTIMATES = Panel("estimated parameters", Loop.for_parameter_estimates, _estimates, 3.6)
-VELOCITY = Panel("estimated velocity", Loop.for_velocity_estimates, _estimated_velocity, 4.6)
+VELOCITY = Panel("estimated velocity", Loop.for_velocity_estimates, _estimated_velocity, 4.6, True)
 VELOCITY_ERRORS = Panel(
-    "error of the estimated velocity", Loop.for_velocity_estimates, _velocity_errors, 4.6
+    "error of the estimated velocity", Loop.for_velocity_estimates, _velocity_errors, 4.6, True
 )
 FROM_ABOVE = Panel("path from above", Loop.for_control_point, _from_above)
 

@@ -33,9 +33,9 @@ from orchestrator.figures.study_values import (
 from orchestrator.figures.style import COLOURS, FIGURE_FORMATS, FIGURE_WIDTH, STYLES, heading
 from orchestrator.system.names import file_name
 
-#: Heights of a row of panels, of a panel by itself, and of a row of a matrix and what surrounds
-#: it [in].
-_ROW, _SQUARE, _LINE, _AROUND = 2.3, 4.0, 0.27, 0.5
+#: Heights of a row of panels, of a panel by itself, of a row of a matrix and what surrounds it, and
+#: of a bar of colours with its name at least [in].
+_ROW, _SQUARE, _LINE, _AROUND, _BAR = 2.3, 4.0, 0.27, 0.5, 1.3
 
 #: Bands: parts of an axis along which runs are counted together, shares of the runs between which
 #: the band lies, and panels in a row, where there is one x.
@@ -293,7 +293,7 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
     other, -1 where it goes with less, 0 where it makes no difference.
     """
     parts = list(runs.parts(entry.by))
-    height = _LINE * len(entry.show) + _AROUND
+    height = max(_LINE * len(entry.show), _BAR / len(parts)) + _AROUND
     figure, panels = make_panels(title, len(parts), 1, height, sharex=True)
     has_gaps = False
     for axes, (name, part) in zip(panels.flat, parts, strict=True):
@@ -312,6 +312,8 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
         axes.set_facecolor(_EMPTY)
         axes.set_title(name)
         has_gaps |= bool(np.isnan(found).any())
+    names = max(name.get_window_extent().height for name in axes.get_xticklabels()) / figure.dpi
+    figure.set_figheight(figure.get_figheight() + max(0.0, names - _NAMES))
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
     legend(figure, *[_sample(_EMPTY, "one of the two is constant")] * has_gaps)
     return figure

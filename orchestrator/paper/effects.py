@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from auv_fmu.euler import STEP
 from auv_fmu.output_feedback import Gains
-from orchestrator.figures.drawing import overlay, save, styled
+from orchestrator.figures.drawing import name_runs, overlay, save, styled
 from orchestrator.figures.panels import draw_commands
 from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn
 from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
@@ -174,6 +174,7 @@ def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Sh
         labels = ("Gauss-Seidel", "Jacobi")
         drawn = [Drawn(label, run.table) for label, run in zip(labels, runs, strict=True)]
         draw_commands(panels[:, column], drawn, title)
+    name_runs(figure, drawn)
     return Shown(
         "A Jacobi master adds a delay of 20 ms to the loop (reading 5). Total variation of the "
         f"three signals of Fig. 5 (N, N·m): proposed {variation[0]:.4g} in Gauss-Seidel order and "

@@ -186,15 +186,16 @@ def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
 
 
 def read_result(
-    path: Path, watched: Callable[[Sequence[str]], Collection[str]] | None = None
+    path: Path,
+    watched: Callable[[Sequence[str], Sequence[Loop]], Collection[str]] | None = None,
 ) -> Drawn:
     """What can be seen of a stored result, by its name.
 
     Args:
         path: a folder that a run has written, or a table in CSV or Parquet. Of a table without a
             record beside it, no parameters are known.
-        watched: chooses the columns that will be drawn among the ones there are; None: what the
-            paper's figures draw.
+        watched: chooses the columns that will be drawn among the ones there are, given the loops;
+            None: what the paper's figures draw.
 
     Raises:
         InputError: there is no result, or it cannot be read.
@@ -205,7 +206,7 @@ def read_result(
     header, blocks = stored_rows(file, record)
     loops = loops_in(record)
     drawn = {name for loop in loops for name in loop.drawn()}
-    table = VisibleRows(drawn if watched is None else watched(header.columns))
+    table = VisibleRows(drawn if watched is None else watched(header.columns, loops))
     table.begin(header)
     for rows in blocks:
         table.take(rows)

@@ -188,8 +188,8 @@ class Result(Table):
 
         Args:
             what: names of groups or columns, or patterns such as `plant.eta.*`; without any:
-                errors, commands and estimates of the loop. Results among them are drawn over this
-                one.
+                errors, commands and estimates of all vehicles. Results among them are drawn over
+                this one.
 
         Raises:
             ValueError: a pattern matches no column.
@@ -198,10 +198,8 @@ class Result(Table):
         from orchestrator.figures.plot import plot, told_apart  # noqa: PLC0415
 
         others = [one for one in what if isinstance(one, Result)]
-        runs = [one._drawn() for one in (self, *others)]
-        tables = (run.result for run in runs)
         patterns = [one for one in what if not isinstance(one, Result)]
-        return plot(list(zip(told_apart(runs), tables, strict=True)), patterns)
+        return plot(told_apart([one._drawn() for one in (self, *others)]), patterns)
 
     def figure(self, *others: Result, name: str | None = None, vehicle: str = "") -> Figure:
         """Draw the figure of its scenario, or another, as `auv-fmu run` does.
@@ -224,9 +222,8 @@ class Result(Table):
             if not isinstance(other, Result):
                 raise InputError(f"{other!r}: not a result; name= takes the name of a figure")
         scenario = self._origin.scenario
-        runs = [one._drawn() for one in (self, *others)]
-        named = [run._replace(label=x) for run, x in zip(runs, told_apart(runs), strict=True)]
-        return one_figure(name or scenario.figure, scenario.title, named, vehicle)
+        runs = told_apart([one._drawn() for one in (self, *others)])
+        return one_figure(name or scenario.figure, scenario.title, runs, vehicle)
 
     def save(
         self,

@@ -7,7 +7,9 @@ import pytest
 
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot
+from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
+from orchestrator.vehicle.signals import Loop
 from support.tables import loop_table, table_of
 
 TIME = 0.02 * np.arange(10)
@@ -24,7 +26,7 @@ def drawn(figure):
 
 def test_members_of_a_group_with_one_unit_share_a_panel():
     table = loop_table()
-    lines = drawn(plot([("run", table)], ["plant.eta"]))
+    lines = drawn(plot([Drawn("run", table)], ["plant.eta"]))
     assert set(lines) == {
         *(("plant.eta\n[m]", k) for k in "xyz"),
         *(("plant.eta\n[rad]", k) for k in ("phi", "theta", "psi")),
@@ -35,7 +37,7 @@ def test_members_of_a_group_with_one_unit_share_a_panel():
 
 def test_runs_lie_over_each_other_with_labels_of_their_own():
     first, second = loop_table(), loop_table(seed=2)
-    lines = drawn(plot([("first", first), ("second", second)], ["plant.eta.x"]))
+    lines = drawn(plot([Drawn("first", first), Drawn("second", second)], ["plant.eta.x"]))
     for label, table in (("first", first), ("second", second)):
         np.testing.assert_array_equal(lines["plant.eta.x\n[m]", label][1], table["plant.eta.x"])
 
@@ -44,7 +46,7 @@ def test_runs_lie_over_each_other_with_labels_of_their_own():
 def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
     """Members have their colours in the panel, runs their styles above all: all of it in sight."""
     labels = [f"another scenario with a long name, controller.k_p = {i}" for i in range(n)]
-    figure = plot([(label, loop_table()) for label in labels], ["plant.eta", "plant.tau"])
+    figure = plot([Drawn(label, loop_table()) for label in labels], ["plant.eta", "plant.tau"])
     save(figure, tmp_path / "plot.png")
     [runs] = figure.legends
     assert [text.get_text() for text in runs.texts] == labels
@@ -65,7 +67,7 @@ def test_an_angle_that_wraps_has_a_gap():
     table = loop_table()
     yaw = np.remainder(np.linspace(0.0, 9.0, len(table)) + np.pi, 2.0 * np.pi) - np.pi
     table["plant.eta.psi"][:] = yaw
-    [[_, line]] = drawn(plot([("run", table)], ["plant.eta.psi"])).values()
+    [[_, line]] = drawn(plot([Drawn("run", table)], ["plant.eta.psi"])).values()
     wraps = np.flatnonzero(np.isnan(line))
     # Between 0 and 9 it passes pi, and does not reach 3 pi.
     assert len(wraps) == 1
@@ -75,24 +77,42 @@ def test_an_angle_that_wraps_has_a_gap():
 
 def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
     own = table_of(TIME, mine__a=np.arange(10.0))
-    lines = drawn(plot([("loop", loop_table()), ("own", own)], ["mine.a"]))
+    lines = drawn(plot([Drawn("loop", loop_table()), Drawn("own", own)], ["mine.a"]))
     np.testing.assert_array_equal(lines["mine.a", "own"][1], np.arange(10.0))
 
 
+def test_a_panel_says_which_runs_are_not_in_it():
+    """As with a user's own controller that gives no error, beside the paper's."""
+    own = Drawn("own", table_of(TIME, plant__tau__u=1.0))
+    paper = Drawn("paper", table_of(TIME, plant__tau__u=2.0, controller__e__x=0.0))
+    for runs, words in (([own, paper], "not in own"), ([own, own, paper], "not in 2 of the runs")):
+        titles = {axes.get_ylabel(): axes.get_title("right") for axes in plot(runs).axes}
+        assert titles == {"plant.tau.u": "", "controller.e.x": words}
+
+
+def test_without_patterns_all_vehicles_are_shown():
+    table = table_of(TIME, a__tau__u=1.0, b__tau__u=2.0, b__law__e__x=0.0, other=3.0)
+    loops = (Loop("a", "a.law"), Loop("b", "b.law"))
+    figure = plot([Drawn("run", table, loops=loops)])
+    assert [axes.get_ylabel() for axes in figure.axes] == ["a.tau.u", "b.tau.u", "b.law.e.x"]
+
+
 def test_without_patterns_the_loop_is_shown():
-    labels = {axes.get_ylabel() for axes in plot([("run", loop_table())]).axes}
+    labels = {axes.get_ylabel() for axes in plot([Drawn("run", loop_table())]).axes}
     assert labels == {"plant.tau.u\n[N]", "plant.tau\n[N·m]", "controller.theta_hat"}
 
 
 def test_what_cannot_be_chosen_is_explained():
     with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
-        plot([("run", loop_table())], ["plant.ta"])
+        plot([Drawn("run", loop_table())], ["plant.ta"])
     with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b"):
-        plot([("own", table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0))])
+        plot([Drawn("own", table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0))])
 
 
 def test_values_that_no_axis_can_show_are_refused(tmp_path):
-    figure = plot([("own", table_of(TIME, mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"])
+    figure = plot(
+        [Drawn("own", table_of(TIME, mine__a=np.linspace(-1.7, 1.7, 10) * 1e308))], ["mine.a"]
+    )
     with pytest.raises(InputError, match="too far apart to draw"):
         save(figure, tmp_path / "plot.png")
     assert list(tmp_path.iterdir()) == []
@@ -109,5 +129,5 @@ def test_units_are_those_of_the_fmus():
         "own.F.x": "N", "own.F.y": "N.m", "own.M.z": "N.m", "own.a": "m/s2", "own.k[1]": "N",
     }  # fmt: skip
     table.header = replace(table.header, units=units)
-    labels = [axes.get_ylabel() for axes in plot([("run", table)], ["own.*"]).axes]
+    labels = [axes.get_ylabel() for axes in plot([Drawn("run", table)], ["own.*"]).axes]
     assert labels == ["own.F.x\n[N]", "own.F.y\n[N·m]", "own.M.z\n[N·m]", "own.a\n[m/s²]", "own.k"]

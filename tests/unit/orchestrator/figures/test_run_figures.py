@@ -118,13 +118,46 @@ def test_colours_belong_to_runs():
     tables = (loop_table(), loop_table(without=STANDARD.y_d), loop_table())
     runs = [Drawn(name, table) for name, table in zip("abc", tables, strict=True)]
     figure = overlay("", runs)
-    colours = {
-        label: {line.get_color() for axes in figure.axes for line in axes.get_lines()
-                if line.get_label() == label}
-        for label in "abc"
-    }  # fmt: skip
-    assert all(len(found) == 1 for found in colours.values())
-    assert len(set.union(*colours.values())) == 3
+    [names] = figure.legends
+    assert [text.get_text() for text in names.texts] == ["a", "b", "c"]
+    a, b, c = (line.get_color() for line in names.get_lines())
+    assert len({a, b, c}) == 3
+    for label, colours in (("$e_x$ [m]", [a, c]), (r"$\tau_q$ [N·m]", [a, b, c])):
+        drawn = [line.get_color() for line in panel(figure, label).get_lines()]
+        assert drawn[: len(colours)] == colours
+
+
+@pytest.mark.parametrize("kind", ["comparison", "overlay", "tracking"])
+@pytest.mark.parametrize("n", [2, 7])
+def test_long_names_leave_the_panels_their_room(kind, n):
+    """They stand above all panels, in sight, and nothing lies upon them."""
+    names = [f"my controller with a notch filter, no. {i}" for i in range(n)]
+    table = loop_table()
+    table["plant.tau.u"][200] = -366.0
+    figure, _ = compose(
+        "A long heading, " * 8, FIGURES[kind][""], [Drawn(name, table) for name in names]
+    )
+    figure.draw_without_rendering()
+    page, [legend] = figure.bbox, figure.legends
+    assert [text.get_text() for text in legend.texts] == names
+    box = legend.get_window_extent()
+    assert page.x0 <= box.x0 and box.x1 <= page.x1 and box.y1 <= page.y1
+    for axes in figure.axes:
+        assert axes.get_position().width > 0.3
+        legends = filter(None, [axes.get_legend()])
+        titles = (axes.title, *(one.get_title() for one in legends))
+        for part in (axes, *axes.texts, *titles):
+            assert not box.overlaps(part.get_window_extent())
+        for text in axes.texts:
+            assert axes.bbox.x0 <= text.get_window_extent().x0
+
+
+def test_a_figure_of_one_run_names_no_others():
+    """Its colours mean something else."""
+    runs = [Drawn(name, loop_table()) for name in "ab"]
+    figure, _ = compose("Fig. 4", FIGURES["tracking"]["-velocity"], runs)
+    assert figure.legends == []
+    assert figure.get_suptitle() == "Fig. 4"
 
 
 def test_a_command_that_is_cut_off_says_its_peak():
@@ -133,7 +166,7 @@ def test_a_command_that_is_cut_off_says_its_peak():
     figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", table)])
     axes = panel(figure, r"$\tau_u$ [N]")
     assert axes.get_ylim()[0] > -366.0
-    assert [text.get_text() for text in axes.texts] == ["limits ±80 N, peak \N{MINUS SIGN}366 N"]
+    assert {text.get_text() for text in axes.texts} == {"limits ±80 N", "peak \N{MINUS SIGN}366 N"}
 
 
 def test_a_figure_has_no_heading_where_none_is_given():

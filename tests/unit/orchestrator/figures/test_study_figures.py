@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.figures import study_figures, study_values
+from orchestrator.figures.drawing import styled
 from orchestrator.figures.study_figures import bands, draw_figures, influence, maps, pareto_front
 from orchestrator.figures.study_values import Values
 from orchestrator.studies.study_file import read_figures
@@ -114,6 +115,29 @@ def test_influence_knows_more_less_and_nothing():
     figure = influence(entry(kind="influence", x=list(VARIED), show=show), "", Values(runs))
     matrix = np.ma.filled(figure.axes[0].get_images()[0].get_array(), np.nan)
     np.testing.assert_allclose(matrix, [[1, 0], [0, -1], [np.nan, np.nan]], atol=1e-12)
+
+
+@pytest.mark.parametrize(("n", "show"), [(1, 1), (2, 2), (3, 3), (12, 3)])
+@pytest.mark.parametrize("by", [(), ("scenario",)])
+def test_influence_of_few_or_long_names_can_be_read(n, show, by):
+    """Rows have room for their names, the bar of colours for its own, the names of x below."""
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
+    x = [f"controller.a_gain_with_a_long_name_{i}" for i in range(n)]
+    runs = columns() | {name: np.random.default_rng(5).random(150) for name in x}
+    figures = {
+        "f": {"kind": "influence", "x": x, "show": ["late_error", "lost", "saturated"][:show]}
+    }
+    [figure_entry] = read_figures("mine.toml", figures, dict.fromkeys(x, float), bool(by))
+    with styled():
+        figure = influence(figure_entry, "title", Values(runs, legends=LEGENDS))
+        figure.draw_without_rendering()
+    *matrices, bar = figure.axes
+    for axes in matrices:
+        rows = [name.get_window_extent() for name in axes.get_yticklabels()]
+        assert axes.bbox.height > sum(row.height for row in rows)
+    assert bar.bbox.height > bar.yaxis.label.get_window_extent().height
+    for name in matrices[-1].get_xticklabels():
+        assert name.get_window_extent().y0 >= 0.0
 
 
 def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_out(tmp_path):
