@@ -22,14 +22,21 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.runs.bundle import current_fmus
 
-#: What the module is among what is kept.
+#: Category in the cache.
 CATEGORY = "live-module"
 
-#: What is made: the module, and the licences of the C library in it.
+#: The module, and the licences of what the compiler links into it.
 MODULE, LICENCES = FILES = "loop.wasm", "licences.txt"
 
-#: Of that library: zig's for WebAssembly is wasi-libc, most of which is musl.
-_NOTICES = ("wasi/LICENSE", "wasi/LICENSE-MIT", "musl/COPYRIGHT")
+#: Texts of these licences in the package of ziglang. Much of the C library is Zig's own code; the
+#: rest is wasi-libc, with parts of cloudlibc and musl.
+_NOTICES = {
+    "Zig": "LICENSE",
+    "wasi-libc": "lib/libc/wasi/LICENSE",
+    "wasi-libc, MIT License": "lib/libc/wasi/LICENSE-MIT",
+    "cloudlibc": "lib/libc/wasi/libc-bottom-half/cloudlibc/LICENSE",
+    "musl": "lib/libc/musl/COPYRIGHT",
+}
 
 _HOST = Path(__file__).with_name("host.c")
 
@@ -70,7 +77,8 @@ def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
 
 def key_of() -> str:
     """Of the sources and the flags."""
-    digest = sha256("\0".join((*FILES, *_TARGET, *_FLAGS, *_LINKED, *_exports())).encode())
+    made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *_TARGET, *_FLAGS, *_LINKED, *_exports())
+    digest = sha256("\0".join(made_of).encode())
     digest.update(_HOST.read_bytes())
     for name, files in _sources().items():
         for file, content in files.items():
@@ -113,9 +121,12 @@ def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes
 
 
 def _licences() -> str:
-    folder = package_folder("ziglang") / "lib" / "libc"
-    texts = [(folder / name).read_text(encoding="utf-8").strip() for name in _NOTICES]
-    return "\n\n".join(("C library of the WebAssembly module: wasi-libc and musl", *texts))
+    folder = package_folder("ziglang")
+    return "\n\n".join(
+        f"{name}, contained in the WebAssembly module\n\n"
+        + (folder / path).read_text(encoding="utf-8").strip()
+        for name, path in _NOTICES.items()
+    )
 
 
 def _zig(folder: Path, *arguments: str) -> None:

@@ -32,7 +32,11 @@ const licences = [...new Set(names)].sort().map((name) => {
   const place = `node_modules/${name}`;
   const { version, license } = JSON.parse(readFileSync(`${place}/package.json`, "utf8"));
   const file = readdirSync(place).find((one) => /^licen[cs]e/i.test(one));
-  const text = file ? readFileSync(`${place}/${file}`, "utf8").trim() : "";
-  return `${name} ${version}, ${license}\n\n${text}\n`;
+  // ogl has its licence in its README, under a heading.
+  const text = file
+    ? readFileSync(`${place}/${file}`, "utf8")
+    : readFileSync(`${place}/README.md`, "utf8").split(`\n## ${license}\n`)[1];
+  if (!text?.trim()) throw new Error(`${name} has no text of its licence`);
+  return `${name} ${version}, ${license}\n\n${text.trim()}\n`;
 });
 writeFileSync(`${folder}/licences.txt`, licences.join("\n\n"));
