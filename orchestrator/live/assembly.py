@@ -67,8 +67,9 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
     fields = {
         "title": html.escape(titles[data["opened"]]),
         "style": parts[STYLE],
-        # What ends the script's element must not occur in it.
-        "script": parts[SCRIPT].replace("</script", "<\\/script"),
+        "style-hash": hash_source(parts[STYLE]),
+        "script": parts[SCRIPT],
+        "script-hash": hash_source(parts[SCRIPT]),
         "licences": html.escape("\n\n".join((licences(NATIVE), library, parts[LICENCES]))),
         "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
         "module": packed(module[MODULE].read_bytes()),
@@ -77,6 +78,11 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
     return before + "".join(
         fields[name] + text for name, _, text in (part.partition("}}") for part in rest)
     )
+
+
+def hash_source(text: str) -> str:
+    """What a content security policy allows an element of the page by: the digest of its text."""
+    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
 def packed(content: bytes) -> str:

@@ -10,6 +10,8 @@ async function bundle(entry, outfile, more) {
     entryPoints: [`src/${entry}`],
     outfile: `${folder}/${outfile}`,
     bundle: true,
+    // Text that would end the element in the page, such as `</script`, is escaped.
+    platform: "browser",
     target: "es2022",
     legalComments: "none",
     metafile: true,
