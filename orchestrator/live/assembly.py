@@ -40,8 +40,14 @@ _PAGE = WEB / "page.html"
 #: Of the sources, what decides what is made.
 _NAMES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
 
-#: The line in which npm or esbuild says what is wrong, not only that something is.
-_COMPLAINT = re.compile(r"npm error (?!code|syscall|errno)\S|.*\bERROR\b")
+#: Of `npm ci`. The packages bring programs for each machine, so none needs a script. Without a
+#: network, npm's own two retries would take more than a minute.
+_OPTIONS = ("--omit=dev", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1")
+
+#: The line in which npm, esbuild or Node.js says what is wrong, not only that something is.
+_COMPLAINT = re.compile(
+    r"npm (?:error|ERR!) (?!code|syscall|errno|engine|notsup Not)\S|.*\bERROR\b|Error: "
+)
 
 #: How long npm may take [s].
 _LIMIT = 600.0
@@ -145,8 +151,7 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
             target = folder / path.relative_to(WEB)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, target)
-        # Its packages bring programs of their own for each machine: none needs a script.
-        _run(folder, npm, "ci", "--omit=dev", "--ignore-scripts", "--prefer-offline")
+        _run(folder, npm, "ci", *_OPTIONS)
         _run(folder, "node", "build.mjs", "build")
         return {name: (folder / "build" / name).read_bytes() for name in FILES}
 
@@ -158,7 +163,7 @@ def _run(folder: Path, *command: str) -> None:
             timeout=_LIMIT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise InputError(f"{command[1]} did not finish within {_LIMIT:g} s") from None
+        raise InputError(f"{' '.join(command[:2])} did not finish within {_LIMIT:g} s") from None
     if process.returncode != 0:
         lines = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
         said = (lines or [last_line(process.stderr)])[0]
