@@ -15,6 +15,7 @@ import posixpath
 import re
 from base64 import b64decode
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -174,12 +175,13 @@ def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 
 
 def live_page() -> tuple[str, str]:
-    """The live page and, where it cannot be made, why."""
+    """The live page and, where it cannot be made, why, as HTML."""
     try:
         return assembly.live_page("fig4"), ""
     except InputError as error:
         log.info("no live page: %s", error)
-        return f"<!doctype html><title>auv-fmu</title><p>{error}", str(error)
+        why = escape(str(error))
+        return f"<!doctype html><title>auv-fmu</title><p>{why}", why
 
 
 def _outside_code(change: Callable[[str], str], text: str) -> str:
