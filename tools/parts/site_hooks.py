@@ -150,7 +150,7 @@ def page_of(name: str) -> str:
 
 def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
     """A notebook as a page, with what its cells print and draw; and its pictures by their names."""
-    notebook = nbformat.read(path, as_version=4)
+    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     with TemporaryDirectory() as folder:
         NotebookClient(notebook, resources={"metadata": {"path": folder}}).execute()
     parts: list[str] = []
