@@ -102,11 +102,11 @@ def main() -> None:
     for room, found in {**rooms, "all": house}.items():
         lines = [module.lines for module in found]
         print(f"{room:32} {len(found):4} modules {sum(lines):6} lines, median {median(lines):g}")
-    for name, lines in odd_sizes().items():
-        print(f"{name:40} {lines:4}  {REASONS.get(name, 'no reason')}")
+    for name, size in odd_sizes().items():
+        print(f"{name:40} {size:4}  {REASONS.get(name, 'no reason')}")
     twice = names_that_occur_twice()
-    for name, found in twice.items():
-        print(f"{name}: {', '.join(found)}")
+    for name, places in twice.items():
+        print(f"{name}: {', '.join(places)}")
     print(f"names that occur twice in the orchestrator: {len(twice)}")
 
 

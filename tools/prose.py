@@ -1,10 +1,10 @@
 """Check the English of the pages: words to avoid, and how long the sentences are.
 
 `python tools/prose.py` reads all pages, the Markdown of notebooks, the docstrings of the public
-names of `orchestrator` and the messages in its code; `python tools/prose.py PATH...` reads some
-pages, or all in a folder. It prints a line for each finding, with the words to write instead. Then
-it prints the lengths of the sentences of each page, in words. It fails if there is a finding, or an
-average above 20 words.
+names of `orchestrator`, the messages in its code and the text of the live page.
+`python tools/prose.py PATH...` reads some pages, or all in a folder. It prints a line for each
+finding, with the words to write instead. Then it prints the lengths of the sentences of each page,
+in words. It fails if there is a finding, or an average above 20 words.
 
 The words are in `tools/prose.toml`; others come from proselint, which the extra `dev` installs.
 Code, the targets of links and comments are not read. Lengths are of whole sentences in paragraphs
@@ -41,6 +41,9 @@ ROOT = Path(__file__).parents[1]
 
 #: The words to avoid.
 WORDS = Path(__file__).with_suffix(".toml")
+
+#: The live page, without its script.
+LIVE_PAGE = ROOT / "orchestrator" / "live" / "web" / "page.html"
 
 #: How many words the sentences of a page have at most, on average.
 LIMIT = 20
@@ -120,6 +123,14 @@ def all_pages() -> Iterator[Page]:
     for file in sorted(ROOT.glob("orchestrator/**/*.py")):
         blocks = list(message_blocks(file.read_text(encoding="utf-8")))
         yield Page(file.relative_to(ROOT).as_posix(), blocks)
+    blocks = list(html_blocks(LIVE_PAGE.read_text(encoding="utf-8")))
+    yield Page(LIVE_PAGE.relative_to(ROOT).as_posix(), blocks)
+
+
+def html_blocks(text: str) -> Iterator[Block]:
+    """The texts between the tags of a page."""
+    for between in re.finditer(r">([^<>]*\w\s+\w[^<>]*)<", text):
+        yield Block(1 + text.count("\n", 0, between.start(1)), between[1], False)
 
 
 def message_blocks(text: str) -> Iterator[Block]:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import argparse
 import os
-import shutil
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from shlex import quote
 from tempfile import TemporaryDirectory
+
+from hatchling.builders.wheel import WheelBuilder
 
 from fmus.compilers import COMPILERS, compiler_for, library
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON, TARGETS, platforms
@@ -85,20 +85,16 @@ def write_wheel(folder: Path) -> Path:
     """Make the wheel.
 
     Raises:
-        OSError, InputError, CalledProcessError: it cannot be made; the text says why.
+        OSError, InputError: it cannot be made; the text says why.
 
     """
     with TemporaryDirectory() as temporary:
-        ready, wheels = Path(temporary, "ready"), Path(temporary, "wheels")
+        ready = Path(temporary)
         write_ready(ready)
-        command = [
-            sys.executable, "-m", "pip", "--quiet", "wheel", "--no-deps", "--no-build-isolation",
-            "--wheel-dir", str(wheels), str(ROOT),
-        ]  # fmt: skip
-        subprocess.run(command, check=True, env={**os.environ, "AUV_FMU_READY": str(ready)})
-        [wheel] = wheels.iterdir()
-        folder.mkdir(parents=True, exist_ok=True)
-        return Path(shutil.move(wheel, folder / wheel.name))
+        builder = WheelBuilder(str(ROOT))
+        builder.target_config["force-include"][str(ready)] = "orchestrator/ready"
+        [wheel] = builder.build(directory=str(folder.resolve()))
+        return Path(wheel)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -107,7 +103,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR")
     try:
         print(write_wheel(parser.parse_args(arguments).out))
-    except (OSError, InputError, subprocess.CalledProcessError) as error:
+    except (OSError, InputError) as error:
         print(f"no wheel: {error}", file=sys.stderr)
         return 2
     return 0

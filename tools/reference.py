@@ -214,7 +214,7 @@ def _write_related(
 
 def _relate(manifest: Element, source: str, role: str, description: str) -> None:
     stated = {"type": _TYPES[Path(source).suffix], "source": source, "role": role}
-    SubElement(manifest, "Related", **stated, description=description)
+    SubElement(manifest, "Related", stated, description=description)
 
 
 def _write_xml(path: Path, root: Element) -> Path:

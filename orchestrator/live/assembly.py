@@ -1,6 +1,6 @@
 """One page in which a loop runs: script, module and data in one file that needs no other.
 
-Script and style are bundled by npm's esbuild, and kept as the module is.
+Script and style are bundled by esbuild, which npm installs, and cached like the module.
 """
 
 from __future__ import annotations
@@ -19,31 +19,37 @@ from tempfile import TemporaryDirectory
 
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
-from orchestrator.live.module import LICENCES as C_LIBRARY
+from orchestrator.live.module import LICENCES as MODULE_LICENCES
 from orchestrator.live.module import MODULE, live_module
 from orchestrator.live.presets import page_data
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 
-#: What script and style are among what is kept.
+#: Category in the cache.
 CATEGORY = "live-script"
 
-#: What is made: the page's script and style, the engine for Node, and what they contain of others.
+#: The page's script and style, the engine for Node.js, and the licences of packages in them.
 SCRIPT, STYLE, ENGINE, LICENCES = FILES = "page.js", "page.css", "engine.mjs", "licences.txt"
 
 WEB = Path(__file__).with_name("web")
 
-#: With the places of all parts.
+#: The page, with `{{NAME}}` in the place of each part.
 _PAGE = WEB / "page.html"
 
-#: Of the sources, what decides what is made.
-_NAMES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
+#: Sources that decide the bundle.
+_SOURCES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
 
-#: The line in which npm or esbuild says what is wrong, not only that something is.
-_COMPLAINT = re.compile(r"npm error (?!code|syscall|errno)\S|.*\bERROR\b")
+#: Options of `npm ci`. The packages bring programs for each machine: none needs a script. Without a
+#: network, npm's own two retries would take more than a minute.
+_OPTIONS = ("--omit=dev", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1")
 
-#: How long npm may take [s].
+#: A line in which npm, esbuild or Node.js says what is wrong, not only that something is.
+_COMPLAINT = re.compile(
+    r"npm (?:error|ERR!) (?!code|syscall|errno|engine|notsup Not)\S|.*\bERROR\b|Error: "
+)
+
+#: How long npm or esbuild may take [s].
 _LIMIT = 600.0
 
 
@@ -52,24 +58,24 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
 
     Args:
         opened: the scenario that it shows first.
-        hear: called with a line before a part is made, which takes long.
+        hear: called with a line before a part is made, which may take minutes.
 
     Raises:
-        InputError: there is no such scenario, the page cannot run it, or what makes its parts is
-            not installed.
+        InputError: there is no such scenario, the page cannot run it, or a part cannot be made.
 
     """
     data = page_data(opened)
     parts = {name: path.read_text(encoding="utf-8") for name, path in live_script(hear).items()}
     module = live_module(hear)
-    library = module[C_LIBRARY].read_text(encoding="utf-8")
+    linked = module[MODULE_LICENCES].read_text(encoding="utf-8")
     titles = {one["name"]: one["title"] for one in data["presets"]}
     fields = {
         "title": html.escape(titles[data["opened"]]),
         "style": parts[STYLE],
-        # What ends the script's element must not occur in it.
-        "script": parts[SCRIPT].replace("</script", "<\\/script"),
-        "licences": html.escape("\n\n".join((licences(NATIVE), library, parts[LICENCES]))),
+        "style-hash": hash_source(parts[STYLE]),
+        "script": parts[SCRIPT],
+        "script-hash": hash_source(parts[SCRIPT]),
+        "licences": html.escape("\n\n".join((licences(NATIVE), linked, parts[LICENCES]))),
         "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
         "module": packed(module[MODULE].read_bytes()),
     }
@@ -79,13 +85,18 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
     )
 
 
+def hash_source(text: str) -> str:
+    """What a content security policy allows an element of the page by: the digest of its text."""
+    return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
+
+
 def packed(content: bytes) -> str:
-    """Bytes as the page has them: gzip, in base64; the same for the same bytes."""
+    """Bytes in the form that the page unpacks: gzip in base64, without a date."""
     return b64encode(gzip.compress(content, mtime=0)).decode()
 
 
 def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Path]:
-    """The files by their names, bundled if that has not been done yet.
+    """The files by their names, bundled unless they are in the cache.
 
     Args:
         hear: called with a line before they are bundled.
@@ -101,7 +112,7 @@ def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
 
 
 def key_of() -> str:
-    """Of the sources."""
+    """Key in the cache: digest of the sources."""
     digest = sha256()
     for path in _sources():
         digest.update(f"{path.relative_to(WEB).as_posix()}\0".encode())
@@ -110,20 +121,20 @@ def key_of() -> str:
 
 
 def _sources() -> list[Path]:
-    places = [WEB / name for name in _NAMES]
+    places = [WEB / name for name in _SOURCES]
     below = (sorted(place.rglob("*")) if place.is_dir() else [place] for place in places)
     return [path for paths in below for path in paths if path.is_file()]
 
 
 def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
-    """Bundle them.
+    """The contents of the files by their names, bundled now.
 
     Args:
-        hear: called with a line before.
+        hear: called with a line before they are bundled.
 
     Raises:
-        InputError: there is no npm, or it does not get what it needs.
-        OSError: it cannot be started.
+        InputError: npm is not installed, or it or esbuild fails.
+        OSError: a file cannot be written, or a program not started.
 
     """
     npm = shutil.which("npm")
@@ -139,8 +150,7 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
             target = folder / path.relative_to(WEB)
             target.parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, target)
-        # Its packages bring programs of their own for each machine: none needs a script.
-        _run(folder, npm, "ci", "--omit=dev", "--ignore-scripts", "--prefer-offline")
+        _run(folder, npm, "ci", *_OPTIONS)
         _run(folder, "node", "build.mjs", "build")
         return {name: (folder / "build" / name).read_bytes() for name in FILES}
 
@@ -152,10 +162,10 @@ def _run(folder: Path, *command: str) -> None:
             timeout=_LIMIT, check=False,
         )  # fmt: skip
     except subprocess.TimeoutExpired:
-        raise InputError(f"{command[1]} did not finish within {_LIMIT:g} s") from None
+        raise InputError(f"{' '.join(command[:2])} did not finish within {_LIMIT:g} s") from None
     if process.returncode != 0:
-        lines = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
-        said = (lines or [last_line(process.stderr)])[0]
+        complaints = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
+        said = (complaints or [last_line(process.stderr)])[0]
         raise InputError(
             f"the script of the live page cannot be built: {' '.join(command[:2])}: {said}"
         )

@@ -22,42 +22,49 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.runs.bundle import current_fmus
 
-#: What the module is among what is kept.
+#: Category in the cache.
 CATEGORY = "live-module"
 
-#: What is made: the module, and the licences of the C library in it.
+#: The module, and the licences of what the compiler links into it.
 MODULE, LICENCES = FILES = "loop.wasm", "licences.txt"
 
-#: Of that library: zig's for WebAssembly is wasi-libc, most of which is musl.
-_NOTICES = ("wasi/LICENSE", "wasi/LICENSE-MIT", "musl/COPYRIGHT")
+#: Texts of these licences in the package of ziglang. Much of the C library is Zig's own code; the
+#: rest is wasi-libc, with parts of cloudlibc and musl.
+_NOTICES = {
+    "Zig": "LICENSE",
+    "wasi-libc": "lib/libc/wasi/LICENSE",
+    "wasi-libc, MIT License": "lib/libc/wasi/LICENSE-MIT",
+    "cloudlibc": "lib/libc/wasi/libc-bottom-half/cloudlibc/LICENSE",
+    "musl": "lib/libc/musl/COPYRIGHT",
+}
 
 _HOST = Path(__file__).with_name("host.c")
 
-#: As the native FMUs are compiled, but for another machine.
+#: Flags of the native FMUs, but for another machine.
 _TARGET = ("-target", "wasm32-wasi")
 _FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
 _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
 
-#: The file of an FMU that includes all others.
+#: The source file that includes the others of an FMU.
 _MAIN = "fmi2.c"
 
-#: What the page calls, and nothing else is in the module.
+#: Functions that the page calls; the linker drops what they do not need.
 _FUNCTIONS = (
     "Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode",
     "ExitInitializationMode", "Reset", "DoStep",
     *(f"{way}{of}" for way in ("Get", "Set") for of in ("Real", "Integer", "Boolean", "String")),
 )  # fmt: skip
-_OTHERS = ("malloc", "free", "host_callbacks")
+_HOST_FUNCTIONS = ("malloc", "free", "host_callbacks")
 
 
 def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Path]:
-    """The files by their names, compiled if that has not been done yet.
+    """The files by their names, compiled unless they are in the cache.
 
     Args:
-        hear: called with a line before it is compiled.
+        hear: called with a line before the module is compiled.
 
     Raises:
-        InputError: it cannot be compiled.
+        InputError: the module cannot be compiled.
 
     """
     try:
@@ -69,8 +76,9 @@ def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
 
 
 def key_of() -> str:
-    """Of the sources and the flags."""
-    digest = sha256("\0".join((*FILES, *_TARGET, *_FLAGS, *_LINKED, *_exports())).encode())
+    """Key in the cache: digest of the sources and the flags."""
+    made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *_TARGET, *_FLAGS, *_LINKED, *_exports())
+    digest = sha256("\0".join(made_of).encode())
     digest.update(_HOST.read_bytes())
     for name, files in _sources().items():
         for file, content in files.items():
@@ -80,14 +88,14 @@ def key_of() -> str:
 
 
 def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
-    """Compile the module.
+    """The contents of the files by their names, compiled now.
 
     Args:
-        hear: called with a line before.
+        hear: called with a line before the module is compiled.
 
     Raises:
-        InputError: there is no ziglang.
-        OSError: it fails.
+        InputError: ziglang is not installed.
+        OSError: ziglang fails.
 
     """
     if find_spec("ziglang") is None:
@@ -113,28 +121,31 @@ def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes
 
 
 def _licences() -> str:
-    folder = package_folder("ziglang") / "lib" / "libc"
-    texts = [(folder / name).read_text(encoding="utf-8").strip() for name in _NOTICES]
-    return "\n\n".join(("C library of the WebAssembly module: wasi-libc and musl", *texts))
+    folder = package_folder("ziglang")
+    return "\n\n".join(
+        f"{name}, contained in the WebAssembly module\n\n"
+        + (folder / path).read_text(encoding="utf-8").strip()
+        for name, path in _NOTICES.items()
+    )
 
 
 def _zig(folder: Path, *arguments: str) -> None:
     command = [sys.executable, "-m", "ziglang", "cc", *_TARGET, *arguments]
     process = run_compiler(command, folder, LIMIT_OF_ZIG)
     if process.returncode != 0:
-        lines = [line for line in process.stderr.splitlines() if "error" in line]
-        raise OSError(f"ziglang makes none: {(lines or [last_line(process.stderr)])[0]}")
+        errors = [line for line in process.stderr.splitlines() if "error" in line]
+        raise OSError(f"ziglang: {(errors or [last_line(process.stderr)])[0]}")
 
 
 def _exports() -> Iterator[str]:
-    yield from _OTHERS
+    yield from _HOST_FUNCTIONS
     for name in components():
         for function in _FUNCTIONS:
             yield f"{name}_fmi2{function}"
 
 
 def _sources() -> Mapping[str, Mapping[str, bytes]]:
-    """The sources in the FMUs, by the names of the components."""
+    """The sources in each FMU by their names, by the names of the components."""
     folder, found = current_fmus(NATIVE), {}
     for name in components():
         with zipfile.ZipFile(folder / f"{name}.fmu") as archive:

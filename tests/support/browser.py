@@ -29,7 +29,8 @@ class Browser:
     """A running browser, and one page in it.
 
     Attributes:
-        said: errors of the page, and what it has written on its console.
+        said: errors of the page, what it has written on its console, and what the browser has
+            refused it.
         requests: addresses of what it has fetched.
 
     """
@@ -43,7 +44,7 @@ class Browser:
         made = self.call("Target.createTarget", url="about:blank")
         found = self.call("Target.attachToTarget", targetId=made["targetId"], flatten=True)
         self._session = found["sessionId"]
-        for domain in ("Page", "Runtime", "Network"):
+        for domain in ("Page", "Runtime", "Network", "Log"):
             self.call(f"{domain}.enable")
 
     def call(self, method: str, **parameters: Any) -> Any:
@@ -85,6 +86,8 @@ class Browser:
         message: dict[str, Any] = json.loads(text)
         match message.get("method"):
             case "Runtime.exceptionThrown" | "Runtime.consoleAPICalled" as method:
+                self.said.append(f"{method}: {message['params']}")
+            case "Log.entryAdded" as method if message["params"]["entry"]["level"] == "error":
                 self.said.append(f"{method}: {message['params']}")
             case "Network.requestWillBeSent":
                 self.requests.append(message["params"]["request"]["url"])

@@ -7,8 +7,7 @@ import re
 import shutil
 import subprocess
 import zipfile
-from collections.abc import Iterator
-from importlib.util import find_spec
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,29 +17,22 @@ import pytest
 from fmus.compilers import FLAGS, machines_compiler
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.live import module, presets
-from orchestrator.live.assembly import ENGINE, live_page, live_script
+from orchestrator.live import assembly, module, presets
+from orchestrator.live.assembly import ENGINE, live_page
 from orchestrator.live.module import live_module
 from orchestrator.live.presets import page_data, preset, runs_of
+from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
 from orchestrator.runs import bundle
 from orchestrator.runs.scenario import names
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
+from support.live import TOLERANCE, needs_npm, needs_zig
 
 #: An installed package has no tests.
 SCRIPTS = Path(__file__).parents[2] / "orchestrator" / "live" / "web" / "test"
 
-NODE = shutil.which("node") and shutil.which("npm")
-
-pytestmark = [
-    pytest.mark.skipif(NODE is None, reason="npm is not installed"),
-    pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed"),
-]
-
-#: What rows may differ by, relative to the larger of 1 and the value: C libraries differ in the
-#: last bit of functions such as sine.
-TOLERANCE = 1e-9
+pytestmark = [needs_npm, needs_zig]
 
 #: Until when [s] that is so where a run is chaotic: 100 m away, the robust term of the PD
 #: controller switches at every step.
@@ -75,12 +67,12 @@ class Parts(NamedTuple):
 
 
 @pytest.fixture(scope="module")
-def parts(tmp_path_factory: pytest.TempPathFactory) -> Parts:
+def parts(script: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Parts:
     """Script, module and data."""
     folder = tmp_path_factory.mktemp("parts")
     (folder / "loop.wasm").write_bytes(live_module()[module.MODULE].read_bytes())
     (folder / "data.json").write_text(json.dumps(page_data("fig4")))
-    return Parts(live_script()[ENGINE], folder / "loop.wasm", folder / "data.json")
+    return Parts(script[ENGINE], folder / "loop.wasm", folder / "data.json")
 
 
 class Rows(NamedTuple):
@@ -95,14 +87,6 @@ def rows(parts: Parts, tmp_path_factory: pytest.TempPathFactory) -> Rows:
     """The runs of all presets."""
     folder = tmp_path_factory.mktemp("rows")
     return Rows(folder, parts.node("rows.mjs", str(folder)))
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page, as the command writes it."""
-    path = tmp_path_factory.mktemp("page") / "live.html"
-    assert main(["live", "--out", str(path)]) == 0
-    return path
 
 
 @pytest.fixture(scope="module")
@@ -319,10 +303,30 @@ def test_table_is_accepted_by_verify(preset, events, changes, opened: Browser, t
 def test_page_stands_by_itself_and_is_light(page: Path):
     text = page.read_text(encoding="utf-8")
     assert len(text.encode()) < 700_000
-    # What is in the page of others is named with its licence.
-    assert all(name in text for name in ("uplot 1.", "ogl 1.", "wasi-libc", "musl as a whole"))
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
-    assert re.search(r'Content-Security-Policy" content="default-src .none.;', text)
+    [policy] = re.findall(r'Content-Security-Policy" content="(.+?)"', text)
+    assert policy.startswith("default-src 'none'; ")
+    assert "unsafe-inline" not in policy
+
+
+#: Titles in the list of licences, each with how its text begins.
+LICENCES = {
+    "auv-fmu": "MIT License",
+    "Zig, contained in the WebAssembly module": "The MIT License (Expat)",
+    "wasi-libc, contained in the WebAssembly module": "wasi-libc as a whole",
+    "wasi-libc, MIT License, contained in the WebAssembly module": "Permission is hereby granted",
+    "cloudlibc, contained in the WebAssembly module": "Copyright (c) 2015-2017 Nuxi",
+    "musl, contained in the WebAssembly module": "musl as a whole",
+    r"ogl [\d.]+, Unlicense": "This is free and unencumbered software",
+    r"uplot [\d.]+, MIT": "The MIT License (MIT)",
+}
+
+
+def test_page_has_the_licence_of_each_thing_in_it(page: Path):
+    [texts] = re.findall("<pre>(.+?)</pre>", page.read_text(encoding="utf-8"), re.DOTALL)
+    for title, beginning in LICENCES.items():
+        section = rf"^{title}\n\n{re.escape(beginning)}"
+        assert re.search(section, texts, re.MULTILINE), title
 
 
 def test_page_opens_a_file_of_the_users(tmp_path, opened: Browser):
@@ -380,16 +384,24 @@ def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, ca
 
 
 @pytest.mark.parametrize(
-    ("lacking", "wanted"),
-    [("module.find_spec", "pip install 'auv-fmu[native]'"), ("assembly.shutil.which", "Node.js")],
+    ("make", "lacking", "wanted"),
+    [
+        (module.compiled, "module.find_spec", r"pip install 'auv-fmu\[native\]'"),
+        (assembly.bundled, "assembly.shutil.which", "Node.js"),
+    ],
 )
 def test_what_makes_a_part_is_named_where_it_is_missing(
-    lacking, wanted, tmp_path, monkeypatch, capsys
+    make: Callable[[], object], lacking, wanted, monkeypatch
 ):
     monkeypatch.setattr(f"orchestrator.live.{lacking}", lambda *_: None)
-    # A whole cache would do without.
-    monkeypatch.setattr("orchestrator.machine.cache.read_cached", lambda *_: {})
-    assert main(["live", "--out", str(tmp_path / "page.html")]) == 2
-    error = capsys.readouterr().err
-    # Before it, there may be a line on a part that is made.
-    assert wanted in error.splitlines()[-1]
+    with pytest.raises(InputError, match=wanted):
+        make()
+
+
+def test_npm_without_a_registry_is_refused_in_one_line(tmp_path, monkeypatch):
+    monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9")
+    monkeypatch.setenv("npm_config_cache", str(tmp_path))
+    monkeypatch.setattr(assembly, "_OPTIONS", (*assembly._OPTIONS, "--fetch-retries=0"))
+    with pytest.raises(InputError, match=r"npm ci: npm .*ECONNREFUSED") as refusal:
+        assembly.bundled()
+    assert "\n" not in str(refusal.value)

@@ -10,24 +10,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
-from shutil import which
 
 import numpy as np
 import pytest
 
-from orchestrator.commands.main import main
 from support.browser import BROWSER, Browser, browser
-
-#: Rows of the page and of the native FMUs: different machines add with different roundings.
-TOLERANCE = 1e-9
+from support.live import TOLERANCE, needs_npm, needs_zig
 
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed"),
-    pytest.mark.skipif(which("npm") is None, reason="Node.js is not installed"),
-    pytest.mark.skipif(find_spec("ziglang") is None, reason="needs the extra `native`"),
+    needs_npm,
+    needs_zig,
 ]
 
 SLIDER = "document.querySelector('input[data-names=\"controller.eps_t\"]')"
@@ -93,14 +88,6 @@ class Live:
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of Fig. 4."""
-    out = tmp_path_factory.mktemp("live") / "page.html"
-    assert main(["live", "fig4", "--out", str(out)]) == 0
-    return out
-
-
-@pytest.fixture(scope="module")
 def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     """One browser for all tests."""
     with browser(tmp_path_factory.mktemp("profile"), *SOFTWARE_GL) as started:
@@ -123,13 +110,6 @@ def rows(text: str) -> tuple[list[str], np.ndarray]:
     """Columns and numbers of a table."""
     header, *lines = csv.reader(io.StringIO(text))
     return header, np.array(lines, dtype=float)
-
-
-def test_page_is_one_small_file(page):
-    text = page.read_text(encoding="utf-8")
-    assert page.stat().st_size < 700_000
-    assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
-    assert "default-src 'none'" in text
 
 
 def test_arrow_keys_move_a_slider_and_the_numbers(opened):

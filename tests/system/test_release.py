@@ -10,7 +10,6 @@ import subprocess
 import sys
 import zipfile
 from collections.abc import Callable
-from importlib.util import find_spec
 from pathlib import Path
 
 import fmpy
@@ -28,6 +27,7 @@ from orchestrator.commands.main import main
 from orchestrator.live import assembly, module
 from orchestrator.runs import bundle
 from ready_wheel import write_wheel
+from support.live import needs_npm, needs_zig
 from support.machine import contents
 from support.settings import NAMES, WITH_INPUTS
 
@@ -42,8 +42,6 @@ PROCESSORS = {
     MACH_O: {0x01000007: "x86_64-darwin", 0x0100000C: "aarch64-darwin"},
 }
 
-needs_npm = pytest.mark.skipif(shutil.which("npm") is None, reason="npm is not installed")
-needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 each_version = pytest.mark.parametrize("fmi", FMI_VERSIONS)
 
 
@@ -86,6 +84,7 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
 @pytest.mark.slow
 @needs_npm
 @needs_zig
+@pytest.mark.usefixtures("script")
 def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(tmp_path: Path):
     wheel = write_wheel(tmp_path)
     assert wheel.name.endswith("-py3-none-any.whl")

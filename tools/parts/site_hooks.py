@@ -15,6 +15,7 @@ import posixpath
 import re
 from base64 import b64decode
 from collections.abc import Callable
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -149,7 +150,7 @@ def page_of(name: str) -> str:
 
 def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
     """A notebook as a page, with what its cells print and draw; and its pictures by their names."""
-    notebook = nbformat.read(path, as_version=4)
+    notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     with TemporaryDirectory() as folder:
         NotebookClient(notebook, resources={"metadata": {"path": folder}}).execute()
     parts: list[str] = []
@@ -174,12 +175,13 @@ def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 
 
 def live_page() -> tuple[str, str]:
-    """The live page and, where it cannot be made, why."""
+    """The live page and, where it cannot be made, why, as HTML."""
     try:
         return assembly.live_page("fig4"), ""
     except InputError as error:
         log.info("no live page: %s", error)
-        return f"<!doctype html><title>auv-fmu</title><p>{error}", str(error)
+        why = escape(str(error))
+        return f"<!doctype html><title>auv-fmu</title><p>{why}", why
 
 
 def _outside_code(change: Callable[[str], str], text: str) -> str:

@@ -11,6 +11,7 @@ pytest.importorskip("proselint")
 from prose import (
     Page,
     findings,
+    html_blocks,
     length,
     markdown_blocks,
     message_blocks,
@@ -118,6 +119,11 @@ def test_messages_of_a_module_are_read_and_docstrings_are_not():
         (3, "the file"),
         (3, "`…` is not\n`…` yet"),
     ]
+
+
+def test_texts_between_tags_are_read_with_their_lines():
+    text = '<p title="not this">\nThe <b>bold text</b> ends.</p>\n<p>{{data}}</p>\n'
+    assert [(block.line, block.text) for block in html_blocks(text)] == [(2, "bold text")]
 
 
 def test_a_finding_names_its_line_and_what_to_write():

@@ -20,6 +20,7 @@ async function start(): Promise<Api> {
 }
 
 const started = start();
+document.querySelector("form")?.addEventListener("submit", (event) => event.preventDefault());
 const api: Api = {
   set: async (changes) => (await started).set(changes),
   csv: async () => (await started).csv(),

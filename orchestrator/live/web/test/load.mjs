@@ -1,9 +1,10 @@
 // Loads a module of the page into Node.
+import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
 export async function load(name) {
   const { outputFiles } = await build({
-    entryPoints: [new URL(`../src/${name}.ts`, import.meta.url).pathname],
+    entryPoints: [fileURLToPath(new URL(`../src/${name}.ts`, import.meta.url))],
     bundle: true,
     format: "esm",
     platform: "node",
