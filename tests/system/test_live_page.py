@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.commands.main import main
 from support.browser import BROWSER, Browser, browser
 from support.live import TOLERANCE, needs_npm, needs_zig
 
