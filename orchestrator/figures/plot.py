@@ -33,7 +33,7 @@ from orchestrator.vehicle.signals import Loop
 #: Height of a panel, and of what stands above and below all of them [in].
 _PANEL, _MARGIN = 1.9, 0.6
 
-#: Runs of one scenario are told apart by so many parameters.
+#: Runs of one scenario are told apart by so many parameters, or events of each.
 _FEW = 2
 
 #: Of the lines, so many that few runs look alike.
@@ -109,7 +109,7 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
 def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]:
     """Runs with labels that tell them apart.
 
-    These are scenarios, or a few parameters, or ends of paths, or else numbers.
+    These are scenarios, or a few parameters, or a few events, or ends of paths, or else numbers.
 
     Args:
         runs: that are drawn together.
@@ -127,11 +127,25 @@ def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]
         ", ".join([name] * (len(set(names)) > 1) + [f"{k} = {_text(values, k)}" for k in differing])
         for name, values in zip(names, given, strict=True)
     ]
+    happened = [
+        [f"{one.label} at {one.time:.5g} s" for one in run.result.ending.events if one.label]
+        for run in runs
+    ]
+    events = [
+        ", ".join([name] * (len(set(names)) > 1) + (found or ["no event"]))
+        for name, found in zip(names, happened, strict=True)
+    ]
     parts = [path.resolve().parts for path in paths]
     longest = max(map(len, parts), default=1)
     ends = [["/".join(part[-n:]) for part in parts] for n in range(1, longest)]
     numbered = [f"{name} ({number})" for number, name in enumerate(names, start=1)]
-    candidates = [names, *([changes] * (len(differing) <= _FEW)), *ends, numbered]
+    candidates = [
+        names,
+        *([changes] * (len(differing) <= _FEW)),
+        *([events] * (max(map(len, happened)) <= _FEW)),
+        *ends,
+        numbered,
+    ]
     labels = next(labels for labels in candidates if len(set(labels)) == len(labels))
     return [run._replace(label=label) for run, label in zip(runs, labels, strict=True)]
 

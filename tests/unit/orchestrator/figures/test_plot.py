@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 
 from orchestrator.figures.drawing import save
-from orchestrator.figures.plot import plot
+from orchestrator.figures.plot import plot, told_apart
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
+from orchestrator.master.observers.observer import Ending, Occurrence
+from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import Loop
 from support.tables import loop_table, table_of
 
@@ -100,6 +102,18 @@ def test_without_patterns_all_vehicles_are_shown():
 def test_without_patterns_the_loop_is_shown():
     labels = {axes.get_ylabel() for axes in plot([Drawn("run", loop_table())]).axes}
     assert labels == {"plant.tau.u\n[N]", "plant.tau\n[N·m]", "controller.theta_hat"}
+
+
+def test_runs_that_differ_in_their_events_only_are_told_apart_by_these():
+    table = loop_table()
+    happened = (Occurrence(2.0, "drop plant.y", "no position"), Occurrence(4.0, "ended"))
+    runs = [
+        Drawn("fig4", Table.of(table.header, table.rows, Ending(events=events)))
+        for events in ((), happened)
+    ]
+    assert [run.label for run in told_apart(runs)] == ["no event", "no position at 2 s"]
+    numbered = ["fig4 (1)", "fig4 (2)", "fig4 (3)"]
+    assert [run.label for run in told_apart([*runs, runs[0]])] == numbered
 
 
 def test_what_cannot_be_chosen_is_explained():
