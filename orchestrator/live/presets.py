@@ -10,12 +10,14 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from operator import itemgetter
-from typing import Any
+from typing import Any, NamedTuple
 
 from fmpy.model_description import ModelVariable
 
 from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
+from fmus.ports.quantities import POSITION, TAU, THETA, VELOCITY, Members
+from orchestrator.figures.style import printed_unit
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR
 from orchestrator.master.hooks.events import (
@@ -35,22 +37,41 @@ from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
+from orchestrator.runs.scenario_file import AT_ONCE
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.indices import metrics
+from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD
 
-#: A scenario with nothing of its own for each controller: it is the other one of a comparison where
-#: a scenario names none.
-_OTHERS = {"ObserverController": "path-pd", "PdController": "path"}
 
-#: Where a scenario names no label.
-_LABELS = {"ObserverController": "proposed", "PdController": "PD"}
+class _Controller(NamedTuple):
+    """What a comparison needs to know of a controller.
 
-#: The page keeps all rows of a run in its memory, and refuses more steps: `web/src/experiment.ts`.
+    Attributes:
+        label: where a scenario names none.
+        other: a scenario with the other controller and nothing else of its own, for scenarios that
+            name no comparison.
+
+    """
+
+    label: str
+    other: str
+
+
+#: In the order in which they are drawn.
+_CONTROLLERS = {
+    "ObserverController": _Controller("proposed", "path-pd"),
+    "PdController": _Controller("PD", "path"),
+}
+
+#: Groups of signals that have charts, with the units of their members.
+_CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
+
+#: The page keeps all rows of a run in its memory, and refuses more steps.
 _MOST_STEPS = 200_000
 
 Plain = dict[str, Any]
@@ -73,14 +94,21 @@ def page_data(opened: str) -> Plain:
     others = [preset(name) for name in names() if name != first["name"]]
     return {
         "opened": first["name"],
+        "mostSteps": _MOST_STEPS,
+        "lastSeconds": LAST_SECONDS,
+        "units": {group: _printed(units) for group, units in _CHARTS.items()},
         "fmus": {name: _fmu(component) for name, component in bundle().items()},
         "presets": sorted([first, *others], key=itemgetter("name")),
         "indices": [
             {"name": one.name, "label": one.label, "meaning": one.meaning}
-            | {"units": {str(member): unit for member, unit in one.units.items()}}
+            | {"units": _printed(one.units)}
             for one in metrics()
         ],
     }
+
+
+def _printed(units: Members) -> dict[str, str]:
+    return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 
 def preset(name: str) -> Plain:
@@ -107,6 +135,7 @@ def preset(name: str) -> Plain:
         "step": experiment.step,
         "events": scenario.name if scenario.events else "",
         "loops": loops,
+        "drawn": sorted(range(len(both)), key=lambda i: _place(both[i].system)),
     }
 
 
@@ -129,8 +158,19 @@ def runs_of(name: str) -> list[Prepared]:
 
 def _other(system: System) -> str:
     """The scenario with the controller that a system does not have; empty: it has neither."""
-    controller = system.components.get(STANDARD.controller)
-    return "" if controller is None else _OTHERS.get(_type(controller), "")
+    controller = _controller(system)
+    return controller.other if controller else ""
+
+
+def _controller(system: System) -> _Controller | None:
+    found = system.components.get(STANDARD.controller)
+    return _CONTROLLERS.get(_type(found)) if found else None
+
+
+def _place(system: System) -> int:
+    """The place of a system's controller among all."""
+    controller = _controller(system)
+    return [*_CONTROLLERS.values()].index(controller) if controller else 0
 
 
 def _type(component: Component) -> str:
@@ -157,6 +197,7 @@ def _check(prepared: Prepared) -> None:
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,
         f"a system without the {STANDARD.vehicle}": STANDARD.vehicle not in system.components,
+        "several vehicles": len(prepared.loops) > 1,
         f"more than {_MOST_STEPS:,} steps": experiment.rows - 1 > _MOST_STEPS,
     }
     for what, is_there in lacking.items():
@@ -169,10 +210,9 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     system, order = plan.system, plan.experiment.order
     sequence = stages(system, order)
     gathered = gathered_connections(system, sequence, order=order)
-    controller = system.components.get(STANDARD.controller)
-    label = _LABELS.get(_type(controller)) if controller else None
+    controller = _controller(system)
     return {
-        "label": scenario.label or label or scenario.name,
+        "label": scenario.label or (controller.label if controller else scenario.name),
         "components": {name: _type(part) for name, part in system.components.items()},
         "head": {"order": scenario.order, "only": [*scenario.only], "wires": {**scenario.wires}},
         "initial": [
@@ -211,8 +251,8 @@ def _parameters(system: System) -> Iterator[Plain]:
                 "default": start,
                 "value": value,
             }
-            if variable.unit:
-                found["unit"] = variable.unit
+            if variable.unit and variable.unit != "1":
+                found["unit"] = printed_unit(variable.unit)
             for end in ("min", "max"):
                 if (text := getattr(variable, end)) is not None:
                     found[end] = float(text)
@@ -264,7 +304,7 @@ def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
     ]
     return {
         name: [
-            _event(number, event)
+            _event(number, event) | {"canEnd": not any(action in table for action in AT_ONCE)}
             for number, table in some
             for event in read_events(name, shared_events([table], system), system)
         ]

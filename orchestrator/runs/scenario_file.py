@@ -15,7 +15,7 @@ from orchestrator.vehicle.signals import STANDARD
 INTERPOLATIONS = ("linear", "hold")
 
 #: Actions of an event after which there is nothing left that could end.
-_AT_ONCE = ("release", "reset", "stop")
+AT_ONCE = ("release", "reset", "stop")
 
 
 class PathTable(TomlTable):
@@ -87,7 +87,7 @@ class EventTable(TomlTable):
         if len(actions) != 1:
             said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(ACTIONS)}"
             raise ValueError(f"write one thing that it does, {said}")
-        if self.duration is not None and actions[0] in _AT_ONCE:
+        if self.duration is not None and actions[0] in AT_ONCE:
             raise ValueError(f"{actions[0]} has no duration: leave `for` out")
         if self.repeat is not None and self.when is None:
             raise ValueError("repeat is for events with `when`")

@@ -24,6 +24,7 @@ from orchestrator.live.presets import page_data, preset, runs_of
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
 from orchestrator.runs import bundle
+from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import names
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
@@ -230,12 +231,7 @@ override = { plant.water.z = 0.0 }
     ids=["whole", "chattering", "stopped", "refused"],
 )
 def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
-    scenario = tmp_path / "mine.toml"
-    scenario.write_text(EVENTS.replace("LAST", last))
-    data = json.loads(parts.data.read_text())
-    (tmp_path / "data.json").write_text(json.dumps(data | {"presets": [preset(str(scenario))]}))
-    said = parts._replace(data=tmp_path / "data.json").node("rows.mjs", str(tmp_path))["mine.0"]
-    [run, _] = runs_of(str(scenario))
+    said, run = both(EVENTS.replace("LAST", last), parts, tmp_path)
     table = Table()
     ending = run.run([table])
     assert table.time[-1] == pytest.approx(end)
@@ -244,6 +240,25 @@ def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Par
     assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
     assert len(ending.events) > 12
     assert (said.get("failure"), said.get("remark")) == (ending.failure, ending.remark)
+
+
+def test_messages_are_the_ones_of_the_master(parts: Parts, tmp_path):
+    """Of an observer that restarts after each reset."""
+    resets = (f'[[events]]\nat = {k / 25}\nreset = "controller"\n' for k in range(1, 120))
+    gate = "stop_time = 5.0\n[parameters]\ncontroller.innovation_gate = 1e-6\n"
+    said, run = both(gate + "".join(resets), parts, tmp_path)
+    assert tuple(said["messages"]) == run.run([]).messages
+    assert re.fullmatch(r"and \d+ more messages", said["messages"][-1])
+
+
+def both(text: str, parts: Parts, folder: Path) -> tuple[Any, Prepared]:
+    """What a scenario's run in Node says, and the run itself."""
+    scenario = folder / "mine.toml"
+    scenario.write_text(text)
+    data = json.loads(parts.data.read_text())
+    (folder / "data.json").write_text(json.dumps(data | {"presets": [preset(str(scenario))]}))
+    said = parts._replace(data=folder / "data.json").node("rows.mjs", str(folder))
+    return said["mine.0"], runs_of(str(scenario))[0]
 
 
 def test_tables_are_the_same_in_node_and_in_a_browser(parts: Parts, opened: Browser):
@@ -352,6 +367,11 @@ def test_loops_with_the_same_controller_are_told_apart_by_their_scenarios(tmp_pa
     ]
 
 
+def test_controllers_are_drawn_in_the_same_order_whichever_a_scenario_has():
+    assert preset("fig5")["drawn"] == [0, 1]
+    assert preset("fig5-pd")["drawn"] == [1, 0]
+
+
 def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
     """The PD controller has no k_d."""
     (tmp_path / "mine.toml").write_text(
@@ -372,6 +392,7 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ('coupling = "linear"\n', "linear"),
         ("[steps]\nplanner = 0.1\n", "longer steps"),
         ("[parameters]\nplant.m11 = -1.0\n", "m11 = -1"),
+        ('[components]\ntow = "AuvPlant"\n', "several vehicles"),
     ],
 )
 def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, capsys):

@@ -226,6 +226,53 @@ def test_what_is_no_number_is_refused_where_it_was_typed(opened, text):
     assert opened.run(f"{field}.getAttribute('aria-invalid')") == "false"
 
 
+def test_value_of_one_loop_can_be_set_in_both_and_taken_back(chromium, tmp_path):
+    (tmp_path / "other.toml").write_text(
+        '[components]\ncontroller = "PdController"\n[wires]\n"controller.dy" = "plant.dy"\n'
+        "[parameters]\nplant.noise.std = 0.01\n"
+    )
+    (tmp_path / "mine.toml").write_text('compare = "other.toml"\nstop_time = 5.0\n')
+    out = tmp_path / "page.html"
+    assert main(["live", str(tmp_path / "mine.toml"), "--out", str(out)]) == 0
+    chromium.open(out)
+    live = Live(chromium)
+    live.start()
+    live.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    before = live.run(TABLE)
+    field = "document.querySelector('#groups input[data-name=\"plant.noise.std\"]')"
+    own = live.run(f"{field}.value")
+    live.type(field, "0.5")
+    live.wait("/plant\\.noise\\.std=0\\.5/.test(location.hash)")
+    live.type(field, own)
+    live.wait(f"location.hash.includes('plant.noise.std={own}')")
+    assert live.run(f"{field}.classList.contains('changed')")
+    assert live.run(TABLE) != before
+    live.run(f"{field}.closest('.row').querySelector('.reset').click()")
+    live.wait("!location.hash.includes('plant.noise.std')")
+    assert not live.run(f"{field}.classList.contains('changed')")
+    assert live.run(TABLE) == before
+
+
+def test_what_fmus_say_and_how_a_run_ends_is_shown_without_an_alarm(opened, chromium, tmp_path):
+    messages = "document.getElementById('messages').innerText"
+    assert opened.run(messages) == ""
+    opened.run('auvfmu.set({"controller.innovation_gate": 1e-6})')
+    said = opened.run(messages)
+    assert said.startswith("proposed: controller: observer restarted at t = ")
+    assert said.count("\n") == 0
+    (tmp_path / "mine.toml").write_text("[[events]]\nat = 2.0\nstop = true\n")
+    out = tmp_path / "page.html"
+    assert main(["live", str(tmp_path / "mine.toml"), "--out", str(out)]) == 0
+    chromium.open(out)
+    opened.start()
+    assert opened.run(messages).splitlines() == [
+        "proposed: ended at t = 2 s: stop",
+        "PD: ended at t = 2 s: stop",
+    ]
+    assert opened.run("document.getElementById('error').hidden")
+    assert not opened.run("document.body.classList.contains('refused')")
+
+
 def test_wrong_time_of_an_event_stays_marked_until_it_is_reset(opened):
     opened.run('auvfmu.set({preset: "fault-thruster"})')
     opened.run(f"{EVENT}.closest('details').open = true")

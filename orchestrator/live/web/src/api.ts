@@ -3,8 +3,9 @@
 import { Refusal } from "./experiment";
 import { fromHash, toHash } from "./link";
 import { eventsOf, presetOf, type Settings, untouched } from "./settings";
+import type { Engine } from "./simulate";
 import { csv } from "./text";
-import type { Data, Engine, Result, Value } from "./types";
+import type { Data, Result, Value } from "./types";
 
 export interface Api {
   /**

@@ -3,8 +3,7 @@
 import { type Changed, Field, SliderRow } from "./field";
 import { parametersOf, type Settings } from "./settings";
 import { GROUPS } from "./sliders";
-import { printedUnit } from "./text";
-import type { Parameter, Preset, Value } from "./types";
+import type { Preset } from "./types";
 
 export class Controls {
   readonly #groups: HTMLElement;
@@ -63,11 +62,9 @@ export class Controls {
     }
   }
 
-  show(settings: Settings): void {
-    const current = (parameter: Parameter): Value =>
-      settings.values[parameter.name] ?? parameter.value;
-    for (const row of this.#rows) row.show(current);
-    for (const field of this.#fields) field.value = current(field.parameter);
+  show({ values }: Settings): void {
+    for (const row of this.#rows) row.show(values);
+    for (const field of this.#fields) field.show(values[field.parameter.name]);
   }
 
   /** Marks what a message names; empty: all is well. Returns whether the message can be seen. */
@@ -96,7 +93,7 @@ function entry(field: Field): { element: HTMLElement; text: string } {
   words.append(code, meaning);
   const units = document.createElement("span");
   units.className = "unit";
-  units.textContent = unit && unit !== "1" ? printedUnit(unit) : "";
+  units.textContent = unit ?? "";
   element.append(words, field.element, units);
   return { element, text: `${name} ${description}`.toLowerCase() };
 }

@@ -1,7 +1,7 @@
 // Which events happen, when and for how long.
 
 import { isDuration, isTime } from "./experiment";
-import { canEnd, type Edit, eventOf, type Settings } from "./settings";
+import { type Edit, eventOf, type Settings } from "./settings";
 import { entered } from "./text";
 import type { EventData, Preset } from "./types";
 
@@ -70,7 +70,7 @@ export class EventsForm {
     } else {
       item.append(this.#field("at", number, event.label));
     }
-    if (canEnd(event)) item.append(this.#field("for", number, event.label));
+    if (event.canEnd) item.append(this.#field("for", number, event.label));
     return item;
   }
 

@@ -7,9 +7,6 @@ export class Refusal extends Error {}
 const ROUNDING = 1e-9;
 const MOST_OF_A_STEP = 1e-3;
 
-/** Rows of more steps than this do not fit into a page. */
-const MOST_STEPS = 200_000;
-
 /** Whether an event can come then [s]: not before the start. */
 export function isTime(time: number): boolean {
   return time >= 0 && time < Infinity;
@@ -32,10 +29,11 @@ export class Experiment {
   /** How many steps there are: the last one is shorter if the run is not a multiple of the step. */
   readonly steps: number;
 
-  /** Times are in seconds. */
+  /** Times are in seconds; a page refuses more than so many steps. */
   constructor(
     readonly stopTime: number,
     readonly step: number,
+    mostSteps: number,
   ) {
     for (const [name, time] of [
       ["step", step],
@@ -45,9 +43,9 @@ export class Experiment {
       if (!isDuration(time)) throw new Refusal(`${name} ${time} s must be positive, and finite`);
     }
     const inSteps = rounded(Math.max(stopTime / step, Number.MIN_VALUE));
-    if (inSteps > MOST_STEPS) {
+    if (inSteps > mostSteps) {
       throw new Refusal(
-        `${stopTime} s in steps of ${step} s are more than ${MOST_STEPS} steps, too many for a page`,
+        `${stopTime} s in steps of ${step} s are more than ${mostSteps} steps, too many for a page`,
       );
     }
     this.fullSteps = Math.floor(inSteps);
@@ -66,6 +64,6 @@ export class Experiment {
 
   /** After how many steps a time has come: the first t_k that is not before it. */
   reaching(time: number): number {
-    return Math.ceil(rounded(Math.min(Math.max(time / this.step, 0), MOST_STEPS + 1)));
+    return Math.ceil(rounded(Math.max(time / this.step, 0)));
   }
 }

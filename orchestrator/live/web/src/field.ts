@@ -1,10 +1,11 @@
 // A number, choice or switch for one parameter, and a row of them with a slider.
 
+import type { Changes } from "./settings";
 import { POSITIONS, positionOf, type Slider, valueAt } from "./sliders";
-import { entered, printedUnit } from "./text";
-import type { Parameter, Value } from "./types";
+import { entered } from "./text";
+import type { Parameter, Value, Values } from "./types";
 
-export type Changed = (values: Record<string, Value>) => void;
+export type Changed = (values: Changes) => void;
 
 /** What a parameter means, where it may lie and what it is without a change. */
 export function explained(parameter: Parameter): string {
@@ -17,7 +18,7 @@ export function explained(parameter: Parameter): string {
   const lines = [
     name,
     description,
-    [unit ? `in ${printedUnit(unit)}` : "", ...range].filter(Boolean).join(", "),
+    [unit ? `in ${unit}` : "", ...range].filter(Boolean).join(", "),
     `preset: ${value}`,
   ];
   return lines.filter(Boolean).join("\n");
@@ -27,7 +28,8 @@ export function explained(parameter: Parameter): string {
 export class Field {
   readonly element: HTMLInputElement | HTMLSelectElement;
   readonly parameter: Parameter;
-  #shown: Value | undefined;
+  /** What it shows, as `show` has got it; null: something else. */
+  #shown: Value | undefined | null = null;
   #wrong = "";
 
   constructor(parameter: Parameter, label: string, changed: Changed) {
@@ -49,7 +51,7 @@ export class Field {
     this.element.setAttribute("aria-label", label);
     this.element.dataset.name = name;
     this.element.addEventListener("change", () => {
-      this.#shown = undefined;
+      this.#shown = null;
       changed({ [name]: this.#entered() });
     });
   }
@@ -61,18 +63,20 @@ export class Field {
     return parameter.type === "String" ? element.value : entered(element.value);
   }
 
-  set value(value: Value) {
-    const { element } = this;
+  /** Shows the value that is set; undefined: the preset's own. */
+  show(given: Value | undefined): void {
     // Nearly all of them stay as they are while a slider moves.
-    if (value === this.#shown && !this.#wrong) return;
-    this.#shown = value;
+    if (given === this.#shown && !this.#wrong) return;
+    this.#shown = given;
+    const { element } = this;
+    const value = given ?? this.parameter.value;
     if (element instanceof HTMLInputElement && element.type === "checkbox") {
       element.checked = value === true;
     } else if (document.activeElement !== element || this.#entered() !== value) {
       // What cannot be read stays, so that it can be mended.
       if (!Number.isNaN(value)) element.value = String(value);
     }
-    element.classList.toggle("changed", value !== this.parameter.value);
+    element.classList.toggle("changed", given !== undefined);
   }
 
   /** Marks it where a message names its parameter. */
@@ -119,7 +123,7 @@ export class SliderRow {
     label.title = explained(parameter);
     const unit = document.createElement("span");
     unit.className = "unit";
-    unit.textContent = parameter.unit && parameter.unit !== "1" ? printedUnit(parameter.unit) : "";
+    unit.textContent = parameter.unit ?? "";
     this.#reset = document.createElement("button");
     this.#reset.type = "button";
     this.#reset.className = "reset";
@@ -127,7 +131,7 @@ export class SliderRow {
     this.#reset.title = `back to ${parameters.map(({ value }) => value).join(", ")}`;
     this.#reset.setAttribute("aria-label", `Reset ${spoken}`);
     this.#reset.addEventListener("click", () => {
-      changed(Object.fromEntries(parameters.map(({ name, value }) => [name, value])));
+      changed(Object.fromEntries(row.names.map((name) => [name, undefined])));
       this.#slider.focus();
     });
     this.#slider = document.createElement("input");
@@ -159,11 +163,9 @@ export class SliderRow {
     this.root.append(head, this.#slider, ...(parameters.length > 1 ? [fields] : []), this.#error);
   }
 
-  show(current: (parameter: Parameter) => Value): void {
-    const values = this.fields.map(({ parameter }) => current(parameter));
-    this.fields.forEach((field, k) => {
-      field.value = values[k];
-    });
+  show(given: Values): void {
+    for (const field of this.fields) field.show(given[field.parameter.name]);
+    const values = this.fields.map(({ parameter }) => given[parameter.name] ?? parameter.value);
     const last = values.length - 1;
     const value = Number(values[last]) * (this.#row.signs?.[last] ?? 1);
     if (!Number.isNaN(value)) {
@@ -172,7 +174,7 @@ export class SliderRow {
       this.#slider.step = String(stepOf(this.#row));
     }
     this.#slider.setAttribute("aria-valuetext", [...new Set(values)].join(", "));
-    const isChanged = this.fields.some(({ parameter }, k) => values[k] !== parameter.value);
+    const isChanged = this.#row.names.some((name) => given[name] !== undefined);
     this.#reset.hidden = !isChanged;
     this.root.classList.toggle("changed", isChanged);
   }

@@ -3,7 +3,7 @@ import type { FmiType, Fmu, Value, Variable } from "./types";
 
 /** FMI's statuses up to the first one with which a call has not done what it should. */
 const WARNING = 1;
-const DISCARD = 2;
+export const DISCARD = 2;
 
 const CO_SIMULATION = 1;
 /** Bytes of a double. */
@@ -150,7 +150,7 @@ export class Instance {
     private readonly machine: Machine,
     readonly name: string,
     private readonly type: string,
-    fmu: Fmu,
+    private readonly fmu: Fmu,
     hear: Hearer,
   ) {
     this.variables = new Map(fmu.variables.map((variable) => [variable.name, variable]));
@@ -189,10 +189,10 @@ export class Instance {
   }
 
   /** Say where the row is, and in which of its columns this component's ports begin. */
-  tie(fmu: Fmu, row: number, first: number): void {
+  tie(row: number, first: number): void {
     this.row = row;
     let column = first;
-    for (const { causality, type, ports } of Instance.layout(fmu)) {
+    for (const { causality, type, ports } of Instance.layout(this.fmu)) {
       const references = this.own(this.machine.allocate(INT * ports.length));
       this.machine.integers(references, ports.length).set(ports.map((port) => port.reference));
       const place =

@@ -4,9 +4,6 @@ import type { Metrics, Result } from "./types";
 const ACTUATORS = ["u", "q", "r"];
 const AXES = ["x", "y", "z"];
 
-/** T_L of section 4.2 [s]. */
-const LAST_SECONDS = 5;
-
 /** What has been made of a run: the page asks more than once. */
 const points = new WeakMap<Result, Float64Array[]>();
 const errors = new WeakMap<Result, Float64Array[]>();
@@ -49,8 +46,8 @@ export function limits(result: Result, actuator: string): readonly [number, numb
   return [of("min"), of("max")];
 }
 
-/** The indices of a run that has made a step; of none, nothing. */
-export function metrics(result: Result): Metrics {
+/** The indices of a run that has made a step, with its end of so many seconds; of none, nothing. */
+export function metrics(result: Result, lastSeconds: number): Metrics {
   const { time, rows } = result;
   const steps = rows - 1;
   if (steps === 0) return {};
@@ -69,7 +66,7 @@ export function metrics(result: Result): Metrics {
     }
   });
   const error = trackingError(result);
-  const late = (values: Float64Array) => values.filter((_, k) => time[k] >= end - LAST_SECONDS);
+  const late = (values: Float64Array) => values.filter((_, k) => time[k] >= end - lastSeconds);
   const largest = (values: Float64Array) => values.reduce((a, b) => Math.max(a, Math.abs(b)), 0);
   return {
     l2_effort: square.map(Math.sqrt),

@@ -1,6 +1,5 @@
 // The indices of section 4.2 as a table, with a row for each controller.
 
-import { printedUnit } from "./text";
 import type { IndexData, Metrics } from "./types";
 
 /** A controller in the table. */
@@ -55,7 +54,7 @@ export class IndicesTable {
   #build(there: readonly IndexData[], measured: readonly Measured[]): void {
     this.#cells = [];
     const rows = there.flatMap(({ label, units, meaning }) => {
-      const found = [...new Set(Object.values(units).filter(Boolean))].map(printedUnit).join(", ");
+      const found = [...new Set(Object.values(units).filter(Boolean))].join(", ");
       const heading = document.createElement("tr");
       heading.className = "index";
       heading.title = meaning;

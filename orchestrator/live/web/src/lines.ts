@@ -123,7 +123,7 @@ const PLAIN_FRAGMENT = /* glsl */ `
 `;
 
 /** Single points, or pairs of them as lines of one pixel, of which at most so many are drawn. */
-export class Marks {
+export class Primitives {
   readonly mesh: Mesh;
   readonly #data: Float32Array;
 

@@ -2,7 +2,6 @@
 
 import { isDuration, isTime } from "./experiment";
 import {
-  canEnd,
   type Edit,
   eventOf,
   parametersOf,
@@ -49,10 +48,12 @@ export function toHash(settings: Settings, data: Data): string {
 /** Settings of a link, and what of it is not understood. */
 export function fromHash(hash: string, data: Data): { settings: Settings; unknown: string[] } {
   const fields = [...new URLSearchParams(hash.replace(/^#/, ""))];
-  const wanted = fields.find(([key]) => key === PRESET)?.[1] ?? data.opened;
+  const presets = fields.filter(([key]) => key === PRESET).map(([, name]) => name);
+  const [wanted = data.opened, ...others] = presets;
   const preset = presetOf(data, wanted) ?? presetOf(data, data.opened) ?? data.presets[0];
   const parameters = parametersOf(preset);
-  const unknown = wanted === preset.name ? [] : [`${PRESET}=${wanted}`];
+  const lost = wanted === preset.name ? others : presets;
+  const unknown = lost.map((name) => `${PRESET}=${name}`);
   const values: Record<string, Value> = {};
   const edited: [string, string][] = [];
   const hidden: string[] = [];
@@ -92,7 +93,7 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
 function editOf(event: EventData, kind: string, text: string): Edit | undefined {
   const time = numberOf(text);
   if (kind === "at") return isTime(time) && event.at !== undefined ? { at: time } : undefined;
-  if (!canEnd(event)) return undefined;
+  if (!event.canEnd) return undefined;
   if (text === FOR_GOOD) return { lasts: null };
   return isDuration(time) ? { lasts: time } : undefined;
 }

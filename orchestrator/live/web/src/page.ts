@@ -3,18 +3,26 @@
 import { Charts, type Mark, rowAt } from "./charts";
 import { commandLine } from "./command";
 import { Controls } from "./controls";
-import { controlPoint, metrics, Refusal } from "./engine";
+import { controlPoint, type Engine, metrics, Refusal } from "./engine";
 import { EventsForm } from "./events_form";
 import { IndicesTable } from "./indices_table";
 import { buildSwitches, fillLegend } from "./legend";
 import { fromHash, toHash } from "./link";
-import { interleaved, lines, type Shown, sections } from "./panels";
+import { interleaved, lines, longest, sections } from "./panels";
 import { Player } from "./player";
 import { missing, Scene } from "./scene";
-import { eventsOf, presetOf, type Settings, untouched, withEdit, withValues } from "./settings";
+import {
+  type Changes,
+  eventsOf,
+  presetOf,
+  type Settings,
+  untouched,
+  withEdit,
+  withValues,
+} from "./settings";
 import { csvLines, entered } from "./text";
 import { palette, themeButton } from "./theme";
-import type { Data, Engine, LoopData, Preset, Result, Values } from "./types";
+import type { Data, LoopData, Preset, Result } from "./types";
 
 /** The link is written so long after the last change [ms]: browsers limit how often it may be. */
 const LINK_AFTER = 300;
@@ -22,7 +30,7 @@ const LINK_AFTER = 300;
 /** How long a notice stays [ms]. */
 const SAID = 4000;
 
-/** How many parts of a link, or messages, are listed. */
+/** How many parts of a link are listed. */
 const NAMED = 5;
 
 function element<T extends HTMLElement>(id: string): T {
@@ -162,7 +170,7 @@ export class Page {
   }
 
   /** Sets parameters by `component.parameter`, and runs. */
-  set(values: Values): void {
+  set(values: Changes): void {
     this.#take(withValues(this.#settings, this.#preset, values));
   }
 
@@ -180,7 +188,7 @@ export class Page {
   /** Makes what belongs to a preset, and runs it. */
   #open(): void {
     this.#preset = presetOf(this.#data, this.#settings.preset) ?? this.#data.presets[0];
-    this.#loops = inOrder(this.#preset);
+    this.#loops = this.#preset.drawn.map((place) => this.#preset.loops[place]);
     document.title = this.#preset.title;
     element<HTMLSelectElement>("preset").value = this.#preset.name;
     // Names of parameters stand between backquotes.
@@ -192,7 +200,12 @@ export class Page {
     );
     if (this.#preset !== this.#built) {
       this.#controls.build(this.#preset);
-      this.#charts.build(sections(this.#loops.map(({ label }) => label)));
+      this.#charts.build(
+        sections(
+          this.#loops.map(({ label }) => label),
+          this.#data.units,
+        ),
+      );
       this.#results = [];
     }
     this.#built = this.#preset;
@@ -231,16 +244,8 @@ export class Page {
       this.#draw();
       return;
     }
-    const failures = this.#results.flatMap((result, k) => {
-      const why = result?.failure ?? result?.remark;
-      return why ? [`${this.#loops[k].label}: ${why}`] : [];
-    });
-    const said = this.#results.flatMap((result, k) =>
-      [...new Set(result?.messages)]
-        .slice(0, NAMED)
-        .map((text) => `${this.#loops[k].label}: ${text}`),
-    );
-    this.#refuse(failures.join("; "), said.join("; "));
+    const failures = this.#each(({ failure }) => (failure === undefined ? [] : [failure]));
+    this.#refuse(failures.join("; "), this.#each(messagesOf).join("\n"));
     this.#draw();
   }
 
@@ -253,12 +258,25 @@ export class Page {
     });
   }
 
-  /** Says why what is set cannot be run, or what its FMUs have said. */
-  #refuse(message: string, said = ""): void {
+  /** What there is to say of the results, each with the name of its controller. */
+  #each(said: (result: Result) => readonly string[]): string[] {
+    return this.#results.flatMap((result, k) =>
+      result ? said(result).map((text) => `${this.#loops[k].label}: ${text}`) : [],
+    );
+  }
+
+  /** Says why what is set cannot be run to its end, and what else there is to say of its runs. */
+  #refuse(message: string, messages = ""): void {
     const isSeen = this.#controls.refuse(message);
-    const error = element("error");
-    error.textContent = [isSeen ? "" : message, said].filter(Boolean).join("; ");
-    error.hidden = error.textContent === "";
+    for (const [id, text] of [
+      ["error", isSeen ? "" : message],
+      ["messages", messages],
+    ]) {
+      const place = element(id);
+      place.hidden = text === "";
+      // Readers of the screen say it again whenever it is set.
+      if (place.textContent !== text) place.textContent = text;
+    }
     document.body.classList.toggle("refused", message !== "");
   }
 
@@ -285,9 +303,7 @@ export class Page {
   }
 
   #draw(): void {
-    const shown = this.#results.map(
-      (result, k): Shown | undefined => result && { loop: this.#loops[k], result },
-    );
+    const { lastSeconds, units } = this.#data;
     const first = this.#results.find((result) => result);
     const hasReference = first?.has("planner.y_d.x") ?? false;
     const end = Math.max(
@@ -296,7 +312,7 @@ export class Page {
     );
     const marks = marksOf(first, end);
     const waypoints = first && hasReference ? waypointsOf(first) : [];
-    this.#charts.set(lines(shown), marks);
+    this.#charts.set(lines(this.#results, units), marks);
     this.#scene?.set({
       tracks: this.#results.map(
         (result) =>
@@ -315,19 +331,17 @@ export class Page {
       ...(waypoints.length ? ["waypoints"] : []),
     ]);
     this.#indices.show(
-      shown.flatMap((one, place) =>
-        one ? [{ label: one.loop.label, place, metrics: metrics(one.result) }] : [],
-      ),
+      this.#results.flatMap((result, place) => {
+        const { label } = this.#loops[place];
+        return result ? [{ label, place, metrics: metrics(result, lastSeconds) }] : [];
+      }),
     );
     this.#player.set(end, marks);
   }
 
   #showTime(time: number): void {
-    const longest = this.#results.reduce<Result | undefined>(
-      (best, one) => (one && one.rows > (best?.rows ?? 0) ? one : best),
-      undefined,
-    );
-    if (longest) this.#scene?.show(rowAt(longest.time, time));
+    const whole = longest(this.#results);
+    if (whole) this.#scene?.show(rowAt(whole.time, time));
     this.#charts.show(time);
   }
 
@@ -407,10 +421,10 @@ export class Page {
   }
 }
 
-/** The proposed controller comes before the PD controller, whichever of them a scenario has. */
-function inOrder({ loops }: Preset): readonly LoopData[] {
-  const isPd = ({ components }: LoopData) => Number(components.controller === "PdController");
-  return [...loops].sort((a, b) => isPd(a) - isPd(b));
+/** What is worth a word of a run that can be looked at; what its failure says is said already. */
+function messagesOf({ failure = "", remark, messages }: Result): string[] {
+  const others = messages.filter((text) => !failure.endsWith(`: ${text}`));
+  return remark === undefined ? others : [remark, ...others];
 }
 
 function attitudeOf(result: Result): Float64Array {

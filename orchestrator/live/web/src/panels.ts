@@ -1,7 +1,7 @@
 // What the charts show of a run.
 
 import { limits, trackingError } from "./engine";
-import type { LoopData, Result } from "./types";
+import type { Data, Result } from "./types";
 
 /** Colour and style of a line: of a controller, or of what is true or wanted. */
 export type Style = "first" | "second" | "reference";
@@ -31,30 +31,24 @@ export interface Lines {
   readonly limits?: readonly [number, number];
 }
 
-/** A run that is shown, in the place of its controller. */
-export interface Shown {
-  readonly loop: LoopData;
-  readonly result: Result;
-}
-
-const AXES = ["x", "y", "z"] as const;
-const ACTUATORS = { u: "N", q: "N·m", r: "N·m" } as const;
-const THETA = ["N", "kg/s", "kg/m", "kg"] as const;
-
 /** The sections of a page whose controllers have these names. */
-export function sections(labels: readonly string[]): readonly Section[] {
+export function sections(labels: readonly string[], units: Data["units"]): readonly Section[] {
   const both: Style[] = ["first", "second"];
   const compared = { styles: both.slice(0, labels.length), names: labels };
   return [
     {
       title: "Tracking errors",
       note: "control point minus reference",
-      panels: AXES.map((axis) => ({ ...compared, title: `<i>e<sub>${axis}</sub></i>`, unit: "m" })),
+      panels: Object.entries(units.e).map(([axis, unit]) => ({
+        ...compared,
+        title: `<i>e<sub>${axis}</sub></i>`,
+        unit,
+      })),
     },
     {
       title: "Commands",
       note: "with their limits, where they are near",
-      panels: Object.entries(ACTUATORS).map(([member, unit]) => ({
+      panels: Object.entries(units.tau).map(([member, unit]) => ({
         ...compared,
         title: `&tau;<sub>${member}</sub>`,
         unit,
@@ -64,57 +58,64 @@ export function sections(labels: readonly string[]): readonly Section[] {
       title: "Velocity of the control point",
       note: "",
       named: true,
-      panels: AXES.map((axis) => ({
+      panels: Object.entries(units.dy).map(([axis, unit]) => ({
         styles: ["first", "reference"],
         names: ["estimated by the observer", "true"],
         title: `<i>y&#775;<sub>${axis}</sub></i>`,
-        unit: "m/s",
+        unit,
       })),
     },
     {
       title: "Estimated parameters",
       note: "",
-      panels: THETA.map((unit, k) => ({
+      panels: Object.entries(units.theta_hat).map(([k, unit]) => ({
         ...compared,
-        title: `&theta;&#770;<sub>${k + 1}</sub>`,
+        title: `&theta;&#770;<sub>${k}</sub>`,
         unit,
       })),
     },
   ];
 }
 
-/** The lines of all panels, section by section. */
-export function lines(shown: readonly (Shown | undefined)[]): readonly (readonly Lines[])[] {
-  // A run that failed is shorter than the other.
-  const longest = shown.reduce<Result | undefined>(
-    (best, one) => (one && one.result.rows > (best?.rows ?? 0) ? one.result : best),
+/** The result with the most rows: a run that failed is shorter than the other. */
+export function longest(results: readonly (Result | undefined)[]): Result | undefined {
+  return results.reduce(
+    (best, one) => (one && one.rows > (best?.rows ?? 0) ? one : best),
     undefined,
   );
-  const time = longest?.time ?? new Float64Array(0);
-  const rows = Math.max(0, (longest?.rows ?? 0) - 1);
+}
+
+/** The lines of all panels, section by section. */
+export function lines(
+  results: readonly (Result | undefined)[],
+  units: Data["units"],
+): readonly (readonly Lines[])[] {
+  const whole = longest(results);
+  const time = whole?.time ?? new Float64Array(0);
+  const rows = Math.max(0, (whole?.rows ?? 0) - 1);
   /** Times at which steps begin: the row at whose end they stand has their signals. */
   const starts = time.subarray(0, rows);
-  const errors = shown.map((one) => one && trackingError(one.result));
+  const errors = results.map((result) => result && trackingError(result));
   const steps = (result: Result | undefined, name: string) =>
     result?.has(name) ? result.column(name).subarray(1) : undefined;
-  const observed = shown.find((one) => one?.result.has("controller.dy_hat.x"))?.result;
-  const moving = observed ?? longest;
+  const observed = results.find((result) => result?.has("controller.dy_hat.x"));
+  const moving = observed ?? whole;
   return [
-    AXES.map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
-    Object.keys(ACTUATORS).map((member) => {
-      const values = shown.map((one) => steps(one?.result, `plant.tau.${member}`));
-      return { time: starts, values, ...(longest ? { limits: limits(longest, member) } : {}) };
+    Object.keys(units.e).map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
+    Object.keys(units.tau).map((member) => {
+      const values = results.map((result) => steps(result, `plant.tau.${member}`));
+      return { time: starts, values, ...(whole ? { limits: limits(whole, member) } : {}) };
     }),
-    AXES.map((axis) => ({
+    Object.keys(units.dy).map((axis) => ({
       time: starts,
       values: [
         steps(observed, `controller.dy_hat.${axis}`),
         moving?.column(`plant.dy.${axis}`).subarray(0, rows),
       ],
     })),
-    THETA.map((_, k) => ({
+    Object.keys(units.theta_hat).map((k) => ({
       time: starts,
-      values: shown.map((one) => steps(one?.result, `controller.theta_hat[${k + 1}]`)),
+      values: results.map((result) => steps(result, `controller.theta_hat[${k}]`)),
     })),
   ];
 }

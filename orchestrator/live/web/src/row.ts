@@ -6,9 +6,6 @@ import type { Fmu, LoopData, Stage, Value } from "./types";
 const FACTOR = 1;
 const OFFSET = -0;
 
-/** A value as it stands in the row. */
-export const numberOf = (value: Value): number => Number(value);
-
 /** All inputs and outputs side by side, as doubles in the module's memory. */
 export class Row {
   readonly address: number;
@@ -31,7 +28,7 @@ export class Row {
       for (const { ports } of Instance.layout(fmus[type])) {
         for (const port of ports) {
           names.push(`${component}.${port.name}`);
-          starts.push(numberOf(port.start ?? 0));
+          starts.push(Number(port.start ?? 0));
         }
       }
     }
@@ -128,12 +125,12 @@ export class Overrides {
 
   /** Let an input take a value, whatever feeds it. */
   override(target: string, value: Value): void {
-    this.alter(target, 0, numberOf(value));
+    this.alter(target, 0, Number(value));
   }
 
   /** Let an input take the value that it would take, and something more. */
   bias(target: string, offset: Value): void {
-    this.alter(target, FACTOR, OFFSET + numberOf(offset));
+    this.alter(target, FACTOR, OFFSET + Number(offset));
   }
 
   /** Let an input take what feeds it, or what it would have. */
@@ -151,7 +148,7 @@ export class Overrides {
   supply(target: string, value: Value): void {
     const column = this.row.column(target);
     const open = this.open.get(column);
-    let number = numberOf(value);
+    let number = Number(value);
     if (open !== undefined) {
       const [, factor, offset] = open;
       this.open.set(column, [number, factor, offset]);

@@ -2,7 +2,7 @@
 
 import { Camera, type Mesh, Renderer, Transform } from "ogl";
 import { axesOf, grid, type Label } from "./axes";
-import { type Colour, Marks, PathLine, POINTS } from "./lines";
+import { type Colour, PathLine, POINTS, Primitives } from "./lines";
 import {
   type Box,
   boxOf,
@@ -49,7 +49,7 @@ const LENGTH = 2;
 const CROSS = 0.015;
 
 /** Half of the width of a title [px]. */
-const TITLE = 40;
+const HALF_TITLE = 40;
 
 /** Room for the numbers around the box [px]. */
 const MARGIN = 25;
@@ -77,9 +77,9 @@ export class Scene {
   readonly #paths: PathLine[];
   readonly #vehicles: Mesh[];
   readonly #reference: PathLine;
-  readonly #target: Marks;
-  readonly #waypoints: Marks;
-  readonly #grid: Marks;
+  readonly #target: Primitives;
+  readonly #waypoints: Primitives;
+  readonly #grid: Primitives;
   readonly #labels: HTMLElement;
   readonly #turning: Turning;
   #shown: Shown = { tracks: [], reference: undefined, waypoints: [], ell: 0.35, zUp: false };
@@ -108,14 +108,14 @@ export class Scene {
     });
     const gl = this.#renderer.gl;
     this.#camera = new Camera(gl, { fov: (HALF * 360) / Math.PI, near: 0.05, far: 50 });
-    this.#grid = new Marks(gl, 400, gl.LINES);
+    this.#grid = new Primitives(gl, 400, gl.LINES);
     this.#reference = new PathLine(gl, 1.6, false);
-    this.#target = new Marks(gl, 1, gl.POINTS, 7 * this.#renderer.dpr);
-    this.#waypoints = new Marks(gl, 400, gl.LINES);
+    this.#target = new Primitives(gl, 1, gl.POINTS, 7 * this.#renderer.dpr);
+    this.#waypoints = new Primitives(gl, 400, gl.LINES);
     this.#paths = [new PathLine(gl, 2.6, false), new PathLine(gl, 2.6, true)];
     this.#vehicles = [vehicleMesh(gl), vehicleMesh(gl)];
-    const marks = [this.#grid, this.#target, this.#waypoints];
-    for (const { mesh } of [...marks, this.#reference, ...this.#paths]) {
+    const primitives = [this.#grid, this.#target, this.#waypoints];
+    for (const { mesh } of [...primitives, this.#reference, ...this.#paths]) {
       mesh.setParent(this.#root);
     }
     for (const vehicle of this.#vehicles) {
@@ -309,7 +309,7 @@ export class Scene {
     const width = this.#host.clientWidth;
     for (const { at, text, axis, isTitle } of labels) {
       const [left, y] = onScreen(at);
-      const x = isTitle ? Math.min(width - TITLE, Math.max(TITLE, left)) : left;
+      const x = isTitle ? Math.min(width - HALF_TITLE, Math.max(HALF_TITLE, left)) : left;
       const crowded = before[axis].some(([a, b]) => Math.hypot(a - x, b - y) < CROWDED);
       if (crowded && !isTitle) continue;
       before[axis].push([x, y]);

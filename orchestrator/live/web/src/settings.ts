@@ -8,6 +8,9 @@ export interface Edit {
   readonly lasts?: number | null;
 }
 
+/** Values by `component.parameter`; undefined: the preset's own again. */
+export type Changes = Readonly<Record<string, Value | undefined>>;
+
 export interface Settings {
   readonly preset: string;
   /** Values that differ from the preset's. */
@@ -45,13 +48,13 @@ export function parametersOf(preset: Preset): ReadonlyMap<string, Parameter> {
   return found;
 }
 
-/** Settings with other values; a value that every loop has anyway is no change. */
-export function withValues(settings: Settings, preset: Preset, changed: Values): Settings {
+/** Settings with other values; undefined, and a value that every loop has anyway, is no change. */
+export function withValues(settings: Settings, preset: Preset, changed: Changes): Settings {
   const values: Record<string, Value> = { ...settings.values };
   const all = preset.loops.flatMap(({ parameters }) => parameters);
   for (const [name, value] of Object.entries(changed)) {
     const isOwn = all.filter((one) => one.name === name).every((one) => one.value === value);
-    if (isOwn) delete values[name];
+    if (value === undefined || isOwn) delete values[name];
     else values[name] = value;
   }
   return { ...settings, values };
@@ -60,11 +63,6 @@ export function withValues(settings: Settings, preset: Preset, changed: Values):
 /** An event of a scenario by its number, as the preset's own loop has it. */
 export function eventOf(preset: Preset, events: string, number: number): EventData | undefined {
   return preset.loops[0].events[events]?.find((event) => event.number === number);
-}
-
-/** Whether an event can end: a reset, a stop and a release have no duration. */
-export function canEnd({ action }: EventData): boolean {
-  return !["reset", "stop", "release"].includes(action.kind);
 }
 
 /** Settings with a change of an event; the event's own times are no change. */

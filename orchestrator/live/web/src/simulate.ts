@@ -1,12 +1,11 @@
 // A run of a loop, from the first exchange of values to the last step.
 import { Ended, Events, parted, type Run } from "./events";
 import { Experiment, Refusal } from "./experiment";
-import { ComponentFailed, Instance, Machine, REAL } from "./fmi";
+import { ComponentFailed, DISCARD, Instance, Machine, REAL } from "./fmi";
 import { Gathering, Overrides, Row } from "./row";
 import { general } from "./text";
 import type {
   Data,
-  Engine as EngineType,
   LoopData,
   Occurrence,
   Options,
@@ -17,23 +16,17 @@ import type {
   Values,
 } from "./types";
 
-/** At most so many rounds of values along all connections. */
-const MOST_ROUNDS = 1000;
-
-/** Messages that are kept: an FMU may have something to say in every step. */
+/** Messages that are kept: an FMU says each once, and again after a reset. */
 const MOST_MESSAGES = 100;
 
-/** FMI's status of a value that was not taken. */
-const DISCARD = 2;
-
-/** A stage of every step. */
-interface Step {
+/** A stage with its values and instances. */
+interface LinkedStage {
   readonly gathering: Gathering;
   readonly members: readonly Instance[];
 }
 
 /** Runs loops in the compiled module. */
-export class Engine implements EngineType {
+export class Engine {
   private constructor(
     private readonly machine: Machine,
     private readonly data: Data,
@@ -44,8 +37,13 @@ export class Engine implements EngineType {
     return new Engine(await Machine.load(bytes), data);
   }
 
+  /**
+   * Runs a loop with its own values except for `values`; names that it lacks are left out.
+   *
+   * Throws `Refusal`, whose message is the FMU's own line, if a value or a time is not usable.
+   */
   run(loop: LoopData, values: Values, options: Options): Result {
-    const experiment = new Experiment(options.stopTime, options.step);
+    const experiment = new Experiment(options.stopTime, options.step, this.data.mostSteps);
     const simulation = new Simulation(this.machine, this.data, loop, values, experiment);
     try {
       return simulation.result(options.events ?? [], options.spare);
@@ -58,14 +56,16 @@ export class Engine implements EngineType {
 /** One run. */
 class Simulation {
   private readonly parameters: Record<string, Value> = {};
-  private readonly set = new Map<string, Map<string, Value>>();
+  /** Values that differ from the FMUs' own, by the names of the components. */
+  private readonly given = new Map<string, Map<string, Value>>();
   private readonly messages: string[] = [];
+  private heard = 0;
   private readonly refusals: string[] = [];
   private readonly instances = new Map<string, Instance>();
   private readonly row: Row;
 
   constructor(
-    machine: Machine,
+    private readonly machine: Machine,
     private readonly data: Data,
     private readonly loop: LoopData,
     values: Values,
@@ -77,20 +77,6 @@ class Simulation {
       const column = this.row.columns.get(name);
       if (column !== undefined) this.row.values[column] = Number(value);
     }
-    const hear = (status: number, text: string) => {
-      if (this.messages.length < MOST_MESSAGES) this.messages.push(text);
-      if (status === DISCARD) this.refusals.push(text);
-    };
-    try {
-      for (const [name, type] of Object.entries(loop.components)) {
-        const instance = new Instance(machine, name, type, data.fmus[type], hear);
-        this.instances.set(name, instance);
-        instance.tie(data.fmus[type], this.row.address, this.row.firsts.get(name) ?? 0);
-      }
-    } catch (error) {
-      this.free();
-      throw error instanceof ComponentFailed ? new Refusal(error.message) : error;
-    }
   }
 
   free(): void {
@@ -100,6 +86,7 @@ class Simulation {
 
   result(events: Options["events"] & object, spare: Result | undefined): Result {
     try {
+      this.instantiate();
       this.initialise();
     } catch (error) {
       if (error instanceof ComponentFailed) throw new Refusal(error.message);
@@ -109,9 +96,9 @@ class Simulation {
   }
 
   /** Take the value of a parameter: the user's, or the loop's. */
-  private take(parameter: Parameter, given: Value | undefined): void {
+  private take(parameter: Parameter, changed: Value | undefined): void {
     const { name, type } = parameter;
-    const value = given ?? parameter.value;
+    const value = changed ?? parameter.value;
     const wanted = { Real: "number", Integer: "number", Boolean: "boolean", String: "string" }[
       type
     ];
@@ -122,21 +109,37 @@ class Simulation {
     this.parameters[name] = value;
     if (Object.is(value, parameter.default)) return;
     const [component, port] = parted(name);
-    const values = this.set.get(component) ?? new Map<string, Value>();
-    this.set.set(component, values.set(port, value));
+    const values = this.given.get(component) ?? new Map<string, Value>();
+    this.given.set(component, values.set(port, value));
+  }
+
+  private instantiate(): void {
+    const { machine, data, loop, row } = this;
+    for (const [name, type] of Object.entries(loop.components)) {
+      const hear = (status: number, text: string) => this.hear(status, text);
+      const instance = new Instance(machine, name, type, data.fmus[type], hear);
+      this.instances.set(name, instance);
+      instance.tie(row.address, row.firsts.get(name) ?? 0);
+    }
+  }
+
+  private hear(status: number, text: string): void {
+    this.heard += 1;
+    if (this.heard <= MOST_MESSAGES) this.messages.push(text);
+    if (status === DISCARD) this.refusals.push(text);
   }
 
   /** Set parameters, exchange values in initialisation mode until they rest, leave that mode. */
   private initialise(): void {
     const { instances, loop } = this;
     for (const [name, instance] of instances) {
-      instance.enterInitialization(this.set.get(name) ?? new Map(), 0);
+      instance.enterInitialization(this.given.get(name) ?? new Map(), 0);
     }
-    const units = loop.initial.map((stage) => this.step(stage));
+    const stages = loop.initial.map((stage) => this.linked(stage));
     this.readAhead();
     const handOn = (everything: boolean): boolean => {
       let changed = false;
-      for (const { gathering, members } of units) {
+      for (const { gathering, members } of stages) {
         const moved = gathering.gather();
         if (!moved && !everything) continue;
         for (const instance of members) instance.exchange();
@@ -145,11 +148,8 @@ class Simulation {
       return changed;
     };
     handOn(true);
-    let rounds = 0;
-    while (handOn(false)) {
-      rounds += 1;
-      if (rounds === MOST_ROUNDS) throw new Refusal("an algebraic loop does not converge");
-    }
+    // It comes to rest: no loop has a ring.
+    while (handOn(false));
     this.checkFinite();
     for (const instance of instances.values()) instance.exitInitialization();
     handOn(true);
@@ -177,7 +177,7 @@ class Simulation {
     if (wrong !== undefined) throw new Refusal(`stopped at t = 0 s: ${wrong}`);
   }
 
-  private step({ connections, components }: Stage): Step {
+  private linked({ connections, components }: Stage): LinkedStage {
     const members = components
       .map((name) => this.instances.get(name))
       .filter((one) => one !== undefined);
@@ -187,12 +187,12 @@ class Simulation {
   /** Step to the end, or to the first failure. */
   private advance(events: Events, spare: Result | undefined): Result {
     const { experiment, instances, row } = this;
-    const stages = this.loop.stages.map((stage) => this.step(stage));
+    const stages = this.loop.stages.map((stage) => this.linked(stage));
     const overrides = new Overrides(
       row,
       stages.map(({ gathering }) => gathering),
     );
-    const run: Run = { experiment, instances, row, overrides, values: this.set, made: 0 };
+    const run: Run = { experiment, instances, row, overrides, values: this.given, made: 0 };
     const width = 1 + row.names.length;
     // Megabytes that were never written take longer than all steps.
     const size = (experiment.steps + 1) * width;
@@ -248,6 +248,8 @@ class Simulation {
       if (wrong !== undefined) failure = `stopped at t = ${general(time, 12)} s: ${wrong}`;
     }
     const whole = table.subarray(0, (run.made + 1) * width);
+    const more = this.heard - this.messages.length;
+    if (more > 0) this.messages.push(`and ${more} more messages`);
     return new Table(
       row.names,
       whole,
@@ -266,9 +268,9 @@ class Simulation {
     const sources = new Map(loop.stages.flatMap(({ connections }) => connections));
     let passedOn: string | undefined;
     for (const component of components) {
-      const variables = data.fmus[loop.components[component]].variables;
-      const ports = variables.filter(({ causality }) => causality !== "parameter");
-      const inputsFirst = [...ports].sort((a, b) => a.causality.localeCompare(b.causality));
+      const inputsFirst = Instance.layout(data.fmus[loop.components[component]]).flatMap(
+        ({ ports }) => ports,
+      );
       for (const { name, causality } of inputsFirst) {
         const port = `${component}.${name}`;
         if (Number.isFinite(row.value(port))) continue;

@@ -1,4 +1,4 @@
-// Numbers, units and runs as texts.
+// Numbers and runs as texts.
 import type { Result } from "./types";
 
 /** A number with so many digits at most, and no zeros at its end, as `%g` writes it. */
@@ -20,15 +20,6 @@ export function numberOf(text: string): number {
 /** The number in a field, in which a comma may stand for the point. */
 export function entered(text: string): number {
   return numberOf(text.replace(/^([^.,]*),([^.,]*)$/, "$1.$2"));
-}
-
-/** A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s², s^1/2 as √s. */
-export function printedUnit(unit: string): string {
-  const raised = "⁰¹²³⁴⁵⁶⁷⁸⁹";
-  return unit
-    .replaceAll("s^1/2", "√s")
-    .replaceAll(".", "·")
-    .replace(/(?<=[A-Za-z])\d+/g, (power) => [...power].map((d) => raised[Number(d)]).join(""));
 }
 
 /** The shortest text that reads back as the same number. */

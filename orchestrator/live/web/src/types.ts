@@ -28,6 +28,7 @@ export interface Parameter {
   /** `component.parameter` */
   readonly name: string;
   readonly type: FmiType;
+  /** As it is printed. */
   readonly unit?: string;
   readonly min?: number;
   readonly max?: number;
@@ -75,6 +76,8 @@ export interface EventData {
   readonly repeat?: boolean;
   /** For how long [s]; absent: for good. */
   readonly lasts?: number;
+  /** Whether there is something that can end. */
+  readonly canEnd: boolean;
 }
 
 /** Components that are stepped after their inputs have been gathered. */
@@ -123,14 +126,18 @@ export interface Preset {
   readonly events: string;
   /** The scenario's own loop, and the one that it is compared with, if there is one. */
   readonly loops: readonly LoopData[];
+  /** Places of the loops, in the order in which they are drawn. */
+  readonly drawn: readonly number[];
 }
+
+/** Units as they are printed, by the members of a group; a single number has the member `""`. */
+export type Units = Readonly<Record<string, string>>;
 
 /** An index of metrics.json. */
 export interface IndexData {
   readonly name: string;
   readonly label: string;
-  /** Units by member; a single number has the member `""`. */
-  readonly units: Readonly<Record<string, string>>;
+  readonly units: Units;
   readonly meaning: string;
 }
 
@@ -138,6 +145,12 @@ export interface IndexData {
 export interface Data {
   /** The preset that is shown first. */
   readonly opened: string;
+  /** Rows of more steps than this do not fit into a page. */
+  readonly mostSteps: number;
+  /** T_L of section 4.2 [s]. */
+  readonly lastSeconds: number;
+  /** Of the groups of signals that have charts. */
+  readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
   readonly fmus: Readonly<Record<string, Fmu>>;
   readonly presets: readonly Preset[];
   readonly indices: readonly IndexData[];
@@ -169,7 +182,7 @@ export interface Result {
   /** Values of all parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
-  /** What FMUs have said, once each: `plant: ...`. */
+  /** The first messages of the FMUs, `plant: ...`, and the number of the others. */
   readonly messages: readonly string[];
   /** Why the run has not come to its end; the rows before that are there. */
   readonly failure?: string;
@@ -186,16 +199,6 @@ export interface Options {
   readonly events?: readonly EventData[];
   /** A result that nothing shows any more: the run takes its memory. */
   readonly spare?: Result | undefined;
-}
-
-/** Runs loops. `Engine.load(bytes, data)` of engine.ts makes one. */
-export interface Engine {
-  /**
-   * Runs a loop with its own values except for `values`; names that it lacks are left out.
-   *
-   * Throws `Refusal`, whose message is the FMU's own line, if a value or a time is not usable.
-   */
-  run(loop: LoopData, values: Values, options: Options): Result;
 }
 
 /** Members of each index by its name, in the order of `IndexData.units`. */

@@ -42,6 +42,7 @@ const events = {
       action: { kind: "alter", effect: "override", values: [["plant.tau.r", 0]] },
       at: 50,
       lasts: 10,
+      canEnd: true,
     },
     {
       number: 1,
@@ -49,6 +50,7 @@ const events = {
       label: 'a "fix"',
       action: { kind: "freeze", targets: ["controller.y.x"] },
       when: { signal: "plant.eta.z", comparison: "<", value: -1.5 },
+      canEnd: true,
     },
   ],
 };
@@ -87,5 +89,14 @@ export const preset = {
       head: { order: "jacobi", only: [], wires: { "controller.dy": "plant.dy" } },
     }),
   ],
+  drawn: [0, 1],
 };
-export const data = { opened: "fault", fmus: {}, presets: [preset], indices: [] };
+export const data = {
+  opened: "fault",
+  mostSteps: 200_000,
+  lastSeconds: 5,
+  units: { e: {}, tau: {}, dy: {}, theta_hat: {} },
+  fmus: {},
+  presets: [preset],
+  indices: [],
+};

@@ -19,7 +19,7 @@ for (const { name, stopTime, step, events, loops } of content.presets) {
       failure,
       remark,
       messages,
-      metrics: metrics(result),
+      metrics: metrics(result, content.lastSeconds),
     };
   }
 }

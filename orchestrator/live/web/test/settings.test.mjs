@@ -16,6 +16,17 @@ test("a value that is the preset's is no change", () => {
   assert.deepEqual(back.values, { "plant.noise.std": 0 });
 });
 
+test("a value is a change if one of the loops has another, until it is taken back", () => {
+  const [own, other] = preset.loops;
+  const longer = other.parameters.map((one) =>
+    one.name === "plant.noise.std" ? { ...one, value: 0.5 } : one,
+  );
+  const apart = { ...preset, loops: [own, { ...other, parameters: longer }] };
+  const changed = withValues(start, apart, { "plant.noise.std": 0.001 });
+  assert.deepEqual(changed.values, { "plant.noise.std": 0.001 });
+  assert.deepEqual(withValues(changed, apart, { "plant.noise.std": undefined }).values, {});
+});
+
 test("a time that is the event's own is no change", () => {
   const changed = withEdit(start, preset, 0, { at: 40, lasts: null });
   assert.deepEqual(changed.edits, { 0: { at: 40, lasts: null } });
@@ -64,6 +75,20 @@ test("what a link says wrongly is named and left out", () => {
   );
   assert.deepEqual(settings, start);
   assert.deepEqual(unknown, ["preset=no", "controller.eps_t=x", "plant.lost=1", "stop_time="]);
+});
+
+test("a controller is hidden once, and a second preset is named", () => {
+  const { settings, unknown } = fromHash("#preset=fault&hide=PD&preset=path&hide=PD", data);
+  assert.deepEqual(settings, { ...start, hidden: ["PD"] });
+  assert.deepEqual(unknown, ["preset=path"]);
+});
+
+test("an event that cannot end has no duration", () => {
+  const [event] = preset.loops[0].events.fault;
+  const [own, other] = preset.loops;
+  const loops = [{ ...own, events: { fault: [{ ...event, canEnd: false }] } }, other];
+  const { unknown } = fromHash("#events.1.for=2", { ...data, presets: [{ ...preset, loops }] });
+  assert.deepEqual(unknown, ["events.1.for=2"]);
 });
 
 test("a link has no events, times and durations that a scenario file could not have", () => {
