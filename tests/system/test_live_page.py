@@ -167,10 +167,15 @@ def test_command_makes_the_same_rows(opened, tmp_path, hidden):
     compare_rows(opened, tmp_path)
 
 
-def test_command_of_a_comparison_has_the_order_and_the_wires(chromium, tmp_path):
-    (tmp_path / "mine.toml").write_text(
-        'order = "jacobi"\nstop_time = 10.0\n[wires]\n"plant.tau_w" = false\n'
-    )
+@pytest.mark.parametrize(
+    "text",
+    [
+        'order = "jacobi"\n[wires]\n"plant.tau_w" = false\n',
+        'order = ["planner", "plant", "controller"]\nonly = ["planner", "plant", "controller"]\n',
+    ],
+)
+def test_command_of_a_comparison_has_order_wires_and_components(chromium, tmp_path, text):
+    (tmp_path / "mine.toml").write_text(f"stop_time = 10.0\n{text}")
     out = tmp_path / "page.html"
     assert main(["live", str(tmp_path / "mine.toml"), "--out", str(out)]) == 0
     chromium.open(out)
@@ -371,6 +376,21 @@ def test_space_plays_and_stops(opened):
     opened.wait(f"{now} > 0.5 && {now} < 99")
     opened.press(" ")
     assert opened.run("document.getElementById('play').dataset.playing") == "false"
+
+
+def test_lost_graphics_are_said(opened):
+    opened.run(
+        "document.querySelector('.scene canvas').getContext('webgl2')"
+        ".getExtension('WEBGL_lose_context').loseContext()"
+    )
+    opened.wait("document.querySelector('.scene').innerText.includes('Reload the page')")
+    opened.run('auvfmu.set({"controller.k_d": 20})')
+
+
+def test_times_of_marks_are_rounded(opened):
+    opened.run('auvfmu.set({preset: "fault-thruster", "events.1.at": 50.3})')
+    title = opened.run("document.querySelector('#marks span').title")
+    assert title.endswith(", at 50.3 s")
 
 
 def test_phone_needs_no_sideways_scrolling(opened):
