@@ -73,5 +73,5 @@ def test_what_cannot_be_installed_is_said(monkeypatch):
         python_with(["nothing"])
     monkeypatch.delenv("PIP_NO_INDEX")
     monkeypatch.setenv("PIP_INDEX_URL", "http://127.0.0.1:9/simple")
-    with pytest.raises(InputError, match="reaches no package index"):
+    with pytest.raises(InputError, match="cannot reach a package index"):
         python_with(["nothing"])
