@@ -87,8 +87,9 @@ def page_data(opened: str) -> Plain:
         InputError: there is no such scenario, or it or the page cannot run it.
 
     """
-    first = preset(opened)
-    for run in runs_of(opened):
+    both = runs_of(opened)
+    first = _preset(opened, both)
+    for run in both:
         # What an FMU refuses is refused here, before there is a page.
         run.run([])
     others = [preset(name) for name in names() if name != first["name"]]
@@ -118,7 +119,10 @@ def preset(name: str) -> Plain:
         InputError: there is no such scenario, or the page cannot run it.
 
     """
-    both = runs_of(name)
+    return _preset(name, runs_of(name))
+
+
+def _preset(name: str, both: Sequence[Prepared]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
     loops = [_loop(one, scenario) for one in both]
     loops[0]["scenario"] = name

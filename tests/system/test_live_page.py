@@ -175,14 +175,20 @@ def test_command_makes_the_same_rows(opened, tmp_path, hidden):
     ],
 )
 def test_command_of_a_comparison_has_order_wires_and_components(chromium, tmp_path, text):
-    (tmp_path / "mine.toml").write_text(f"stop_time = 10.0\n{text}")
-    out = tmp_path / "page.html"
-    assert main(["live", str(tmp_path / "mine.toml"), "--out", str(out)]) == 0
+    live = live_of(chromium, tmp_path, f"stop_time = 10.0\n{text}")
+    live.run("auvfmu.set({hide: 'proposed'})")
+    compare_rows(live, tmp_path)
+
+
+def live_of(chromium, folder, text) -> Live:
+    """The page of a user's scenario file."""
+    (folder / "mine.toml").write_text(text)
+    out = folder / "page.html"
+    assert main(["live", str(folder / "mine.toml"), "--out", str(out)]) == 0
     chromium.open(out)
     live = Live(chromium)
     live.start()
-    live.run("auvfmu.set({hide: 'proposed'})")
-    compare_rows(live, tmp_path)
+    return live
 
 
 def compare_rows(opened, tmp_path):
@@ -236,12 +242,7 @@ def test_value_of_one_loop_can_be_set_in_both_and_taken_back(chromium, tmp_path)
         '[components]\ncontroller = "PdController"\n[wires]\n"controller.dy" = "plant.dy"\n'
         "[parameters]\nplant.noise.std = 0.01\n"
     )
-    (tmp_path / "mine.toml").write_text('compare = "other.toml"\nstop_time = 5.0\n')
-    out = tmp_path / "page.html"
-    assert main(["live", str(tmp_path / "mine.toml"), "--out", str(out)]) == 0
-    chromium.open(out)
-    live = Live(chromium)
-    live.start()
+    live = live_of(chromium, tmp_path, 'compare = "other.toml"\nstop_time = 5.0\n')
     live.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
     before = live.run(TABLE)
     field = "document.querySelector('#groups input[data-name=\"plant.noise.std\"]')"
@@ -316,6 +317,8 @@ def test_download_has_the_settings_of_now(opened):
 
 def test_script_is_refused_what_only_the_other_loop_refuses(opened):
     opened.run('auvfmu.set({preset: "fig5-pd"})')
+    # The link is written a moment later.
+    opened.wait("/preset=fig5-pd/.test(location.hash)")
     before = opened.run("location.hash")
     why = opened.run('auvfmu.set({"controller.k_d": -1}).then(() => "", (error) => error.message)')
     assert "k_d = -1" in why
