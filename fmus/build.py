@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from fmus.compilers import compiler_for
-from fmus.discovery import components, fingerprint
+from fmus.discovery import components, fingerprint, source_of
 from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
 from fmus.python.packaging import LOADERS, PythonKind, best_loader
@@ -38,13 +38,13 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
     current = {key: before.get(key) for key in made_from} == made_from
     digests = before["sha256"] if current else {}
     stale = {
-        path: (component, package)
-        for component, package in components().items()
+        path: source_of(component)
+        for component in components()
         if not (path := destination / f"{component}.fmu").is_file()
         or digests.get(path.name) != _digest(path)
     }
     with ThreadPoolExecutor(kind.side_by_side) as pool:
-        list(pool.map(lambda path: kind.write(*stale[path], path), stale))
+        list(pool.map(lambda path: kind.write(stale[path], path), stale))
     if stale:
         digests |= {path.name: _digest(path) for path in stale}
         text = json.dumps({**made_from, "sha256": digests})

@@ -10,9 +10,11 @@ from importlib import import_module
 from importlib.metadata import distribution
 from importlib.util import find_spec
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 
 from fmus.kinds import CONTAINED
+from fmus.ports.definition import Definition, define
 from fmus.ports.port import Port
 
 #: The folder of a component that holds its reference results.
@@ -44,20 +46,56 @@ def components() -> dict[str, str]:
     }
 
 
+class Source(NamedTuple):
+    """What the FMU of a component is made from.
+
+    Attributes:
+        name: of the component.
+        modules: that define it.
+        folder: that its page and its reference results lie in.
+
+    """
+
+    name: str
+    modules: tuple[str, ...]
+    folder: Path
+
+    @property
+    def definition(self) -> Definition:
+        """What its modules say; they are imported.
+
+        Raises:
+            TypeError: they do not go together.
+
+        """
+        return define(self.name, *map(import_module, self.modules))
+
+    @property
+    def page(self) -> str:
+        """What its author says of it, in Markdown."""
+        return (self.folder / "page.md").read_text(encoding="utf-8").strip()
+
+
+def source_of(name: str) -> Source:
+    """What a component of the bundle is made from."""
+    package = components()[name]
+    modules = (f"{package}.ports", f"{package}.behaviour")
+    return Source(name, modules, package_folder(package))
+
+
 def ports_of(name: str) -> Sequence[Port]:
-    """The ports of a component, all but `fault`."""
-    ports: Sequence[Port] = import_module(f"{components()[name]}.ports").PORTS
-    return ports
+    """The ports of a component of the bundle, all but `fault`."""
+    return source_of(name).definition.ports
 
 
-def related_files(package: str) -> dict[str, bytes]:
+def related_files(source: Source) -> dict[str, bytes]:
     """The reference results that an FMU of a component carries, by their places in it.
 
     Returns:
         The manifest and the files that it names; empty if the component has none.
 
     """
-    folder = package_folder(package) / REFERENCE
+    folder = source.folder / REFERENCE
     manifest = folder / RELATED_MANIFEST
     if not manifest.is_file():
         return {}

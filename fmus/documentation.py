@@ -12,9 +12,8 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
-from fmus.discovery import components, package_folder, ports_of, related_files
+from fmus.discovery import Source, related_files
 from fmus.kinds import NATIVE, PYTHON
-from fmus.ports.description import PAPER
 from fmus.ports.description_fmi3 import TYPES
 from fmus.ports.port import FAULT, Port
 
@@ -89,17 +88,16 @@ result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
 If the FMU has a parameter `h_max`, a longer step is split evenly, with held inputs."""
 
 
-def component_page(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+def component_page(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
     """Write the page of a component in Markdown: description, ports, refusals, an example."""
-    text = (package_folder(components()[name]) / "page.md").read_text(encoding="utf-8").strip()
-    ports = (*ports_of(name), FAULT)
+    name, ports = source.name, (*source.definition.ports, FAULT)
     refusals = _REFUSALS
     if fmi == "3":
         refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")
     made_of = (_NATIVE,) if kind == NATIVE else ()
     tables = _tables(ports, TYPES if fmi == "3" else {})
-    reference = (_REFERENCE.format(name=name),) if related_files(components()[name]) else ()
-    parts = (text, *made_of, *tables, refusals, *reference, _EXAMPLE.format(name=name))
+    reference = (_REFERENCE.format(name=name),) if related_files(source) else ()
+    parts = (source.page, *made_of, *tables, refusals, *reference, _EXAMPLE.format(name=name))
     return "\n\n".join(parts) + "\n"
 
 
@@ -159,19 +157,20 @@ def _range(port: Port) -> str:
     return " ".join(filter(None, (lower, upper)))
 
 
-def fmu_documents(name: str, kind: str = PYTHON, fmi: str = "2") -> dict[str, bytes]:
+def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[str, bytes]:
     """What an FMU of a component holds for its user, by the places in it."""
-    documents = {"documentation/index.html": component_html(name, kind, fmi).encode()}
-    if related := related_files(components()[name]):
-        documents["documentation/fmi-ls-ref.txt"] = f"{_REFERENCE.format(name=name)}\n".encode()
+    documents = {"documentation/index.html": component_html(source, kind, fmi).encode()}
+    if related := related_files(source):
+        text = f"{_REFERENCE.format(name=source.name)}\n"
+        documents["documentation/fmi-ls-ref.txt"] = text.encode()
     return documents | related
 
 
-def component_html(name: str, kind: str = PYTHON, fmi: str = "2") -> str:
+def component_html(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(component_page(name, kind, fmi))
+    body = MarkdownIt("commonmark").enable("table").render(component_page(source, kind, fmi))
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(
-        title=name, paper=PAPER, body=body
+        title=source.name, citation=source.definition.origin.citation, body=body
     )

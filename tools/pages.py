@@ -31,7 +31,7 @@ from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.gain_conditions import at_least, coupling
 from auv_fmu.saturation import MAXIMUM_SLOPE
 from auv_fmu.vehicle import Vehicle
-from fmus.discovery import components
+from fmus.discovery import components, source_of
 from fmus.documentation import component_page
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
@@ -69,7 +69,7 @@ def files() -> dict[Path, str]:
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
-        **{COMPONENTS / f"{name}.md": component_page(name) for name in components()},
+        **{COMPONENTS / f"{name}.md": component_page(source_of(name)) for name in components()},
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
     }

@@ -6,9 +6,10 @@ from auv_fmu.plant import ETA_0, INTEGRATORS, NU_0, Localisation, Parameters, Ro
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters, setting
 from fmus.ports.quantities import ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
-from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE
+from fmus.ports.vehicle import CONTROL_POINT, LIMITS, PAPER, VEHICLE
 
 DESCRIPTION = "Autonomous underwater vehicle with limited actuators and noisy position sensor"
+ORIGIN = PAPER
 
 _ROLL, _LOCALISATION, _DEFAULTS = RollAxis(), Localisation(), Parameters()
 

@@ -6,8 +6,10 @@ from auv_fmu.disturbance import Disturbance
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import TIME, Port, inputs, outputs, parameter
 from fmus.ports.quantities import NU, TAU_W
+from fmus.ports.vehicle import PAPER
 
 DESCRIPTION = "Disturbance by friction, waves and ocean currents in six degrees of freedom"
+ORIGIN = PAPER
 
 _WAVES = Disturbance()
 _INPUTS = inputs("nu", NU, "Velocity in the body frame")

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 
 from fmus import documentation
 from fmus.compilers import Compiler, library
-from fmus.discovery import digest_of, guid_of, licences, write_archive
+from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
 from fmus.native.translator import tables, translated
 from fmus.ports import description, description_fmi3
+from fmus.ports.definition import Definition
 from fmus.ports.port import Port
 
 _FOLDER = Path(__file__).parent
@@ -24,7 +24,7 @@ RUNTIME = _FOLDER / "runtime"
 #: The file to compile, by the version of FMI: it includes all others.
 MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
 
-_DESCRIBE: dict[str, Callable[[str, str, str, Sequence[Port]], bytes]] = dict(
+_DESCRIBE: dict[str, Callable[[Definition, str], bytes]] = dict(
     zip(FMI_VERSIONS, (description.fmi2_description, description_fmi3.fmi3_description))
 )
 
@@ -53,14 +53,8 @@ def _pictures(name: str, ports: Sequence[Port], fmi: str) -> dict[str, bytes]:
     }
 
 
-def sources(package: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
-    """The C sources of a component by their names, all but identity.h.
-
-    Args:
-        package: of the component, for example `fmus.auv_plant`.
-        fmi: version of FMI.
-
-    """
+def sources(definition: Definition, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
+    """The C sources of a component by their names, all but identity.h."""
     others = {name for version, name in MAIN.items() if version != fmi}
     return {
         **{
@@ -68,14 +62,13 @@ def sources(package: str, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
             for path in sorted(RUNTIME.glob("*.[ch]"))
             if path.name not in others
         },
-        "equations.c": translated(package),
-        "ports.h": tables(package),
+        "equations.c": translated(definition),
+        "ports.h": tables(definition),
     }
 
 
 def fmu_entries(
-    component: str,
-    package: str,
+    source: Source,
     fmi: str,
     platforms: Sequence[Platform],
     compiler: Compiler,
@@ -86,8 +79,7 @@ def fmu_entries(
     Its GUID follows from its description and its sources, and is the same for all platforms.
 
     Args:
-        component: its name, and its libraries' name.
-        package: that its folder is.
+        source: of the component; its libraries have its name.
         fmi: version.
         platforms: that it has libraries for.
         compiler: that makes them.
@@ -97,13 +89,10 @@ def fmu_entries(
         OSError: the compiler fails.
 
     """
-    declared = import_module(f"{package}.ports")
-    written = {name: content.encode() for name, content in sources(package, fmi).items()}
-
-    def described(guid: str) -> bytes:
-        return _DESCRIBE[fmi](component, declared.DESCRIPTION, guid, declared.PORTS)
-
-    guid = guid_of(digest_of({**written, "modelDescription.xml": described("")}))
+    component, definition = source.name, source.definition
+    describe = _DESCRIBE[fmi]
+    written = {name: content.encode() for name, content in sources(definition, fmi).items()}
+    guid = guid_of(digest_of({**written, "modelDescription.xml": describe(definition, "")}))
     written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
     libraries = {}
     for platform in platforms:
@@ -111,9 +100,9 @@ def fmu_entries(
         libraries[path] = library(compiler, platform, component, written, MAIN[fmi])
         tell(f"{component} for {platform.name}, FMI {fmi}.0")
     return {
-        "modelDescription.xml": described(guid),
-        **_pictures(component, declared.PORTS, fmi),
-        **documentation.fmu_documents(component, NATIVE, fmi),
+        "modelDescription.xml": describe(definition, guid),
+        **_pictures(component, definition.ports, fmi),
+        **documentation.fmu_documents(source, NATIVE, fmi),
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
         **libraries,
@@ -142,14 +131,12 @@ class NativeKind:
             "compiler": self.compiler.name,
         }
 
-    def write(self, component: str, package: str, path: Path) -> None:
-        """Write the FMU of a component, whose folder is a package.
+    def write(self, source: Source, path: Path) -> None:
+        """Write the FMU of a component.
 
         Raises:
             OSError: the compiler fails, or the file cannot be written.
 
         """
-        entries = fmu_entries(
-            component, package, self.fmi, self.platforms, self.compiler, self.tell
-        )
+        entries = fmu_entries(source, self.fmi, self.platforms, self.compiler, self.tell)
         write_archive(path, entries)

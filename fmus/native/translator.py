@@ -4,21 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import import_module
+from textwrap import wrap
 
 from auv_fmu import euler
-from fmus.native.functions import function_in_c, laid_out
+from fmus.native.functions import LINE_WIDTH, function_in_c, laid_out
 from fmus.native.program import Function, Program, Structure, count_numbers
-from fmus.ports.behaviour import Behaviour, read_behaviour
+from fmus.ports.behaviour import Behaviour
+from fmus.ports.definition import Definition
 from fmus.ports.port import FAULT, H_MAX, Port, Value
 
 _HEAD = """\
 /* {title}
  *
  * Translated from the Python text of its equations, function by function, in the order in which
- * they need each other. A name begins with the module that the function stands in. The numbers in
- * brackets are the equation numbers of "Three-dimensional tracking control of autonomous
- * underwater vehicles with limited torque and without velocity sensors".
+ * they need each other. A name begins with the module that the function stands in.{citation}
  */
 #include "arithmetic.h"
 """
@@ -41,21 +40,18 @@ _O, _E = "model_outputs *outputs", "Error *error"
 
 
 @cache
-def translated(package: str) -> str:
+def translated(definition: Definition) -> str:
     """The equations of a component, and the functions that the component calls.
-
-    Args:
-        package: of the component, for example `fmus.auv_plant`.
 
     Raises:
         Untranslatable: its text is outside the language of equations.
 
     """
-    behaviour = read_behaviour(import_module(f"{package}.behaviour"))
     program = Program(function_in_c)
-    glue = _glue(program, behaviour)
+    glue = _glue(program, definition.behaviour)
+    citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     sections = [
-        _HEAD.format(title=import_module(f"{package}.ports").DESCRIPTION),
+        _HEAD.format(title=definition.summary, citation=citation),
         *program.structures.values(),
         *program.constants.values(),
         *(function.text for function in program.functions.values()),
@@ -175,12 +171,11 @@ static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
 """
 
 
-def tables(package: str) -> str:
-    """The file ports.h of a component, for example of `fmus.auv_plant`."""
-    module = import_module(f"{package}.ports")
-    ports: Sequence[Port] = (*module.PORTS, FAULT)
+def tables(definition: Definition) -> str:
+    """The file ports.h of a component."""
+    ports = (*definition.ports, FAULT)
     places = {FAULT.name: "0", H_MAX.name: "PARAMETER_AT(h_max)"}
-    for name, path in module.PARAMETERS.paths.items():
+    for name, path in definition.parameters.paths.items():
         places[name] = f"PARAMETER_AT(model.{_member(path)})"
     references = {
         causality: [

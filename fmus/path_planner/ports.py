@@ -5,9 +5,10 @@ from __future__ import annotations
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, Port, parameter, setting
-from fmus.ports.vehicle import CONTROL_POINT, LIMITS, VEHICLE, reference
+from fmus.ports.vehicle import CONTROL_POINT, LIMITS, PAPER, VEHICLE, reference
 
 DESCRIPTION = "Path planner: reference through waypoints with velocity and acceleration"
+ORIGIN = PAPER
 
 _DEFAULTS, _WAYPOINTS = Parameters(), Waypoints()
 

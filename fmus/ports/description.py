@@ -12,16 +12,8 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
 from auv_fmu.euler import STEP
+from fmus.ports.definition import Definition
 from fmus.ports.port import FAULT, Port, Value
-
-#: About every component, by the names of the attributes.
-ABOUT = {"author": "auv-fmu", "license": "MIT", "version": __version__}
-
-#: The paper that the components implement.
-PAPER = (
-    "Three-dimensional tracking control of autonomous underwater vehicles with limited torque and "
-    "without velocity sensors"
-)
 
 #: Start, end and step of an experiment when the host names none [s].
 EXPERIMENT = (0.0, 100.0, STEP)
@@ -87,19 +79,14 @@ def _literal(value: Value) -> str:
     return f"{value:.16g}" if isinstance(value, float) else str(value)
 
 
-def with_paper(description: str) -> str:
-    """A component's description, and where the numbers of equations come from."""
-    return f'{description}. Equation numbers are from the paper "{PAPER}"'
-
-
-def root_of(version: str, name: str, description: str, **identity: str) -> Element:
+def root_of(version: str, definition: Definition, **identity: str) -> Element:
     """The root of a description that no other tool has written, with guid or token."""
     said = {
         "fmiVersion": version,
-        "modelName": name,
+        "modelName": definition.name,
         **identity,
-        "description": with_paper(description),
-        **ABOUT,
+        "description": definition.description,
+        **definition.about,
         "generationTool": f"auv-fmu {__version__}",
         "variableNamingConvention": "structured",
     }
@@ -205,23 +192,21 @@ _CAPABILITIES = {
 SOURCE = "fmi2.c"
 
 
-def fmi2_description(name: str, description: str, guid: str, ports: Sequence[Port]) -> bytes:
-    """The description of a component that is a library.
+def fmi2_description(definition: Definition, guid: str) -> bytes:
+    """The description of a component that is a library of the same name.
 
     Args:
-        name: of the component, and of the library.
-        description: one line.
+        definition: of the component.
         guid: as the library knows it.
-        ports: all but `fault`, in the order of their value references.
 
     """
-    root = root_of("2.0", name, description, guid=guid)
-    implementation = SubElement(root, "CoSimulation", modelIdentifier=name)
+    root = root_of("2.0", definition, guid=guid)
+    implementation = SubElement(root, "CoSimulation", modelIdentifier=definition.name)
     SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCE)
     root.extend((log_categories("fmi2"), default_experiment()))
     SubElement(root, "ModelVariables")
     SubElement(root, "ModelStructure")
-    return text(complete(root, (*ports, FAULT)))
+    return text(complete(root, (*definition.ports, FAULT)))
 
 
 def complete(root: Element, ports: Sequence[Port]) -> Element:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
 
+from fmus.ports.definition import Definition
 from fmus.ports.description import (
     CAPABILITIES,
     UNITS,
@@ -42,20 +43,18 @@ SOURCE, _LANGUAGE = "fmi3.c", "C99"
 _LIBM_APART = ("x86_64-linux", "aarch64-linux")
 
 
-def fmi3_description(name: str, description: str, token: str, ports: Sequence[Port]) -> bytes:
-    """The description of a component.
+def fmi3_description(definition: Definition, token: str) -> bytes:
+    """The description of a component that is a library of the same name.
 
     Args:
-        name: of the component, and of the library.
-        description: one line.
+        definition: of the component.
         token: as the library knows it.
-        ports: all but `fault`, in the order of their value references.
 
     """
-    variables = (*ports, FAULT, TIME)
+    variables = (*definition.ports, FAULT, TIME)
     units = units_of(variables)
-    root = root_of(_VERSION, name, description, instantiationToken=token)
-    SubElement(root, "CoSimulation", _CAPABILITIES, modelIdentifier=name)
+    root = root_of(_VERSION, definition, instantiationToken=token)
+    SubElement(root, "CoSimulation", _CAPABILITIES, modelIdentifier=definition.name)
     root.extend(
         (
             unit_definitions(units),

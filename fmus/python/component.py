@@ -20,7 +20,7 @@ from pythonfmu import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS, internal_steps, longest_step
-from fmus.ports.description import ABOUT, EXPERIMENT, complete
+from fmus.ports.description import EXPERIMENT, complete
 from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
 from fmus.python.callbacks import (
@@ -63,7 +63,6 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     :meth:`begin` and :meth:`advance`. These may raise: what they raise becomes a refusal.
     """
 
-    author, license, version = ABOUT["author"], ABOUT["license"], ABOUT["version"]
     default_experiment = DefaultExperiment(*EXPERIMENT)
 
     #: What the parameters mean to the equations; `h_max` is not among them.

@@ -16,18 +16,18 @@ import pythonfmu
 
 from fmus import documentation
 from fmus.compilers import machines_compiler, run_compiler
-from fmus.discovery import digest_of, guid_of, licences, package_folder, write_archive
+from fmus.discovery import Source, digest_of, guid_of, licences, package_folder, write_archive
 from fmus.kinds import PYTHON
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
 #: The script of a component.
 _SCRIPT = """\
-from {package} import behaviour, ports
+{imports}
 from fmus.python.loading import settle
 from fmus.python.slave import slave_of
 
-{component} = slave_of("{component}", ports, behaviour)
+{component} = slave_of("{component}", {modules})
 settle({component}, globals(), locals())
 """
 
@@ -237,14 +237,19 @@ class PythonKind:
         """What the FMUs depend on besides their sources."""
         return {"kind": PYTHON, "loader": self.loader}
 
-    def write(self, component: str, package: str, path: Path) -> None:
-        """Write the FMU of a component, whose folder is a package.
+    def write(self, source: Source, path: Path) -> None:
+        """Write the FMU of a component.
 
         Raises:
             OSError: the loader cannot be compiled, or the file cannot be written.
 
         """
-        text = _SCRIPT.format(package=package, component=component)
-        entries = fmu_entries(component, text, self.loader)
-        entries |= documentation.fmu_documents(component)
+        places = [module.rpartition(".") for module in source.modules]
+        text = _SCRIPT.format(
+            imports="\n".join(f"from {package} import {name}" for package, _, name in places),
+            modules=", ".join(name for _, _, name in places),
+            component=source.name,
+        )
+        entries = fmu_entries(source.name, text, self.loader)
+        entries |= documentation.fmu_documents(source)
         seal(entries, path)

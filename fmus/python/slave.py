@@ -25,8 +25,8 @@ from typing import Any
 
 from pythonfmu.enums import Fmi2Status
 
-from fmus.ports.behaviour import HOOKS, Behaviour, read_behaviour
-from fmus.ports.description import with_paper
+from fmus.ports.behaviour import HOOKS, Behaviour
+from fmus.ports.definition import define
 from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
@@ -53,28 +53,28 @@ class Noisy(Component[State, Inputs, Outputs, Parameters]):
 
 
 @cache
-def slave_of(
-    name: str, ports: ModuleType, behaviour: ModuleType
-) -> type[Component[Any, Any, Any, Any]]:
+def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, Any]]:
     """The class of a component, the same each time: an FMU's script asks once an instance.
 
     Args:
         name: of the component.
-        ports, behaviour: the modules in its folder.
+        modules: that define it.
 
     Raises:
         TypeError: they do not go together.
 
     """
-    said = read_behaviour(behaviour)
-    places = slices([port for port in ports.PORTS if port.causality == "output"])
+    definition = define(name, *modules)
+    said = definition.behaviour
+    places = slices([port for port in definition.ports if port.causality == "output"])
     members: dict[str, Any] = {
-        "__module__": ports.__package__,
-        "__doc__": ports.DESCRIPTION,
-        "description": with_paper(ports.DESCRIPTION),
-        "ports": ports.PORTS,
-        "parameter_set": ports.PARAMETERS,
-        "group_of": getattr(ports, "GROUP_OF", {}),
+        "__module__": modules[0].__package__,
+        "__doc__": definition.summary,
+        **definition.about,
+        "description": definition.description,
+        "ports": definition.ports,
+        "parameter_set": definition.parameters,
+        "group_of": definition.group_of,
         "_latest": None,
     }
     scope = {

@@ -18,7 +18,7 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmus.discovery import components, package_folder
+from fmus.discovery import components, package_folder, source_of
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
@@ -80,7 +80,7 @@ def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
 
 def written(path: Path, describe: Callable[..., bytes], name: str) -> Path:
     """The folder, with the description of a component."""
-    content = describe(name, declared(name).DESCRIPTION, GUID, declared(name).PORTS)
+    content = describe(source_of(name).definition, GUID)
     (path / "modelDescription.xml").write_bytes(content)
     return path
 

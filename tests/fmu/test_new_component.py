@@ -108,7 +108,8 @@ def test_page_has_the_ports(tree: Path):
     page = python(
         tree,
         "-c",
-        f"from fmus.documentation import component_page; print(component_page({NAME!r}))",
+        f"from fmus.discovery import source_of; from fmus.documentation import component_page; "
+        f"print(component_page(source_of({NAME!r})))",
     )
     assert page.startswith("# FirstOrderLag\n\nT dx/dt = u - x")
     assert "| `y.x` | Real | m | Its value, measured: x |" in page

@@ -8,7 +8,7 @@ from random import Random
 from typing import NamedTuple
 from xml.etree import ElementTree
 
-from fmus.discovery import ports_of
+from fmus.discovery import source_of
 from fmus.kinds import PYTHON
 from fmus.ports.description import fmi2_description
 from support import states
@@ -44,7 +44,7 @@ def has_call(name: str, key: tuple[str, str]) -> bool:
 @cache
 def _description(name: str) -> Description:
     """What the FMU of a component says of itself, without building it."""
-    text = fmi2_description(name, "", "", ports_of(name))
+    text = fmi2_description(source_of(name).definition, "")
     return description_in(ElementTree.fromstring(text), PYTHON)
 
 

@@ -12,6 +12,7 @@ from tempfile import mkdtemp
 from types import ModuleType
 from typing import Any, get_args, get_origin, get_type_hints
 
+from fmus.discovery import components, source_of
 from fmus.native.translator import translated
 
 ROOT = Path(__file__).parents[2]
@@ -87,10 +88,10 @@ def flat(value: Any) -> list[float]:
 class Equations:
     """A component's functions in both languages."""
 
-    def __init__(self, package: str) -> None:
-        self.behaviour: ModuleType = import_module(f"{package}.behaviour")
+    def __init__(self, name: str) -> None:
+        self.behaviour: ModuleType = import_module(f"{components()[name]}.behaviour")
         folder = Path(mkdtemp(prefix="auv_fmu_equations_"))
-        (folder / "equations.c").write_text(translated(package))
+        (folder / "equations.c").write_text(translated(source_of(name).definition))
         (folder / "shim.c").write_text(_SHIM)
         command = ["cc", *FLAGS, "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-I", str(RUNTIME)]
         library = folder / "equations.so"
@@ -141,9 +142,9 @@ def _passed(arguments: Sequence[Any]) -> list[Any]:
 
 
 @cache
-def equations(package: str) -> Equations:
+def equations(name: str) -> Equations:
     """Compiled once a run of the tests."""
-    return Equations(package)
+    return Equations(name)
 
 
 def bits(numbers: Sequence[float]) -> list[str]:

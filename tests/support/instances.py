@@ -13,7 +13,7 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
-from fmus.discovery import components
+from fmus.discovery import source_of
 from fmus.python.callbacks import ANSWER
 from fmus.python.component import Component
 from fmus.python.slave import slave_of
@@ -21,9 +21,7 @@ from fmus.python.slave import slave_of
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:
     """The class of a component."""
-    package = components()[name]
-    ports, behaviour = (import_module(f"{package}.{part}") for part in ("ports", "behaviour"))
-    return slave_of(name, ports, behaviour)
+    return slave_of(name, *map(import_module, source_of(name).modules))
 
 
 def messages_of(slave: Component[Any, Any, Any, Any]) -> list[str]:

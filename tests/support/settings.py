@@ -5,11 +5,10 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
-from importlib import import_module
 from typing import Any, NamedTuple
 
-from fmus.discovery import components, package_folder, ports_of
-from fmus.ports.behaviour import Behaviour, read_behaviour
+from fmus.discovery import components, package_folder, ports_of, source_of
+from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import ParameterSet
 from support.tiers import slow
 
@@ -69,10 +68,8 @@ def choices_of(name: str, port: str) -> Sequence[str]:
 
 def parameters_of(name: str) -> ParameterSet[Any]:
     """What the parameters of a component mean to its equations."""
-    found: ParameterSet[Any] = import_module(f"{components()[name]}.ports").PARAMETERS
-    return found
+    return source_of(name).definition.parameters
 
 
-@cache
 def behaviour_of(name: str) -> Behaviour:
-    return read_behaviour(import_module(f"{components()[name]}.behaviour"))
+    return source_of(name).definition.behaviour

@@ -7,11 +7,14 @@ from xml.etree import ElementTree
 import pytest
 
 from fmus.compilers import Compiler
-from fmus.discovery import components
+from fmus.discovery import source_of
 from fmus.kinds import platforms
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
+from fmus.ports.definition import Definition
 from support.settings import NAMES
+
+PLANT = source_of("AuvPlant").definition
 
 ANY = Compiler("any", ["any"], targets={})
 
@@ -23,7 +26,7 @@ def _no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def entries(name: str, fmi: str = "2", names: str = "all") -> dict[str, bytes]:
-    return fmu_entries(name, components()[name], fmi, platforms(fmi, names), ANY, print)
+    return fmu_entries(source_of(name), fmi, platforms(fmi, names), ANY, print)
 
 
 def guid(contents: dict[str, bytes]) -> str:
@@ -75,15 +78,15 @@ def test_guid_is_the_same_for_all_platforms():
 def test_guid_follows_from_sources_and_description(monkeypatch: pytest.MonkeyPatch):
     guids = {guid(entries(name, fmi)) for name in NAMES for fmi in FILES}
     written = packaging.sources
-    for file in written("fmus.auv_plant"):
+    for file in written(PLANT):
 
-        def changed(package: str, *fmi: int, file: str = file) -> dict[str, str]:
-            sources = written(package, *fmi)
+        def changed(it: Definition, *fmi: str, file: str = file) -> dict[str, str]:
+            sources = written(it, *fmi)
             return {**sources, file: sources[file] + "\n"}
 
         monkeypatch.setattr(packaging, "sources", changed)
         guids.add(guid(entries("AuvPlant")))
-    assert len(guids) == 2 * len(NAMES) + len(written("fmus.auv_plant"))
+    assert len(guids) == 2 * len(NAMES) + len(written(PLANT))
 
 
 @pytest.mark.parametrize("name", NAMES)

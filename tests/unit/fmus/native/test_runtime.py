@@ -15,14 +15,12 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fmus.discovery import components
+from fmus.discovery import components, source_of
 from fmus.native.packaging import MAIN, sources
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 
 pytestmark = pytest.mark.skipif(not COMPILERS, reason="there is no C compiler")
-
-PACKAGES = components()
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off")
 
@@ -43,7 +41,7 @@ def written(folder: Path, name: str, version: str = "2") -> Path:
     """The sources of a component in a folder."""
     folder.mkdir(exist_ok=True)
     identity = f'#define MODEL_NAME "{name}"\n#define MODEL_GUID "{{{name}}}"\n'
-    files = {**sources(PACKAGES[name], version), "identity.h": identity}
+    files = {**sources(source_of(name).definition, version), "identity.h": identity}
     for file, text in files.items():
         (folder / file).write_text(text, encoding="utf-8")
     return folder
@@ -200,7 +198,7 @@ def bits(numbers: list[float]) -> bytes:
 
 @pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize("version", MAIN)
-@pytest.mark.parametrize("name", PACKAGES)
+@pytest.mark.parametrize("name", components())
 def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: str, compiler: str):
     folder = written(tmp_path, name, version)
     compile_in(folder, "-fsyntax-only", MAIN[version], compiler=compiler)

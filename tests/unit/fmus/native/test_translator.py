@@ -17,7 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
-from fmus.discovery import components
+from fmus.discovery import components, ports_of, source_of
 from fmus.native.program import strip_sphinx_marks
 from fmus.native.translator import tables, translated
 from fmus.ports.port import FAULT, H_MAX, Port
@@ -33,32 +33,30 @@ from support.equations import (
     flat,
     structure,
 )
-from support.settings import behaviour_of
-
-PACKAGES = [*components().values()]
+from support.settings import NAMES, behaviour_of, parameters_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
 
-every = pytest.mark.parametrize("package", PACKAGES)
+every = pytest.mark.parametrize("name", NAMES)
 randoms = st.randoms(use_true_random=True)
 
 
-@pytest.mark.parametrize("package", PACKAGES[:2])
-def test_every_process_writes_the_same(package):
+@pytest.mark.parametrize("name", NAMES[:2])
+def test_every_process_writes_the_same(name):
     process = subprocess.run(
-        [sys.executable, "-m", "fmus.native", package],
+        [sys.executable, "-m", "fmus.native", name],
         capture_output=True,
         text=True,
         check=True,
         env={"PYTHONHASHSEED": "7"},
     )
-    assert process.stdout == translated(package)
+    assert process.stdout == translated(source_of(name).definition)
 
 
 @every
-def test_it_has_no_memory_and_no_variable_outside_of_functions(package):
-    text = translated(package)
+def test_it_has_no_memory_and_no_variable_outside_of_functions(name):
+    text = translated(source_of(name).definition)
     assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\b", text)
     outside = [
         line for line in text.splitlines() if re.match(r"static (?!const\b).*[^{;]*=.*;", line)
@@ -67,25 +65,25 @@ def test_it_has_no_memory_and_no_variable_outside_of_functions(package):
 
 
 @every
-def test_lines_can_be_read(package):
+def test_lines_can_be_read(name):
     """But for texts, which are not broken."""
-    long = [line for line in translated(package).splitlines() if len(line) > 100]
+    long = [line for line in translated(source_of(name).definition).splitlines() if len(line) > 100]
     assert all('"' in line for line in long)
 
 
 @every
 @pytest.mark.parametrize("standard", ["c99", "c11", "gnu17"])
-def test_it_is_c_without_warnings(package, standard, tmp_path):
+def test_it_is_c_without_warnings(name, standard, tmp_path):
     path = tmp_path / "equations.c"
-    path.write_text(translated(package))
+    path.write_text(translated(source_of(name).definition))
     flags = [f"-std={standard}", *FLAGS[1:], "-Wshadow=local", "-Wconversion"]
     subprocess.run(["cc", *flags, "-I", str(RUNTIME), "-fsyntax-only", str(path)], check=True)
 
 
 @every
-def test_each_function_has_its_docstring_above_it(package):
-    text, seen = translated(package), 0
-    behaviour = Path(str(import_module(f"{package}.behaviour").__file__))
+def test_each_function_has_its_docstring_above_it(name):
+    text, seen = translated(source_of(name).definition), 0
+    behaviour = Path(str(import_module(f"{components()[name]}.behaviour").__file__))
     for path in (behaviour, *(ROOT / "src/auv_fmu").glob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
@@ -171,17 +169,17 @@ ROW = re.compile(
 )
 
 
-def rows(package: str) -> list[dict[str, str]]:
-    return [found.groupdict() for found in ROW.finditer(tables(package))]
+def rows(name: str) -> list[dict[str, str]]:
+    return [found.groupdict() for found in ROW.finditer(tables(source_of(name).definition))]
 
 
-def ports(package: str) -> list[Port]:
-    return [*import_module(f"{package}.ports").PORTS, FAULT]
+def ports(name: str) -> list[Port]:
+    return [*ports_of(name), FAULT]
 
 
 @every
-def test_ports_are_those_of_the_declaration(package: str):
-    for row, port in zip(rows(package), ports(package), strict=True):
+def test_ports_are_those_of_the_declaration(name: str):
+    for row, port in zip(rows(name), ports(name), strict=True):
         assert (row["name"], row["kind"]) == (port.name, port.type.upper())
         assert row["causality"] == port.causality.upper()
         assert row["variability"] == port.variability.upper()
@@ -193,12 +191,12 @@ def test_ports_are_those_of_the_declaration(package: str):
 
 
 @every
-def test_inputs_and_outputs_lie_in_their_order(package: str):
-    declared, text = ports(package), tables(package)
+def test_inputs_and_outputs_lie_in_their_order(name: str):
+    declared, text = ports(name), tables(source_of(name).definition)
     for causality in ("INPUT", "OUTPUT"):
         places = [
             int(row["place"])
-            for row in rows(package)
+            for row in rows(name)
             if (row["causality"], row["kind"]) == (causality, "REAL")
         ]
         assert places == [*range(len(places))]
@@ -210,15 +208,15 @@ def test_inputs_and_outputs_lie_in_their_order(package: str):
 
 
 @every
-def test_parameters_lie_where_the_equations_look_for_them(package: str):
+def test_parameters_lie_where_the_equations_look_for_them(name: str):
     """Each port gets another value, which is then found at its place."""
-    declared = import_module(f"{package}.ports").PARAMETERS
+    declared = parameters_of(name)
     values = {
         port.name: next(iter(port.choices)) if port.choices else float(i)
         for i, port in enumerate(declared.ports)
     }
     model = declared.of(values)
-    parameters = [row for row in rows(package) if row["causality"] == "PARAMETER"]
+    parameters = [row for row in rows(name) if row["causality"] == "PARAMETER"]
     for row in parameters:
         [member] = re.findall(r"^PARAMETER_AT\((.*)\)$", row["place"])
         if row["name"] == H_MAX.name:
@@ -237,9 +235,9 @@ def at(model: Any, member: str) -> Any:
 
 
 def test_choices_are_the_texts_and_the_numbers_of_the_equations():
-    text = tables("fmus.observer_controller")
-    described = [row for row in rows("fmus.observer_controller") if row["kind"] == "STRING"]
-    declared = [port for port in ports("fmus.observer_controller") if port.type == "String"]
+    text = tables(source_of("ObserverController").definition)
+    described = [row for row in rows("ObserverController") if row["kind"] == "STRING"]
+    declared = [port for port in ports("ObserverController") if port.type == "String"]
     for row, port in zip(described, declared, strict=True):
         [choices] = re.findall(rf"choice {row['choices']}\[\] = \{{(.*)\}};", text)
         numbers = re.findall(r'\{"(\w+)", (\d+)\}', choices)
@@ -279,8 +277,8 @@ def raised(call: Any) -> tuple[str, list[str]]:
 
 @every
 @given(random=randoms)
-def test_begin(package, random):
-    both, wild = equations(package), random.choice((0.0, 0.02, 0.3))
+def test_begin(name, random):
+    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
     parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
     t = number(random)
     given = {"parameters": parameters, "inputs": inputs, "t": t}
@@ -299,8 +297,8 @@ def test_begin(package, random):
 
 @every
 @given(random=randoms)
-def test_advance(package, random):
-    both, wild = equations(package), random.choice((0.0, 0.02, 0.3))
+def test_advance(name, random):
+    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
     parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
     state = value(both.state, random, wild)
     t, h, n = number(random), random.random(), random.randrange(1, 5)
@@ -327,12 +325,10 @@ def test_advance(package, random):
     assert found == raised(lambda: both.python("advance", **given))
 
 
-@pytest.mark.parametrize(
-    "package", [p for name, p in components().items() if behaviour_of(name).hooks["expected"]]
-)
+@pytest.mark.parametrize("name", [name for name in NAMES if behaviour_of(name).hooks["expected"]])
 @given(random=randoms)
-def test_expected(package, random):
-    both, wild = equations(package), random.choice((0.0, 0.02, 0.3))
+def test_expected(name, random):
+    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
     parameters, state = value(both.parameters, random, wild), value(both.state, random, wild)
     outputs = value(both.outputs, random, wild)
     if hasattr(state, "quaternion") and random.random() < 0.5:
@@ -353,7 +349,7 @@ def test_expected(package, random):
 
 @given(random=randoms)
 def test_restarts_of_the_observer(random):
-    both, wild = equations("fmus.observer_controller"), 0.0
+    both, wild = equations("ObserverController"), 0.0
     parameters = value(both.parameters, random, wild)
     state, inputs = value(both.state, random, wild), value(both.inputs, random, wild)
     given = {"parameters": parameters, "state": state, "inputs": inputs}
@@ -368,7 +364,7 @@ def test_restarts_of_the_observer(random):
 
 @given(random=randoms)
 def test_limits_that_leave_an_actuator_nothing(random):
-    both, wild = equations("fmus.auv_plant"), 0.3
+    both, wild = equations("AuvPlant"), 0.3
     parameters = value(both.parameters, random, wild)
     why = both.call("check", filled(both.parameters, parameters))
     assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
@@ -377,7 +373,7 @@ def test_limits_that_leave_an_actuator_nothing(random):
 @given(random=randoms, n=st.integers(0, MOST + 2), timed=st.booleans())
 def test_paths_are_refused_alike(random, n, timed):
     """Most of them somewhere on the way; more waypoints than there are, for a place beyond them."""
-    both, default = equations("fmus.path_planner"), Parameters()
+    both, default = equations("PathPlanner"), Parameters()
     series = [tuple(random.uniform(-15.0, 15.0) for _ in range(MOST)) for _ in "xyz"]
     t = tuple(sorted(random.uniform(0.0, 2000.0) for _ in range(MOST)))
     flat_z = tuple(0.2 * z for z in series[2])
@@ -390,7 +386,7 @@ def test_paths_are_refused_alike(random, n, timed):
 
 @given(random=randoms)
 def test_noise_of_the_localisation(random):
-    both, wild = equations("fmus.auv_plant"), 0.3
+    both, wild = equations("AuvPlant"), 0.3
     parameters, outputs = value(both.parameters, random, wild), value(both.outputs, random, wild)
     n = value(tuple[float, float, float], random, wild)
     passed = filled(both.outputs, outputs)
@@ -403,7 +399,7 @@ def test_noise_of_the_localisation(random):
 
 @pytest.mark.parametrize("seed", [0, 1, -1, 2**31 - 1, -(2**31)])
 def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
-    both = equations("fmus.auv_plant")
+    both = equations("AuvPlant")
     parameters = structure(both.parameters)()
     parameters.noise.seed = seed
     both.library.seed.restype = c_ulong

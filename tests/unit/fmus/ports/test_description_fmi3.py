@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
 from xml.etree import ElementTree
 
 from auv_fmu import __version__
+from fmus.ports.definition import Definition
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
     fmi3_description,
     terminals_and_icons,
 )
 from fmus.ports.port import FAULT, TIME, Port, inputs, outputs, parameter
+from fmus.ports.vehicle import PAPER
 
 A = inputs("a", {"x": "m"}, "Place")[0]
 PORTS = (
@@ -100,7 +103,9 @@ def canonical(content: str | bytes) -> str:
 
 
 def test_description_says_what_the_ports_are():
-    found = fmi3_description("It", "A thing", "{1}", PORTS)
+    nothing: Any = None
+    it = Definition("It", "A thing", PAPER, PORTS, nothing, {}, nothing)
+    found = fmi3_description(it, "{1}")
     assert canonical(found) == canonical(DESCRIPTION)
 
 
