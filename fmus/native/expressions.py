@@ -5,42 +5,49 @@ from __future__ import annotations
 import ast
 import inspect
 import math
+import re
 import sys
-from collections.abc import Callable
-from types import FunctionType, ModuleType
+from collections.abc import Callable, Sequence
+from enum import IntEnum
+from itertools import count
+from types import ModuleType
 from typing import Any, NamedTuple
 
-from fmus.native.program import (
+from fmus.native import arrays
+from fmus.native.program import Function, Program, Untranslatable, number_in_c
+from fmus.native.shapes import (
+    BOOLEAN,
     DOUBLE,
     INTEGER,
     TEXT,
-    Function,
-    Program,
     Shape,
     Structure,
-    Untranslatable,
-    c_name,
+    in_c,
     structure,
+    vector,
 )
 
 #: How tightly the operators of C bind.
-_TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, _POSTFIX = range(9)
+TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, POSTFIX = range(9)
 
-_BINARY = {ast.Add: ("+", _SUM), ast.Sub: ("-", _SUM), ast.Mult: ("*", _PRODUCT)}
+_BINARY = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
 _COMPARE = {
-    ast.Lt: ("<", _RELATION), ast.LtE: ("<=", _RELATION), ast.Gt: (">", _RELATION),
-    ast.GtE: (">=", _RELATION), ast.Eq: ("==", _EQUALITY), ast.NotEq: ("!=", _EQUALITY),
+    ast.Lt: ("<", RELATION), ast.LtE: ("<=", RELATION), ast.Gt: (">", RELATION),
+    ast.GtE: (">=", RELATION), ast.Eq: ("==", EQUALITY), ast.NotEq: ("!=", EQUALITY),
 }  # fmt: skip
 
-#: Functions that never raise, and arithmetic.h's for the others.
-_PLAIN = {
-    math.atan: "atan", math.atan2: "atan2", math.copysign: "copysign", math.tanh: "tanh",
-    abs: "fabs",
-}  # fmt: skip
-_RAISING = {
-    math.asin: "ASIN", math.cos: "COS", math.exp: "EXP", math.expm1: "EXPM1", math.log: "LOG",
-    math.log1p: "LOG1P", math.sin: "SIN", math.sqrt: "SQRT",
-}  # fmt: skip
+#: Functions of arithmetic.h for operators of integers, which may exceed 32 bits.
+_OF_INTEGERS = {ast.Add: "ADD", ast.Sub: "SUB", ast.Mult: "MUL"}
+
+#: Functions of arithmetic.h for operators that may raise, of floats and of integers.
+_DIVISIONS = {
+    ast.Div: ("DIV", "INT_DIV"),
+    ast.FloorDiv: ("FLOORDIV", "INT_FLOORDIV"),
+    ast.Mod: ("MOD", "INT_MOD"),
+}
+
+WHOLE = (INTEGER, BOOLEAN)
+NUMBERS = (DOUBLE, *WHOLE)
 
 
 class Code(NamedTuple):
@@ -48,7 +55,7 @@ class Code(NamedTuple):
 
     text: str
     shape: Shape
-    binding: int = _POSTFIX
+    binding: int = POSTFIX
 
     def within(self, binding: int) -> str:
         """The text as an operand of what binds so tightly."""
@@ -60,11 +67,17 @@ class Expressions:
 
     Attributes:
         made: the function, of which it notes whether it raises.
-        local: shapes of its arguments and variables.
+        names: all names of its arguments and variables.
+        local: shapes of the ones that have been met.
+        assigned: names that have a value here; None: here no step of the program comes.
+        functions: local functions by their names: the function, and what it captures.
+        numbers: of the functions that are made of parts of this one.
 
     """
 
-    def __init__(self, program: Program, path: str, scope: dict[str, Any], made: Function) -> None:
+    def __init__(
+        self, program: Program, path: str, scope: dict[str, Any], made: Function, names: set[str]
+    ) -> None:
         """Begin with the arguments.
 
         Args:
@@ -72,14 +85,18 @@ class Expressions:
             path: of its module.
             scope: of its module.
             made: the function in C.
+            names: of its arguments and variables.
 
         """
-        self.made, self.local = made, dict(made.arguments)
-        self._program, self._path, self._scope = program, path, scope
+        self.made, self.names, self.local = made, names, dict(made.arguments)
+        self.assigned: set[str] | None = set(made.arguments)
+        self.functions: dict[str, tuple[Function, list[str]]] = {}
+        self.program, self.path, self.scope = program, path, scope
+        self.numbers = count(1)
 
     def fail(self, node: ast.AST, what: str) -> Untranslatable:
         """What to raise, with the line."""
-        return Untranslatable(f"{self._path}:{getattr(node, 'lineno', 0)}: {what}")
+        return Untranslatable(f"{self.path}:{getattr(node, 'lineno', 0)}: {what}")
 
     def parts(self, node: ast.AST, code: Code) -> list[Code]:
         """The elements of a tuple that has a name."""
@@ -89,12 +106,13 @@ class Expressions:
 
     def known(self, node: ast.expr) -> Any:
         """What a name of a module stands for; None: it is a local one, or an expression."""
-        if isinstance(node, ast.Name) and node.id not in self.local:
-            return self._scope.get(node.id, {"abs": abs}.get(node.id))
+        if isinstance(node, ast.Name) and node.id not in self.names:
+            builtins: dict[str, Any] = self.scope.get("__builtins__", {})
+            return self.scope.get(node.id, builtins.get(node.id))
         if isinstance(node, ast.Attribute):
             owner = self.known(node.value)
-            if isinstance(owner, ModuleType):
-                return getattr(owner, node.attr)
+            if isinstance(owner, ModuleType) or _is_enumeration(owner):
+                return getattr(owner, node.attr, None)
         return None
 
     def code(self, node: ast.expr, wanted: Shape | None = None) -> Code:
@@ -104,109 +122,233 @@ class Expressions:
             Untranslatable: it has no counterpart.
 
         """
-        method: Callable[[Any, Shape | None], Code]
-        method = getattr(self, f"_{type(node).__name__.lower()}")
+        name = f"_{type(node).__name__.lower()}"
+        if not hasattr(self, name):
+            raise self.fail(node, f"{type(node).__name__} has no counterpart in C here")
+        method: Callable[[Any, Shape | None], Code] = getattr(self, name)
         return method(node, wanted)
+
+    def fitting(self, node: ast.expr, wanted: Shape | None) -> Code:
+        """An expression of exactly this shape."""
+        return self.fit(node, self.code(node, wanted), wanted)
+
+    def fit(self, node: ast.expr, code: Code, wanted: Shape | None) -> Code:
+        """The code of an expression, if it is of exactly this shape."""
+        if wanted is None or code.shape == wanted:
+            return code
+        if wanted == DOUBLE and code.shape in WHOLE:
+            text = ast.unparse(node)
+            better = f"{text}.0" if text.removeprefix("-").isdecimal() else f"float({text})"
+            raise self.fail(node, f"{text} is an int where a float is wanted: write {better}")
+        raise self.fail(node, f"{code.shape.word} where {wanted.word} is wanted")
+
+    def number(self, node: ast.expr, code: Code | None = None) -> Code:
+        """An operand that is a float, or an int that becomes one."""
+        if isinstance(node, ast.Constant) and type(node.value) is int:
+            return Code(repr(float(node.value)), DOUBLE)
+        code = code or self.code(node)
+        if code.shape not in NUMBERS:
+            raise self.fail(node, f"{code.shape.word} where a number is wanted")
+        return code
+
+    def integer(self, node: ast.expr, what: str) -> Code:
+        """An expression that is an int."""
+        code = self.code(node)
+        if code.shape not in WHOLE:
+            raise self.fail(node, f"{what} that is {code.shape.word}, not an int")
+        return code
+
+    def calling(self, function: Function, arguments: Sequence[str]) -> Code:
+        """A call; what returns nothing is a statement."""
+        self.made.raises |= function.raises
+        return Code(function.call(arguments), function.returns or INTEGER)
+
+    # Names and constants
 
     def _constant(self, node: ast.Constant, wanted: Shape | None) -> Code:
         value: Any = node.value
         if isinstance(value, str):
             return Code(f'"{value}"', TEXT)
-        if type(value) is float or wanted == DOUBLE:
-            return Code(repr(float(value)), DOUBLE)
-        return Code(str(int(value)), INTEGER)
+        if type(value) is float:
+            return Code(number_in_c(value), DOUBLE)
+        return Code(str(int(value)), BOOLEAN if type(value) is bool else INTEGER)
 
     def _name(self, node: ast.Name, wanted: Shape | None) -> Code:
-        if node.id in self.local:
-            return Code(node.id, self.local[node.id])
-        return self._module_constant(node)
+        if node.id not in self.names:
+            return self._module_constant(node)
+        if node.id not in self.local or (
+            self.assigned is not None and node.id not in self.assigned
+        ):
+            raise self.fail(node, f"{node.id} may have no value here")
+        return Code(in_c(node.id), self.local[node.id])
 
     def _module_constant(self, node: ast.expr) -> Code:
         name = node.id if isinstance(node, ast.Name) else ast.unparse(node).rsplit(".")[-1]
         value = self.known(node)
+        if value is None:
+            raise self.fail(node, f"the name {ast.unparse(node)} is not known here")
+        if isinstance(value, float) and vars(math).get(name) == value:
+            return Code(number_in_c(value), DOUBLE)
         # It bears the name of the module that it stands in, wherever it was imported.
-        in_c = c_name(_home(self._scope["__name__"], name), name)
+        module = _home(self.scope["__name__"], name)
+        if isinstance(value, IntEnum):
+            module, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
         try:
-            return Code(in_c, self._program.constant(in_c, value))
-        except Untranslatable as error:
+            return Code(*self.program.constant(module, name, value))
+        except (Untranslatable, TypeError) as error:
             raise self.fail(node, str(error)) from None
 
     def _attribute(self, node: ast.Attribute, wanted: Shape | None) -> Code:
-        if self.known(node.value) is not None:
+        owner = self.known(node.value)
+        if isinstance(owner, ModuleType) or _is_enumeration(owner):
             return self._module_constant(node)
         code = self.code(node.value)
+        if node.attr == "T" and arrays.is_array(code.shape) and len(arrays.sizes(code.shape)) == 2:
+            return self.calling(arrays.transpose(self.program, code.shape), [code.text])
         for suffix, part in code.shape.parts if isinstance(code.shape, Structure) else ():
-            if suffix == f".{node.attr}":
-                return Code(f"{code.within(_POSTFIX)}{suffix}", part)
-        raise self.fail(node, f"{node.attr} is not a field")
+            if suffix == f".{in_c(node.attr)}":
+                return Code(f"{code.within(POSTFIX)}{suffix}", part)
+        raise self.fail(node, f"{node.attr} is not a field of {code.shape.word}")
+
+    # Elements
 
     def _subscript(self, node: ast.Subscript, wanted: Shape | None) -> Code:
         code = self.code(node.value)
-        if not isinstance(node.slice, ast.Constant):
-            return self._element(node, code)
-        key = node.slice.value
-        for i, (suffix, part) in enumerate(getattr(code.shape, "parts", ())):
-            if key in (i, suffix[1:]):
-                return Code(f"{code.within(_POSTFIX)}{suffix}", part)
-        raise self.fail(node, f"there is no element {key!r} here")
+        if isinstance(node.slice, ast.Slice):
+            return self._slice(node, node.slice, code)
+        for place in node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]:
+            code = self._element(node, place, code)
+        return code
 
-    def _element(self, node: ast.Subscript, code: Code) -> Code:
-        """The element of an array at a place that is computed."""
-        place = self.code(node.slice)
+    def _element(self, node: ast.Subscript, place: ast.expr, code: Code) -> Code:
+        parts = code.shape.parts if isinstance(code.shape, Structure) else ()
+        key = _constant_of(place)
+        key = in_c(key) if isinstance(key, str) else key
+        if isinstance(key, int) and key < 0:
+            key += len(parts)
+        for i, (suffix, part) in enumerate(parts):
+            if key is not None and key in (i, suffix[1:]):
+                return Code(f"{code.within(POSTFIX)}{suffix}", part)
+        if key is not None:
+            raise self.fail(node, f"there is no element {ast.unparse(place)} here")
         if not isinstance(code.shape, Structure) or not code.shape.is_array:
             raise self.fail(
                 node, "a computed subscript of something other than a tuple of parts of one type"
             )
-        if place.shape != INTEGER:
-            raise self.fail(node, "a subscript that is not a whole number")
+        where = self.integer(place, "a subscript")
         self.made.raises = True
-        text = f"{code.within(_POSTFIX)}.v[PLACE({place.text}, {len(code.shape.parts)})]"
-        return Code(text, code.shape.parts[0][1])
+        text = f"{code.within(POSTFIX)}.v[PLACE({where.text}, {len(parts)})]"
+        return Code(text, parts[0][1])
+
+    def _slice(self, node: ast.Subscript, places: ast.Slice, code: Code) -> Code:
+        bounds = [places.lower, places.upper, places.step]
+        numbers = [None if bound is None else _constant_of(bound) for bound in bounds]
+        known = all(n is not None or bound is None for n, bound in zip(numbers, bounds))
+        if not known or not isinstance(code.shape, Structure) or not code.shape.is_array:
+            raise self.fail(node, "a slice other than a constant one of a vector or tuple")
+        if not is_dotted_name(node.value):
+            raise self.fail(node, "a slice of something that has no name")
+        parts = self.parts(node, code)[slice(*numbers)]
+        if not parts:
+            raise self.fail(node, "a slice without elements")
+        made = vector(len(parts)) if arrays.is_array(code.shape) else None
+        return self.literal(made or structure([part.shape for part in parts]), parts)
+
+    # Operators
 
     def _binop(self, node: ast.BinOp, wanted: Shape | None) -> Code:
-        left, right = self._alike(node.left, node.right, wanted)
-        if isinstance(node.op, ast.Div):
-            if DOUBLE not in (left.shape, right.shape):
-                raise self.fail(node, "a division of whole numbers")
-            if isinstance(node.right, ast.Constant) and node.right.value:
-                return Code(f"{left.within(_PRODUCT)} / {right.text}", DOUBLE, _PRODUCT)
-            self.made.raises = True
-            return Code(f"DIV({left.text}, {right.text})", DOUBLE)
+        left, right = self.code(node.left), self.code(node.right)
+        if arrays.is_array(left.shape) or arrays.is_array(right.shape):
+            return self._of_arrays(node, left, right)
+        for side, code in ((node.left, left), (node.right, right)):
+            if code.shape not in NUMBERS:
+                raise self.fail(side, f"{code.shape.word} where a number is wanted")
+        is_float = DOUBLE in (left.shape, right.shape)
+        if is_float:
+            left, right = self.number(node.left, left), self.number(node.right, right)
+        if type(node.op) in _DIVISIONS:
+            return self._divided(node, left, right, is_float)
+        if type(node.op) not in _BINARY:
+            raise self.fail(node, f"the operator {type(node.op).__name__}")
         sign, binding = _BINARY[type(node.op)]
-        shape = DOUBLE if DOUBLE in (left.shape, right.shape) else INTEGER
-        text = f"{left.within(binding)} {sign} {right.within(binding + 1)}"
-        return Code(text, shape, binding)
+        if is_float:
+            text = f"{left.within(binding)} {sign} {right.within(binding + 1)}"
+            return Code(text, DOUBLE, binding)
+        self.made.raises = True
+        return Code(f"{_OF_INTEGERS[type(node.op)]}({left.text}, {right.text})", INTEGER)
 
-    def _alike(
-        self, left: ast.expr, right: ast.expr, wanted: Shape | None = None
-    ) -> tuple[Code, Code]:
-        """Two operands; whole numbers that are written beside a double become one."""
-        one, other = self.code(left, wanted), self.code(right, wanted)
+    def _divided(self, node: ast.BinOp, left: Code, right: Code, is_float: bool) -> Code:
+        of_floats, of_integers = _DIVISIONS[type(node.op)]
+        is_quotient = isinstance(node.op, ast.Div)
+        if is_float and is_quotient and isinstance(node.right, ast.Constant) and node.right.value:
+            return Code(f"{left.within(PRODUCT)} / {right.text}", DOUBLE, PRODUCT)
+        self.made.raises = True
+        function = of_floats if is_float else of_integers
+        shape = DOUBLE if is_float or is_quotient else INTEGER
+        return Code(f"{function}({left.text}, {right.text})", shape)
+
+    def _of_arrays(self, node: ast.BinOp, left: Code, right: Code) -> Code:
+        operation = arrays.binary(self.program, node.op, left.shape, right.shape)
+        if operation is None:
+            sign = _sign_of(node.op)
+            raise self.fail(node, f"there is no {left.shape.word} {sign} {right.shape.word}")
+        operands = [self.number(x, c).text if c.shape in NUMBERS else c.text
+                    for x, c in ((node.left, left), (node.right, right))]  # fmt: skip
+        return self.calling(operation.function, operands[::-1] if operation.swapped else operands)
+
+    def alike(self, left: ast.expr, right: ast.expr) -> tuple[Code, Code]:
+        """Two operands of a comparison; whole numbers beside a double become one."""
+        one, other = self.code(left), self.code(right)
         if DOUBLE in (one.shape, other.shape):
-            return self.code(left, DOUBLE), self.code(right, DOUBLE)
+            return self.number(left, one), self.number(right, other)
+        for node, code in ((left, one), (right, other)):
+            if code.shape not in NUMBERS:
+                raise self.fail(node, f"a comparison of {code.shape.word}")
         return one, other
 
     def _unaryop(self, node: ast.UnaryOp, wanted: Shape | None) -> Code:
         if isinstance(node.op, ast.Not):
-            operand = self.code(node.operand)
-            if operand.shape == DOUBLE:
-                return Code(f"{operand.within(_RELATION)} == 0.0", INTEGER, _EQUALITY)
-            return Code(f"!{operand.within(_UNARY)}", INTEGER, _UNARY)
-        operand = self.code(node.operand, wanted)
-        return Code(f"-{operand.within(_POSTFIX)}", operand.shape, _UNARY)
+            operand = self.condition(node.operand)
+            if operand.text.endswith(" != 0.0") and operand.binding == EQUALITY:
+                return Code(f"{operand.text[:-7]} == 0.0", BOOLEAN, EQUALITY)
+            return Code(f"!{operand.within(UNARY)}", BOOLEAN, UNARY)
+        if isinstance(node.op, ast.UAdd):
+            raise self.fail(node, "the operator +")
+        operand = self.code(node.operand)
+        if arrays.is_array(operand.shape):
+            return self.calling(arrays.negative(self.program, operand.shape), [operand.text])
+        if operand.shape in WHOLE and not isinstance(node.operand, ast.Constant):
+            self.made.raises = True
+            return Code(f"NEG({operand.text})", INTEGER)
+        if operand.shape not in NUMBERS:
+            raise self.fail(node, f"{operand.shape.word} where a number is wanted")
+        shape = INTEGER if operand.shape in WHOLE else DOUBLE
+        return Code(f"-{operand.within(POSTFIX)}", shape, UNARY)
 
     def condition(self, node: ast.expr) -> Code:
         """An expression as a truth value."""
+        if isinstance(node, ast.BoolOp):
+            return self._joined(node, [self.condition(value) for value in node.values])
         code = self.code(node)
         if code.shape == DOUBLE:
-            return Code(f"{code.within(_RELATION)} != 0.0", INTEGER, _EQUALITY)
+            return Code(f"{code.within(RELATION)} != 0.0", BOOLEAN, EQUALITY)
+        if code.shape not in WHOLE:
+            raise self.fail(node, f"{code.shape.word} as a condition")
         return code
 
     def _boolop(self, node: ast.BoolOp, wanted: Shape | None) -> Code:
-        sign, binding = ("||", _OR) if isinstance(node.op, ast.Or) else ("&&", _AND)
+        codes = [self.code(value) for value in node.values]
+        for value, code in zip(node.values, codes):
+            if code.shape != BOOLEAN:
+                word = code.shape.word
+                raise self.fail(value, f"{word} before or after and, or: write a comparison")
+        return self._joined(node, codes)
+
+    @staticmethod
+    def _joined(node: ast.BoolOp, codes: Sequence[Code]) -> Code:
+        sign, binding = ("||", OR) if isinstance(node.op, ast.Or) else ("&&", AND)
         # Compilers want brackets around one kind of them within the other.
-        texts = [self.condition(value).within(_EQUALITY) for value in node.values]
-        return Code(f" {sign} ".join(texts), INTEGER, binding)
+        return Code(f" {sign} ".join(code.within(EQUALITY) for code in codes), BOOLEAN, binding)
 
     def _compare(self, node: ast.Compare, wanted: Shape | None) -> Code:
         operands = [node.left, *node.comparators]
@@ -214,81 +356,98 @@ class Expressions:
             raise self.fail(node, "what stands between two comparisons must be a name")
         parts = []
         for operator, left, right in zip(node.ops, operands, operands[1:]):
+            if type(operator) not in _COMPARE:
+                raise self.fail(node, "a comparison other than of size")
             sign, binding = _COMPARE[type(operator)]
-            one, other = self._alike(left, right)
-            parts.append(
-                Code(
-                    f"{one.within(binding + 1)} {sign} {other.within(binding + 1)}",
-                    INTEGER,
-                    binding,
-                )
-            )
+            one, other = self.alike(left, right)
+            text = f"{one.within(binding + 1)} {sign} {other.within(binding + 1)}"
+            parts.append(Code(text, BOOLEAN, binding))
         if len(parts) == 1:
             return parts[0]
-        return Code(" && ".join(part.text for part in parts), INTEGER, _AND)
+        return Code(" && ".join(part.text for part in parts), BOOLEAN, AND)
 
     def _ifexp(self, node: ast.IfExp, wanted: Shape | None) -> Code:
-        condition = self.condition(node.test).within(_OR)
+        condition = self.condition(node.test).within(OR)
         one, other = self.code(node.body, wanted), self.code(node.orelse, wanted)
-        text = f"{condition} ? {one.within(_OR)} : {other.text}"
-        return Code(text, one.shape, _TERNARY)
+        if other.shape == DOUBLE:
+            one = self.fit(node.body, one, DOUBLE)
+        other = self.fit(node.orelse, other, one.shape)
+        text = f"{condition} ? {one.within(OR)} : {other.text}"
+        return Code(text, one.shape, TERNARY)
+
+    # Tuples
 
     def _tuple(self, node: ast.Tuple, wanted: Shape | None) -> Code:
-        shapes = [part for _, part in wanted.parts] if isinstance(wanted, Structure) else []
-        codes = self._elements(node.elts, shapes)
+        is_tuple = isinstance(wanted, Structure) and not arrays.is_array(wanted)
+        shapes = [part for _, part in wanted.parts] if is_tuple else []  # type: ignore[union-attr]
+        codes = self.elements(node.elts, shapes)
         shape = wanted if shapes else structure([code.shape for code in codes])
         assert isinstance(shape, Structure)
-        self._program.defined(shape)
         if len(codes) != len(shape.parts):
             raise self.fail(node, f"{len(codes)} values for {len(shape.parts)}")
-        return Code(_literal(shape, codes), shape)
+        return self.literal(shape, codes)
 
-    def _elements(self, nodes: list[ast.expr], shapes: list[Shape]) -> list[Code]:
+    def elements(self, nodes: Sequence[ast.expr], shapes: Sequence[Shape]) -> list[Code]:
         """Expressions, of which those with a star stand for their elements."""
         codes: list[Code] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                if not is_dotted_name(node.value):
-                    raise self.fail(node, "a star before something that has no name")
-                codes += self.parts(node, self.code(node.value))
+                codes += self._starred(node.value)
             else:
                 wanted = shapes[len(codes)] if len(codes) < len(shapes) else None
-                codes.append(self.code(node, wanted))
+                codes.append(self.fitting(node, wanted))
         return codes
+
+    def _starred(self, node: ast.expr) -> list[Code]:
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
+            self._slice(node, node.slice, code := self.code(node.value))
+            places = range(len(self.parts(node, code)))[self._range(node.slice)]
+            return [self.parts(node, code)[place] for place in places]
+        if not is_dotted_name(node):
+            raise self.fail(node, "a star before something that has no name")
+        return self.parts(node, self.code(node))
+
+    @staticmethod
+    def _range(places: ast.Slice) -> slice:
+        bounds = (places.lower, places.upper, places.step)
+        return slice(*(None if bound is None else _constant_of(bound) for bound in bounds))
 
     def _dict(self, node: ast.Dict, wanted: Shape | None) -> Code:
         if not isinstance(wanted, Structure):
             raise self.fail(node, "a dict that is not a result")
-        given = {ast.literal_eval(k): v for k, v in zip(node.keys, node.values) if k is not None}
-        codes = [self.code(given[suffix[1:]], part) for suffix, part in wanted.parts]
-        return Code(_literal(wanted, codes), wanted)
+        keys = [in_c(ast.literal_eval(key)) for key in node.keys if key is not None]
+        given = dict(zip(keys, node.values))
+        for suffix, _ in wanted.parts:
+            if suffix[1:] not in given:
+                raise self.fail(node, f"{suffix[1:]} is missing in {wanted.word}")
+        codes = [self.fitting(given[suffix[1:]], part) for suffix, part in wanted.parts]
+        return self.literal(wanted, codes)
 
-    def _call(self, node: ast.Call, wanted: Shape | None) -> Code:
-        called = self.known(node.func)
-        if called in _PLAIN or called in _RAISING:
-            texts = [self.code(argument, DOUBLE).text for argument in node.args]
-            self.made.raises |= called in _RAISING
-            return Code(f"{(_PLAIN | _RAISING)[called]}({', '.join(texts)})", DOUBLE)
-        if called is math.degrees:
-            factor = Code(repr(math.degrees(1.0)), DOUBLE)
-            operand = self.code(node.args[0], DOUBLE)
-            return Code(f"{operand.within(_PRODUCT)} * {factor.text}", DOUBLE, _PRODUCT)
-        if isinstance(called, type):
-            shape = self._program.shape(called)
-            assert isinstance(shape, Structure)
-            codes = self._elements(node.args, [part for _, part in shape.parts])
-            if len(codes) != len(shape.parts):
-                raise self.fail(node, f"{len(codes)} values for {len(shape.parts)} fields")
-            return Code(_literal(shape, codes), shape)
-        if not isinstance(called, FunctionType):
-            raise self.fail(node, f"{ast.unparse(node.func)} is not a function of equations")
-        function = self._program.function(called)
-        codes = self._elements(node.args, list(function.arguments.values()))
-        if [code.shape for code in codes] != list(function.arguments.values()):
-            raise self.fail(node, f"arguments that do not match {function.name}")
-        self.made.raises |= function.raises
-        # A call that returns nothing is a statement.
-        return Code(function.call([code.text for code in codes]), function.returns or INTEGER)
+    def literal(self, shape: Structure, codes: Sequence[Code]) -> Code:
+        """A structure with these values."""
+        self.program.defined(shape)
+        texts = [_initializer(code) for code in codes]
+        if shape.is_array:
+            return Code(f"({shape.name}){{{{{', '.join(texts)}}}}}", shape)
+        names = [suffix for suffix, _ in shape.parts]
+        filled = [f"{name} = {text}" for name, text in zip(names, texts)]
+        return Code(f"({shape.name}){{{', '.join(filled) or '0'}}}", shape)
+
+
+def _is_enumeration(value: Any) -> bool:
+    return isinstance(value, type) and issubclass(value, IntEnum)
+
+
+def _constant_of(node: ast.expr) -> Any:
+    """A number or a text that is written out; None: it is computed."""
+    try:
+        return ast.literal_eval(node)
+    except ValueError:
+        return None
+
+
+def _sign_of(operator: ast.operator) -> str:
+    return ast.unparse(ast.BinOp(ast.Name("a"), operator, ast.Name("b")))[2:-2]
 
 
 def _home(module: str, name: str) -> str:
@@ -301,16 +460,6 @@ def _home(module: str, name: str) -> str:
     return module
 
 
-def _literal(shape: Structure, codes: list[Code]) -> str:
-    """A structure with these values."""
-    texts = [_initializer(code) for code in codes]
-    if shape.is_array:
-        return f"({shape.name}){{{{{', '.join(texts)}}}}}"
-    names = [suffix for suffix, _ in shape.parts]
-    filled = [f"{name} = {text}" for name, text in zip(names, texts)]
-    return f"({shape.name}){{{', '.join(filled) or '0'}}}"
-
-
 def _initializer(code: Code) -> str:
     """An expression within a literal, which says its type."""
     prefix = f"({code.shape.name}){{"
@@ -321,4 +470,6 @@ def is_dotted_name(node: ast.expr) -> bool:
     """Whether an expression is a name, or a part of one."""
     if isinstance(node, (ast.Attribute, ast.Subscript)):
         return is_dotted_name(node.value)
-    return isinstance(node, (ast.Name, ast.Constant))
+    return isinstance(node, (ast.Name, ast.Constant)) or (
+        isinstance(node, ast.UnaryOp) and re.fullmatch(r"-[\d.]+", ast.unparse(node)) is not None
+    )

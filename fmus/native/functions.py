@@ -1,4 +1,4 @@
-"""Functions of the language of equations in C: their statements, and how these are laid out."""
+"""Functions of the language of equations in C: their statements."""
 
 from __future__ import annotations
 
@@ -9,106 +9,32 @@ import re
 import textwrap
 import tokenize
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from types import FunctionType
-from typing import get_type_hints
+from typing import Any
 
-from fmus.native.expressions import Code, Expressions, is_dotted_name
+from fmus.native.calls import Calls
+from fmus.native.expressions import WHOLE, Code, is_dotted_name
 from fmus.native.language import foreign
-from fmus.native.program import (
+from fmus.native.layout import INDENT, LINE_WIDTH, laid_out
+from fmus.native.loops import loop_over
+from fmus.native.program import Function, Program, Untranslatable
+from fmus.native.shapes import (
     DOUBLE,
     TEXT,
-    Function,
-    Program,
     Shape,
     Structure,
-    Untranslatable,
-    c_name,
+    has_no_size,
+    in_c,
+    shape_of,
     strip_sphinx_marks,
 )
 from fmus.ports.port import Refusal
 
-LINE_WIDTH = 98
-INDENT = "    "
-
-_STRINGS = re.compile(r'"(?:[^"\\]|\\.)*"')
-
-#: Spaces that no line is broken at.
-_UNBROKEN = re.compile(r"(?<!,) (?!(?:[-+?:]|&&|\|\|) )")
-
-#: What stands for a space that no line is broken at, and for brackets and commas that are text.
-_KEPT = str.maketrans(" (){},", "\x01\x02\x03\x04\x05\x06")
-_BACK = str.maketrans("\x01\x02\x03\x04\x05\x06", " (){},")
-
-
-def laid_out(text: str, indent: str) -> list[str]:
-    """A statement as lines."""
-    protected = _STRINGS.sub(lambda string: string.group().translate(_KEPT), text)
-    return [line.translate(_BACK) for line in _lines(protected, indent)]
-
-
-def _lines(text: str, indent: str) -> list[str]:
-    if len(indent) + len(text) <= LINE_WIDTH:
-        return [indent + text]
-    start, end = _widest(text)
-    # Inside of a short bracket there is nothing to gain.
-    if end - start < len(text) // 2 or "{" not in text[start:end]:
-        return _wrapped(text, indent)
-    # Two of them around the same are opened as one.
-    while text[start + 1] == "{" and _closing(text, start + 1) == end - 1:
-        start, end = start + 1, end - 1
-    *items, last = _split(text[start + 1 : end])
-    after = [f"{last},", text[end:]] if text[start] == "{" else [f"{last}{text[end:]}"]
-    lines = [indent + text[: start + 1]]
-    for item in (*(f"{item}," for item in items), after[0]):
-        lines += _lines(item, indent + INDENT)
-    return lines + [indent + closing for closing in after[1:]]
-
-
-def _wrapped(text: str, indent: str) -> list[str]:
-    """Lines that end after commas and before operators."""
-    wrapper = textwrap.TextWrapper(
-        LINE_WIDTH,
-        initial_indent=indent,
-        subsequent_indent=indent + INDENT,
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return wrapper.wrap(_UNBROKEN.sub("\x01", text))
-
-
-def _closing(text: str, start: int) -> int:
-    """Where a bracket is closed; its own place if it is not."""
-    depth = 0
-    for i in range(start, len(text)):
-        depth += (text[i] in "({") - (text[i] in ")}")
-        if depth == 0:
-            return i
-    return start
-
-
-def _widest(text: str) -> tuple[int, int]:
-    """The outermost pair of brackets that holds the most."""
-    spans, i = [(0, 0)], 0
-    while i < len(text):
-        if text[i] in "({":
-            spans.append((i, _closing(text, i)))
-            i = spans[-1][1]
-        i += 1
-    return max(spans, key=lambda span: span[1] - span[0])
-
-
-def _split(text: str) -> list[str]:
-    """The items of a list, at the commas that are in no bracket."""
-    items, depth, start = [], 0, 0
-    for i, character in enumerate(text):
-        depth += (character in "({") - (character in ")}")
-        if character == "," and depth == 0:
-            items.append(text[start:i].strip())
-            start = i + 1
-    return [*items, text[start:].strip()]
+#: How values in the text of a refusal may be written: as C writes them, too.
+_FORMAT = re.compile(r"[+ ]?0?\d*(?:\.\d+)?[efgEG]")
 
 
 @cache
@@ -131,131 +57,262 @@ def _checked(path: str) -> ast.Module:
     return ast.parse(Path(path).read_text(encoding="utf-8"))
 
 
-def function_in_c(program: Program, function: FunctionType) -> Function:
-    """A function of equations in C.
+def function_in_c(program: Program, function: FunctionType, made: Function) -> None:
+    """Write the text of a function of equations in C.
 
     Args:
         program: that gets the functions and structures that it needs.
         function: whose module is in the language.
+        made: the function, which gets its text.
 
     Raises:
         Untranslatable: it has no counterpart.
 
     """
-    return _Translation(program, function).done()
+    path = str(inspect.getsourcefile(function))
+    [tree] = [
+        node
+        for node in _checked(path).body
+        if isinstance(node, ast.FunctionDef) and node.name == function.__name__
+    ]
+    names = {*made.arguments, *_stored_names(tree)}
+    nothing = function.__annotations__.get("return") in (None, "None")
+    _Translation(tree, Calls(program, path, function.__globals__, made, names), nothing).write()
 
 
 class _Translation:
     """One function on its way to C."""
 
-    def __init__(self, program: Program, function: FunctionType) -> None:
-        self._program, self._path = program, str(inspect.getsourcefile(function))
-        [self._tree] = [
-            node
-            for node in _checked(self._path).body
-            if isinstance(node, ast.FunctionDef) and node.name == function.__name__
-        ]
-        hints = get_type_hints(function)
-        returns = hints.pop("return")
-        self._made = Function(
-            c_name(function.__module__, function.__name__),
-            {name: program.shape(hint) for name, hint in hints.items()},
-            None if returns is type(None) else program.shape(returns),
-        )
-        self._in_c = Expressions(program, self._path, function.__globals__, self._made)
-        names = [n for n in ast.walk(self._tree) if isinstance(n, ast.Name)]
-        self._names = {name.id for name in names}
-        self._assigned = Counter(n.id for n in names if isinstance(n.ctx, ast.Store))
+    def __init__(self, tree: ast.FunctionDef, in_c: Calls, returns_nothing: bool) -> None:
+        self._tree, self._in_c, self._made = tree, in_c, in_c.made
+        self._returns_nothing = returns_nothing
+        self._assigned = Counter(_stored_names(tree))
+        #: Names that are declared, block by block.
         self._scopes = [set(self._made.arguments)]
+        #: Names that are given a value in a block and used after it, with their shapes.
+        self._hoisted: dict[str, Shape | None] = {}
 
-    def done(self) -> Function:
-        """The function with its text."""
+    def write(self) -> None:
+        """Write its text."""
         made = self._made
         body = list(self._block(self._tree.body, INDENT, new=False))
-        arguments = [f"{_declared(shape)}{name}" for name, shape in made.arguments.items()]
+        if self._in_c.assigned is not None and not self._returns_nothing:
+            raise self._in_c.fail(self._tree, f"{self._tree.name} may end without a return")
+        arguments = [f"{_declared(shape)}{in_c(name)}" for name, shape in made.arguments.items()]
         if made.raises:
             arguments.append("Error *error")
         returned = "void" if made.returns is None else made.returns.name
         head = f"static {returned} {made.name}({', '.join(arguments) or 'void'}) {{"
         lines = [*_comment(ast.get_docstring(self._tree)), *laid_out(head, ""), *body, "}"]
         made.text = "\n".join(lines)
-        return made
+
+    # Blocks
 
     def _block(self, statements: list[ast.stmt], indent: str, new: bool = True) -> Iterator[str]:
         if new:
             self._scopes.append(set())
         for statement in statements:
             lines = [line for text in self._statement(statement, indent) for line in text]
-            about = _comments(self._path).get(statement.end_lineno or 0)
-            if about and lines and not isinstance(statement, (ast.If, ast.While)):
+            about = _comments(self._in_c.path).get(statement.end_lineno or 0)
+            simple = not isinstance(statement, (ast.If, ast.While, ast.For, ast.FunctionDef))
+            if about and lines and simple:
                 lines = _annotated(lines, f"/* {about} */", indent)
             yield from lines
         if new:
             self._scopes.pop()
 
     def _statement(self, node: ast.stmt, indent: str) -> Iterator[list[str]]:
-        if isinstance(node, ast.Return) and node.value is not None:
-            yield laid_out(
-                f"return {self._in_c.code(node.value, self._made.returns).text};", indent
-            )
-        elif isinstance(node, ast.Assign):
-            for text in self._assignment(node.targets[0], node.value):
+        if isinstance(node, (ast.If, ast.While, ast.For)):
+            yield from self._hoisting(node, indent)
+        elif isinstance(node, ast.Return) and node.value is not None:
+            code = self._in_c.fitting(node.value, self._made.returns)
+            if self._made.returns is None:
+                self._made.returns = code.shape
+            yield laid_out(f"return {code.text};", indent)
+            self._in_c.assigned = None
+        elif isinstance(node, (ast.Break, ast.Continue)):
+            yield [f"{indent}{'break' if isinstance(node, ast.Break) else 'continue'};"]
+            self._in_c.assigned = None
+        elif isinstance(node, (ast.Assign, ast.AnnAssign, ast.AugAssign)):
+            for text in self._storing(node):
                 yield laid_out(text, indent)
-        elif isinstance(node, ast.AugAssign):
-            target = ast.Name(ast.unparse(node.target), ast.Load(), lineno=node.lineno)
-            changed = ast.BinOp(target, node.op, node.value, lineno=node.lineno)
-            yield laid_out(f"{target.id} = {self._in_c.code(changed).text};", indent)
-        elif isinstance(node, ast.If):
-            yield laid_out(f"if ({self._in_c.condition(node.test).text}) {{", indent)
-            yield list(self._block(node.body, indent + INDENT))
-            if node.orelse:
-                yield [f"{indent}}} else {{"]
-                yield list(self._block(node.orelse, indent + INDENT))
-            yield [f"{indent}}}"]
-        elif isinstance(node, ast.While):
-            yield laid_out(f"while ({self._in_c.condition(node.test).text}) {{", indent)
-            yield list(self._block(node.body, indent + INDENT))
-            if self._made.raises:
-                yield [f"{indent}{INDENT}if (error->raised) break;"]
-            yield [f"{indent}}}"]
         elif isinstance(node, ast.Raise):
             yield laid_out(self._raised(node), indent)
             if self._made.returns is not None:
                 yield [f"{indent}return {_zero(self._made.returns)};"]
+            elif self._returns_nothing:
+                yield [f"{indent}return;"]
+            self._in_c.assigned = None
+        elif isinstance(node, ast.FunctionDef):
+            self._local_function(node)
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             yield laid_out(f"{self._in_c.code(node.value).text};", indent)
 
+    def _hoisting(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
+        """A statement with blocks, after the declarations of what is used after it."""
+        inside = set(_stored_names(node))
+        declared = set().union(*self._scopes)
+        outside = Counter(_loaded_names(self._tree)) - Counter(_loaded_names(node))
+        wanted = {name for name in inside - declared if outside[name] > 0}
+        always = _always_stored(node)
+        mine = sorted(wanted & always) if always is not None else []
+        self._hoisted |= dict.fromkeys(mine)
+        self._scopes[-1] |= set(mine)
+        lines = [line for text in self._compound(node, indent) for line in text]
+        for name in mine:
+            shape = self._hoisted.pop(name)
+            if shape is not None:
+                value = "{0}" if isinstance(shape, Structure) else "0"
+                yield [f"{indent}{_declared(shape)}{in_c(name)} = {value};"]
+        yield lines
+
+    def _compound(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
+        inner = indent + INDENT
+        if isinstance(node, ast.If):
+            yield laid_out(f"if ({self._in_c.condition(node.test).text}) {{", indent)
+            before = self._in_c.assigned
+            yield list(self._block(node.body, inner))
+            after_body, self._in_c.assigned = self._in_c.assigned, before
+            if node.orelse:
+                yield [f"{indent}}} else {{"]
+                yield list(self._block(node.orelse, inner))
+            self._in_c.assigned = _both(after_body, self._in_c.assigned)
+            yield [f"{indent}}}"]
+            return
+        if isinstance(node, ast.While):
+            yield laid_out(f"while ({self._in_c.condition(node.test).text}) {{", indent)
+            before, bound = self._in_c.assigned, []
+        else:
+            changed = set(_stored_names(*node.body))
+            loop = loop_over(self._in_c, node.target, node.iter, changed)
+            for name, _ in loop.bound:
+                if any(name in scope for scope in self._scopes):
+                    raise self._in_c.fail(node, f"{name} has a value already: rename it here")
+            yield [line for text in loop.before for line in laid_out(text, indent)]
+            yield laid_out(loop.head, indent)
+            before, bound = self._in_c.assigned, loop.bound
+        self._scopes.append(set())
+        for name, code in bound:
+            if code.text == in_c(name):
+                self._scopes[-1].add(name)
+                self._in_c.local[name] = code.shape
+                self._note(name)
+            elif name in set(_loaded_names(*node.body)):
+                yield laid_out(self._stored(node, [(name, code)]), inner)
+        yield list(self._block(node.body, inner))
+        self._scopes.pop()
+        self._in_c.assigned = before
+        if self._made.raises:
+            yield [f"{inner}if (error->raised) break;"]
+        yield [f"{indent}}}"]
+
+    def _local_function(self, node: ast.FunctionDef) -> None:
+        """A function within this one, as a function of its own that gets what it captures."""
+        body = ast.Module(node.body, [])
+        inner, captured = self._in_c.inside(body, node.name)
+        for name in captured:
+            if self._assigned[name] > (name not in self._made.arguments):
+                raise self._in_c.fail(node, f"{name}, which {node.name} uses, is changed")
+        given: dict[str, Any] = {a.arg: self._shape(a.annotation) for a in node.args.args}
+        captured = [name for name in captured if name not in given]
+        made = inner.made
+        made.arguments = {**given, **{name: self._in_c.local[name] for name in captured}}
+        nothing = isinstance(node.returns, ast.Constant) and node.returns.value is None
+        made.returns = None if nothing else self._shape(node.returns)
+        inner.local = dict(made.arguments)
+        inner.names = {*made.arguments, *_stored_names(node)}
+        if inner.assigned is not None:
+            inner.assigned = set(made.arguments)
+        inner.functions = dict(self._in_c.functions)
+        _Translation(node, inner, nothing).write()
+        self._in_c.program.functions[made.name] = made
+        self._in_c.functions = {**self._in_c.functions, node.name: (made, captured)}
+        self._note(node.name)
+
+    def _shape(self, annotation: ast.expr | None) -> Shape | None:
+        """The shape that an annotation names."""
+        text = ast.unparse(annotation) if annotation else ""
+        hint: Any = eval(text, self._in_c.scope)
+        try:
+            return None if has_no_size(hint) else self._in_c.program.defined(shape_of(hint))
+        except TypeError as error:
+            raise self._in_c.fail(annotation or self._tree, str(error)) from None
+
+    # Assignments
+
+    def _storing(self, node: ast.Assign | ast.AnnAssign | ast.AugAssign) -> Iterator[str]:
+        if isinstance(node, ast.Assign):
+            yield from self._assignment(node.targets[0], node.value)
+        elif isinstance(node, ast.AnnAssign):
+            assert isinstance(node.target, ast.Name) and node.value is not None
+            code = self._in_c.fitting(node.value, self._shape(node.annotation))
+            yield self._stored(node, [(node.target.id, code)])
+        else:
+            target = ast.Name(ast.unparse(node.target), ast.Load(), lineno=node.lineno)
+            changed = ast.BinOp(target, node.op, node.value, lineno=node.lineno)
+            code = self._in_c.fitting(changed, self._in_c.code(target).shape)
+            yield f"{in_c(target.id)} = {code.text};"
+
     def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         if isinstance(target, ast.Name):
-            code = self._in_c.code(value, self._in_c.local.get(target.id))
-            yield self._stored([(target.id, code)])
+            declared = any(target.id in scope for scope in self._scopes)
+            wanted = self._in_c.local.get(target.id) if declared else None
+            yield self._stored(target, [(target.id, self._in_c.code(value, wanted))])
         elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-            # Python computes all values first, C stores one after the other.
-            for name in sorted(_names(target) & _names(value)):
-                raise self._in_c.fail(target, f"{name} is given and used in one assignment")
+            if len(target.elts) != len(value.elts) or _has_star(value):
+                yield from self._taken_apart_in(target, value)
+                return
             pairs = list(zip(target.elts, value.elts))
-            if all(isinstance(one, ast.Name) for one, _ in pairs):
+            if _names(target) & _names(value):
+                yield from self._at_once(target, pairs)
+            elif all(isinstance(one, ast.Name) for one, _ in pairs):
                 codes = [(ast.unparse(one), self._in_c.code(other)) for one, other in pairs]
-                for alike in _alike(codes):
-                    yield self._stored(alike)
+                for alike in _alike([pair for pair in codes if pair[0] != "_"]):
+                    yield self._stored(target, alike)
             else:
                 for one, other in pairs:
                     yield from self._assignment(one, other)
         else:
-            code = self._in_c.code(value)
-            if not is_dotted_name(value):
-                name = self._name_of_all(target, value)
-                yield self._stored([(name, code)])
-                code = Code(name, code.shape)
-            for alike in _alike(list(self._taken_apart(target, code))):
-                yield self._stored(alike)
+            yield from self._taken_apart_in(target, value)
+
+    def _at_once(self, target: ast.expr, pairs: list[tuple[ast.expr, ast.expr]]) -> Iterator[str]:
+        """Values that are all computed before the first is stored, as Python does."""
+        codes = []
+        for i, (_, value) in enumerate(pairs):
+            code, name = self._in_c.code(value), self._unused(f"next_{i}_{target.lineno}")
+            self._in_c.program.defined(code.shape)
+            yield f"const {_declared(code.shape)}{name} = {code.text};"
+            codes.append(Code(name, code.shape))
+        for (one, _), code in zip(pairs, codes):
+            for alike in _alike(list(self._taken_apart(one, code))):
+                yield self._stored(target, alike)
+
+    def _taken_apart_in(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
+        code = self._in_c.code(value)
+        if not is_dotted_name(value):
+            name = self._name_of_all(target, value)
+            self._in_c.program.defined(code.shape)
+            yield f"const {_declared(code.shape)}{in_c(name)} = {code.text};"
+            code = Code(in_c(name), code.shape)
+        for alike in _alike(list(self._taken_apart(target, code))):
+            yield self._stored(target, alike)
+
+    def _unused(self, name: str) -> str:
+        while name in self._in_c.names:
+            name += "_"
+        self._in_c.names.add(name)
+        return name
 
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
         """A name for what is taken apart: the name of the function it comes from."""
         name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
-        first = next(n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_")
-        taken = name in self._in_c.local or name in self._names
-        return f"{name}_{first}" if taken else name.lstrip("_")
+        first = next((n for n in sorted(_names(target)) if n != "_"), "_")
+        first = next(
+            (n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_"), first
+        )
+        called = {n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name)}
+        taken = name in self._in_c.local or name in called
+        return self._unused(f"{name}_{first}" if taken else name.lstrip("_"))
 
     def _taken_apart(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
         if isinstance(target, ast.Name):
@@ -269,34 +326,123 @@ class _Translation:
         for one, part in zip(target.elts, parts):
             yield from self._taken_apart(one, part)
 
-    def _stored(self, values: list[tuple[str, Code]]) -> str:
+    def _stored(self, node: ast.AST, values: list[tuple[str, Code]]) -> str:
         """The assignment of values of one type, to names that are new or not."""
-        stores = [f"{name} = {code.text}" for name, code in values]
-        if any(name in scope for name, _ in values for scope in self._scopes):
+        stores = [f"{in_c(name)} = {code.text}" for name, code in values]
+        old = [name for name, _ in values if any(name in scope for scope in self._scopes)]
+        for name, code in values:
+            if name in self._hoisted and self._hoisted[name] is None:
+                self._hoisted[name] = self._in_c.local[name] = self._in_c.program.defined(
+                    code.shape
+                )
+            elif name in old and code.shape != self._in_c.local[name]:
+                raise self._in_c.fail(node, self._other(name, code))
+        if old and len(old) < len(values):
+            return " ".join(self._stored(node, [value]) for value in values)
+        for name, _ in values:
+            self._note(name)
+        if old:
             return "; ".join(stores) + ";"
         shape = values[0][1].shape
         for name, code in values:
             self._scopes[-1].add(name)
-            self._in_c.local[name] = self._program.defined(code.shape)
+            self._in_c.local[name] = self._in_c.program.defined(code.shape)
         changes = any(self._assigned[name] > 1 for name, _ in values)
         return f"{'' if changes else 'const '}{_declared(shape)}{', '.join(stores)};"
+
+    def _other(self, name: str, code: Code) -> str:
+        before = self._in_c.local[name]
+        if before == DOUBLE and code.shape in WHOLE:
+            better = f"{code.text}.0" if code.text.isdecimal() else f"float({code.text})"
+            return f"{name} is a float and gets an int: write {better}"
+        return f"{name} is {before.word} and gets {code.shape.word}: use another name"
+
+    def _note(self, name: str) -> None:
+        """A name has a value from here on."""
+        if self._in_c.assigned is not None:
+            self._in_c.assigned = self._in_c.assigned | {name}
 
     def _raised(self, node: ast.Raise) -> str:
         assert isinstance(node.exc, ast.Call)
         self._made.raises = True
         kind, text = self._in_c.known(node.exc.func), node.exc.args[0]
+        if not (isinstance(kind, type) and issubclass(kind, Exception)):
+            raise self._in_c.fail(node, f"{ast.unparse(node.exc.func)} is not an exception")
         form = "" if kind is Refusal else f"{kind.__name__}: "
         arguments = []
         for part in text.values if isinstance(text, ast.JoinedStr) else [text]:
             if isinstance(part, ast.FormattedValue):
-                code = self._in_c.code(part.value)
-                how = "".join(ast.literal_eval(x) for x in getattr(part.format_spec, "values", ()))
-                form += "%s" if code.shape == TEXT else f"%{how}"
-                arguments.append(f"shown({code.text})" if code.shape == DOUBLE else code.text)
+                directive, argument = self._formatted(part)
+                form += directive
+                arguments.append(argument)
             else:
                 form += str(ast.literal_eval(part)).replace("%", "%%")
-        quoted = '"' + form.replace("\\", "\\\\").replace('"', '\\"') + '"'
+        quoted = '"' + form.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
         return f"raise_error({', '.join(['error', quoted, *arguments])});"
+
+    def _formatted(self, part: ast.FormattedValue) -> tuple[str, str]:
+        """A value in a text: its directive for printf, and the argument."""
+        code = self._in_c.code(part.value)
+        how = "".join(ast.literal_eval(x) for x in getattr(part.format_spec, "values", ()))
+        if code.shape == TEXT and not how:
+            return "%s", code.text
+        if code.shape in WHOLE and how in ("", "d"):
+            return "%d", code.text
+        if code.shape in (DOUBLE, *WHOLE) and _FORMAT.fullmatch(how):
+            number = code.text if code.shape == DOUBLE else f"(double)({code.text})"
+            return f"%{how}", f"shown({number})"
+        name = ast.unparse(part.value)
+        raise self._in_c.fail(part.value, f"{{{name}}} in a text: write {{{name}:g}}")
+
+
+def _stored_names(*nodes: ast.AST) -> list[str]:
+    """Names that are given a value, but not in functions and expressions of their own."""
+    found: list[str] = []
+    for node in nodes:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.FunctionDef):
+                found.append(child.name)
+            elif isinstance(child, ast.Name) and isinstance(child.ctx, ast.Store):
+                found.append(child.id)
+            elif not isinstance(child, (ast.GeneratorExp, ast.arguments)):
+                found += _stored_names(child)
+    return found + [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+
+
+def _loaded_names(*nodes: ast.AST) -> list[str]:
+    """Names that are used."""
+    parts = [part for node in nodes for part in ast.walk(node)]
+    names = [n.id for n in parts if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
+    return names + [n.target.id for n in parts if isinstance(n, ast.AugAssign)
+                    and isinstance(n.target, ast.Name)]  # fmt: skip
+
+
+def _always_stored(node: ast.stmt) -> set[str] | None:
+    """Names that a statement gives a value on every way through it; None: none leads through."""
+    if isinstance(node, (ast.Return, ast.Raise, ast.Break, ast.Continue)):
+        return None
+    if isinstance(node, ast.If):
+        return _both(_all_stored(node.body), _all_stored(node.orelse))
+    if isinstance(node, (ast.While, ast.For)):
+        return set()
+    return set(_stored_names(node))
+
+
+def _all_stored(statements: Iterable[ast.stmt]) -> set[str] | None:
+    found: set[str] = set()
+    for statement in statements:
+        stored = _always_stored(statement)
+        if stored is None:
+            return None
+        found |= stored
+    return found
+
+
+def _both(one: set[str] | None, other: set[str] | None) -> set[str] | None:
+    """What is in both; None stands for everything."""
+    if one is None or other is None:
+        return one if other is None else other
+    return one & other
 
 
 def _zero(shape: Shape) -> str:
@@ -305,6 +451,10 @@ def _zero(shape: Shape) -> str:
 
 def _names(node: ast.expr) -> set[str]:
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+
+
+def _has_star(node: ast.Tuple) -> bool:
+    return any(isinstance(element, ast.Starred) for element in node.elts)
 
 
 def _declared(shape: Shape) -> str:

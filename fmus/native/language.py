@@ -13,62 +13,130 @@ from pathlib import Path
 #: Functions of `math` that equations may use.
 MATHEMATICS = frozenset(
     (
-        "asin", "atan", "atan2", "copysign", "cos", "degrees", "exp", "expm1", "log", "log1p",
-        "sin", "sqrt", "tanh",
+        "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
+        "cosh", "degrees", "exp", "expm1", "fabs", "floor", "fmod", "isfinite", "isinf", "isnan",
+        "log", "log10", "log1p", "log2", "pow", "radians", "sin", "sinh", "sqrt", "tan", "tanh",
+        "trunc",
     )
 )  # fmt: skip
 
-#: What else may be called without being imported.
-BUILT_IN = frozenset(("abs",))
+#: Its constants.
+CONSTANTS = frozenset(("e", "inf", "nan", "pi", "tau"))
 
-#: Functions that stand among the equations and are none, with the reason.
+#: What else may be called without being imported.
+BUILT_IN = frozenset(
+    (
+        "abs", "bool", "enumerate", "float", "int", "len", "max", "min", "range", "round", "tuple",
+        "zip", "ArithmeticError", "OverflowError", "ValueError", "ZeroDivisionError",
+    )
+)  # fmt: skip
+
+#: Functions and classes that stand among the equations and are none, with the reason.
 OUTSIDE = {
     "plant.white_noise": "makes the generator of the standard library that has the state",
     "euler.internal_steps": "makes an integer; the runtime in C has a twin, which looks first",
     "closed_loop.closed_loop": "is the generator of instants that all else is checked against",
 }
 
+#: What to write instead of what is outside the language.
+INSTEAD = {
+    "the operator Pow": "write a product, x * x, or math.pow",
+    "a comparison other than of size": "write == or <, or an or of them",
+    "a dict whose keys are not constants": "use a NamedTuple",
+    "a raise without a text": "write raise Refusal(\"...\")",
+    "a while that changes nothing in its condition": "write for _ in range(most): and break",
+    "more names than one for a value": "write one assignment a line",
+    "the name sum": "write v.sum() of a Vector: Python's sum rounds differently from 3.12 on",
+    "the name hypot": "write sqrt(x * x + y * y): Python's hypot has an algorithm of its own",
+    "the name print": "use a debugger, or an output",
+    "the name list": "use a Vector or a tuple",
+    "the name sorted": "use min, max or a loop",
+    "the name any": "write a loop with break, or an or",
+    "the name all": "write a loop with break, or an and",
+    "the name np": "use Vector and Matrix of auv_fmu.linear_algebra",
+    "the name numpy": "use Vector and Matrix of auv_fmu.linear_algebra",
+    "the name random": "use the hooks seed and measured",
+    "an assignment to Attribute": "write x = x._replace(field=...)",
+    "an assignment to Subscript": "write v = v.replaced(k, x)",
+    "Assert": "write if not ...: raise Refusal(\"...\")",
+    "AsyncFunctionDef": "write def",
+    "Delete": "leave it out",
+    "DictComp": "use a NamedTuple",
+    "GeneratorExp": "write it in Vector(...), Matrix(...) or tuple(...)",
+    "Global": "keep it in State",
+    "Import": "import at the top of the file",
+    "ImportFrom": "import at the top of the file",
+    "JoinedStr": "texts are for raise Refusal(f\"...\") only",
+    "Lambda": "write def",
+    "List": "write a tuple, or Vector((...))",
+    "ListComp": "write Vector(... for ...)",
+    "Match": "write if and elif",
+    "NamedExpr": "write the assignment on a line of its own",
+    "Nonlocal": "return the value",
+    "Set": "write a tuple",
+    "SetComp": "write Vector(... for ...)",
+    "Try": "test before: if x <= 0.0",
+    "With": "files and locks are for plain PythonFMU",
+}  # fmt: skip
+
 #: Packages whose functions, tuples and constants equations share.
 _PACKAGES = frozenset(("auv_fmu", "fmus"))
 
-_BASES = frozenset(("NamedTuple", "TypedDict", "ArithmeticError"))
-_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.USub, ast.Not)
+_BASES = frozenset(("NamedTuple", "TypedDict", "ArithmeticError", "IntEnum"))
+_OPERATORS = (
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.MatMult, ast.USub, ast.Not,
+)  # fmt: skip
 _COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 _CONSTANTS = (float, int, bool)
 _MODULE_LEVEL = (ast.Import, ast.ImportFrom, ast.Assign, ast.AnnAssign)
 
+#: What may take an expression with a for.
+_COLLECTIONS = frozenset(("Matrix", "Vector", "tuple"))
+
 
 def foreign(path: Path) -> list[str]:
     """What is outside the language in a module: one line each that an editor can jump to."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    try:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+    except SyntaxError as error:
+        return [f"{path}:{error.lineno}: {error.msg}"]
     return [
-        f"{path}:{line}: {what} is not in the language of equations"
-        for line, what in sorted(_module(tree, path.stem), key=itemgetter(0))
+        f"{path}:{line}: {what} is not in the language of equations{_advice(what)}"
+        for line, what in sorted(_module(tree, path), key=itemgetter(0))
     ]
+
+
+def _advice(what: str) -> str:
+    return f"; {INSTEAD[what]}" if what in INSTEAD else ""
 
 
 _Found = Iterator["tuple[int, str]"]
 
 
-def _module(tree: ast.Module, name: str) -> _Found:
-    known = set(_known(tree))
+def _module(tree: ast.Module, path: Path) -> _Found:
+    known = set(_known(tree, path))
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
-            if f"{name}.{node.name}" not in OUTSIDE:
+            if f"{path.stem}.{node.name}" not in OUTSIDE:
                 yield from _function(node)
                 yield from _names(node, known)
         elif isinstance(node, ast.ClassDef):
-            bases = [base.id for base in node.bases if isinstance(base, ast.Name)]
-            if len(bases) != 1 or bases[0] not in _BASES or node.decorator_list:
-                yield node.lineno, f"the class {node.name}"
-            for part in node.body:
-                if not isinstance(part, ast.AnnAssign) and not _is_text(part):
-                    yield part.lineno, f"{_kind(part)} in the class {node.name}"
+            yield from _class(node)
         elif not isinstance(node, _MODULE_LEVEL) and not _is_text(node):
             yield node.lineno, f"{_kind(node)} at the level of the module"
 
 
-def _known(tree: ast.Module) -> Iterator[str]:
+def _class(node: ast.ClassDef) -> _Found:
+    bases = [base.id for base in node.bases if isinstance(base, ast.Name)]
+    if len(bases) != 1 or bases[0] not in _BASES or node.decorator_list:
+        yield node.lineno, f"the class {node.name}"
+    wanted = ast.Assign if bases == ["IntEnum"] else ast.AnnAssign
+    for part in node.body:
+        if not isinstance(part, wanted) and not _is_text(part):
+            yield part.lineno, f"{_kind(part)} in the class {node.name}"
+
+
+def _known(tree: ast.Module, path: Path) -> Iterator[str]:
     """Names that a module's functions may use."""
     yield from BUILT_IN
     for node in tree.body:
@@ -76,22 +144,49 @@ def _known(tree: ast.Module) -> Iterator[str]:
             yield node.name
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
-            yield from (target.id for target in targets if isinstance(target, ast.Name))
+            names = [n for target in targets for n in ast.walk(target)]
+            yield from (name.id for name in names if isinstance(name, ast.Name))
+        elif isinstance(node, ast.Import):
+            yield from ("math" for alias in node.names if alias.name == "math")
         elif isinstance(node, ast.ImportFrom):
-            names = {alias.asname or alias.name for alias in node.names}
+            names_in = {alias.name: alias.asname or alias.name for alias in node.names}
+            package = str(node.module).split(".")[0]
             if node.module == "math":
-                yield from names & MATHEMATICS
-            elif str(node.module).split(".")[0] in _PACKAGES:
-                yield from names
+                allowed = MATHEMATICS | CONSTANTS
+                yield from (own for name, own in names_in.items() if name in allowed)
+            elif package in _PACKAGES or _lies_beside(path, package):
+                yield from names_in.values()
+
+
+def _lies_beside(path: Path, module: str) -> bool:
+    return path.with_name(f"{module}.py").is_file() or path.with_name(module).is_dir()
 
 
 def _names(function: ast.FunctionDef, known: set[str]) -> _Found:
-    names = [n for s in function.body for n in ast.walk(s) if isinstance(n, ast.Name)]
-    local = {name.id for name in names if isinstance(name.ctx, ast.Store)}
-    local |= {argument.arg for argument in function.args.args}
-    for name in names:
-        if name.id not in known | local:
+    local = set(known)
+    used: list[ast.Name] = []
+    for node in ast.walk(function):
+        if isinstance(node, ast.FunctionDef):
+            local |= {node.name, *(argument.arg for argument in node.args.args)}
+        elif isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
+            local.add(node.id)
+    for statement in function.body:
+        used += _used(statement)
+    for name in used:
+        if name.id not in local:
             yield name.lineno, f"the name {name.id}"
+
+
+def _used(node: ast.AST) -> Iterator[ast.Name]:
+    """Names in code, but not in annotations."""
+    for field, value in ast.iter_fields(node):
+        if field in ("annotation", "returns"):
+            continue
+        for part in value if isinstance(value, list) else [value]:
+            if isinstance(part, ast.Name):
+                yield part
+            if isinstance(part, ast.AST):
+                yield from _used(part)
 
 
 def _function(node: ast.FunctionDef) -> _Found:
@@ -108,22 +203,45 @@ def _block(statements: list[ast.stmt]) -> _Found:
     for node in statements:
         if isinstance(node, ast.Return) and node.value is not None:
             yield from _expression(node.value)
-        elif isinstance(node, ast.Assign) and len(node.targets) == 1:
+        elif isinstance(node, ast.Assign):
+            if len(node.targets) != 1:
+                yield node.lineno, "more names than one for a value"
             yield from _target(node.targets[0])
             yield from _expression(node.value)
-        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+        elif isinstance(node, ast.AnnAssign) and node.value is not None:
+            yield from _target(node.target)
+            yield from _expression(node.value)
+        elif isinstance(node, ast.AugAssign):
+            yield from _target(node.target)
             yield from _expression(ast.BinOp(node.target, node.op, node.value, lineno=node.lineno))
-        elif isinstance(node, (ast.If, ast.While)) and not (
-            isinstance(node, ast.While) and node.orelse
-        ):
-            yield from _expression(node.test)
-            yield from _block([*node.body, *node.orelse])
+        elif isinstance(node, (ast.If, ast.While, ast.For, ast.FunctionDef)):
+            yield from _compound(node)
         elif isinstance(node, ast.Raise):
             yield from _raised(node)
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             yield from _expression(node.value)
-        elif not _is_text(node):
+        elif not isinstance(node, (ast.Break, ast.Continue, ast.Pass)) and not _is_text(node):
             yield node.lineno, _kind(node)
+
+
+def _compound(node: ast.If | ast.While | ast.For | ast.FunctionDef) -> _Found:
+    if isinstance(node, ast.FunctionDef):
+        yield from _function(node)
+        return
+    if isinstance(node, ast.For):
+        yield from _target(node.target)
+        yield from _expression(node.iter)
+    else:
+        yield from _expression(node.test)
+    if isinstance(node, ast.While):
+        names = {n.id for n in ast.walk(node.test) if isinstance(n, ast.Name)}
+        inside = [n for statement in node.body for n in ast.walk(statement)]
+        stored = {n.id for n in inside if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+        if not names & stored:
+            yield node.lineno, "a while that changes nothing in its condition"
+    if node.orelse and not isinstance(node, ast.If):
+        yield node.orelse[0].lineno, f"else of a {_kind(node).lower()}"
+    yield from _block([*node.body, *node.orelse])
 
 
 def _target(node: ast.expr) -> _Found:
@@ -151,7 +269,7 @@ def _raised(node: ast.Raise) -> _Found:
 #: What expressions consist of.
 _EXPRESSIONS = (
     ast.Constant, ast.Name, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Tuple,
-    ast.Dict, ast.Attribute, ast.Starred, ast.Subscript, ast.Call,
+    ast.Dict, ast.Attribute, ast.Starred, ast.Subscript, ast.Slice, ast.Call,
 )  # fmt: skip
 
 
@@ -159,9 +277,31 @@ def _expression(node: ast.expr) -> _Found:
     wrong = _wrong(node) if isinstance(node, _EXPRESSIONS) else _kind(node)
     if wrong:
         yield node.lineno, wrong
-    for part in ast.iter_child_nodes(node):
+    for part in _parts(node):
         if isinstance(part, ast.expr) and isinstance(node, _EXPRESSIONS):
             yield from _expression(part)
+
+
+def _parts(node: ast.expr) -> Iterator[ast.AST]:
+    """The expressions that an expression consists of."""
+    if not isinstance(node, ast.Call):
+        yield from ast.iter_child_nodes(node)
+        return
+    yield node.func
+    called = ast.unparse(node.func).rpartition(".")[2]
+    for part in (*node.args, *(keyword.value for keyword in node.keywords)):
+        if called in _COLLECTIONS and isinstance(part, ast.GeneratorExp):
+            yield from _comprehension(part)
+        else:
+            yield part
+
+
+def _comprehension(node: ast.GeneratorExp) -> Iterator[ast.AST]:
+    yield from (generator.iter for generator in node.generators)
+    if isinstance(node.elt, ast.GeneratorExp):
+        yield from _comprehension(node.elt)
+    else:
+        yield node.elt
 
 
 def _wrong(node: ast.expr) -> str | None:
@@ -173,13 +313,19 @@ def _wrong(node: ast.expr) -> str | None:
         wrong = f"the operator {_kind(node.op)}"
     elif isinstance(node, ast.Compare) and not all(isinstance(o, _COMPARISONS) for o in node.ops):
         wrong = "a comparison other than of size"
-    elif isinstance(node, ast.Subscript) and isinstance(node.slice, (ast.Slice, ast.Tuple)):
-        wrong = "a subscript for more than one element"
     elif isinstance(node, ast.Dict) and not all(isinstance(k, ast.Constant) for k in node.keys):
         wrong = "a dict whose keys are not constants"
-    elif isinstance(node, ast.Call) and node.keywords:
-        wrong = "a call with names of arguments"
+    elif isinstance(node, ast.Call) and any(keyword.arg is None for keyword in node.keywords):
+        wrong = "a call with **"
+    elif _is_of_math(node):
+        wrong = f"the name {ast.unparse(node)}"
     return wrong
+
+
+def _is_of_math(node: ast.expr) -> bool:
+    """Whether a name is one of `math` that equations may not use."""
+    is_of_it = isinstance(node, ast.Attribute) and ast.unparse(node.value) == "math"
+    return is_of_it and ast.unparse(node)[5:] not in MATHEMATICS | CONSTANTS
 
 
 def _is_text(node: ast.stmt) -> bool:

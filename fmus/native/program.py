@@ -1,131 +1,35 @@
-"""What a set of functions needs in C: the shapes of its types, structures, constants, functions.
-
-A shape is what a type is in C: a number, or a structure of them.
-"""
+"""What a set of functions needs in C: structures, constants and functions, in their order."""
 
 from __future__ import annotations
 
-import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from math import isinf, isnan
+from pathlib import Path
 from types import FunctionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from typing import Any
 
-from auv_fmu import vectors
+from auv_fmu.arrays import Matrix, Vector
+from fmus.native.shapes import (
+    BOOLEAN,
+    DOUBLE,
+    INTEGER,
+    Scalar,
+    Shape,
+    declaration,
+    has_no_size,
+    hints_of,
+    inner_structures,
+    matrix,
+    shape_of,
+    structure,
+    vector,
+)
 
-
-@dataclass(frozen=True)
-class Scalar:
-    """A number, or a text of a refusal."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class Structure:
-    """A tuple: an array `v` where its elements are alike, else one member an element.
-
-    Attributes:
-        name: of the structure in C.
-        parts: how each element is written after a name, and its shape.
-        made: the NamedTuple or TypedDict; None: a plain tuple.
-
-    """
-
-    name: str
-    parts: tuple[tuple[str, Shape], ...]
-    made: Any = None
-
-    @property
-    def is_array(self) -> bool:
-        """Whether its elements stand in an array."""
-        return bool(self.parts) and self.parts[0][0] == ".v[0]"
-
-
-Shape = Union[Scalar, Structure]
-
-DOUBLE, INTEGER, TEXT = Scalar("double"), Scalar("int"), Scalar("const char *")
-
-_SCALARS = {float: DOUBLE, int: INTEGER, bool: INTEGER, str: TEXT}
-
-#: Names of tuples that the equations have given them.
-_NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
-
-
-def shape_of(hint: Any) -> Shape:
-    """What a type is in C.
-
-    Raises:
-        TypeError: it is nothing there.
-
-    """
-    if hint in _SCALARS:
-        return _SCALARS[hint]
-    if get_origin(hint) is tuple:
-        return structure([shape_of(part) for part in get_args(hint)], _NAMES.get(hint))
-    if isinstance(hint, type) and hasattr(hint, "__annotations__"):
-        hints = get_type_hints(hint)
-        parts = tuple((f".{name}", shape_of(part)) for name, part in hints.items())
-        return Structure(hint.__name__, parts, hint)
-    raise TypeError(f"{hint} is not a type in the language of equations")
-
-
-def structure(items: list[Shape], name: str | None = None) -> Structure:
-    """The structure of a plain tuple."""
-    if all(item == items[0] for item in items):
-        first = items[0]
-        own = f"Vector{len(items)}" if first == DOUBLE else f"{first.name}x{len(items)}"
-        return Structure(name or own, tuple((f".v[{i}]", item) for i, item in enumerate(items)))
-    joined = "_".join(item.name for item in items)
-    return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
-
-
-def count_numbers(shape: Shape) -> int:
-    """How many numbers a shape holds.
-
-    Raises:
-        TypeError: some of them are not doubles.
-
-    """
-    if isinstance(shape, Structure):
-        return sum(count_numbers(part) for _, part in shape.parts)
-    if shape != DOUBLE:
-        raise TypeError(f"{shape.name} among numbers")
-    return 1
-
-
-def inner_structures(shape: Shape) -> Iterator[Structure]:
-    """The structures that a structure needs, and itself after them."""
-    if isinstance(shape, Structure):
-        for _, part in shape.parts:
-            yield from inner_structures(part)
-        yield shape
-
-
-def declaration(shape: Structure) -> str:
-    """The definition of a structure, with the comments of a class."""
-    about = _comments(shape.made)
-    members = [f"{part.name} {suffix[1:]};{about.get(suffix, '')}" for suffix, part in shape.parts]
-    if shape.is_array:
-        members = [f"{shape.parts[0][1].name} v[{len(members)}];"]
-    lines = [f"    {line}" for line in members or ["char nothing; /* C has no empty structure */"]]
-    text = inspect.cleandoc(shape.made.__doc__).splitlines()[0] if shape.made else ""
-    head = f"/* {strip_sphinx_marks(text)} */\n" if text else ""
-    return head + "\n".join(["typedef struct {", *lines, f"}} {shape.name};"])
-
-
-def _comments(made: Any) -> dict[str, str]:
-    """What `#:` says of the fields of a class, as comments."""
-    if made is None:
-        return {}
-    found = re.findall(r"^    (\w+):.*#: (.*)$", inspect.getsource(made), re.MULTILINE)
-    return {f".{name}": f" /* {strip_sphinx_marks(text)} */" for name, text in found}
-
-
-def strip_sphinx_marks(text: str) -> str:
-    """Take the marks that Sphinx reads out of a text."""
-    return re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text).replace("*/", "* /")
+#: What all components share in C.
+RUNTIME = Path(__file__).parent / "runtime"
 
 
 class Untranslatable(Exception):
@@ -134,7 +38,16 @@ class Untranslatable(Exception):
 
 @dataclass
 class Function:
-    """A function in C."""
+    """A function in C.
+
+    Attributes:
+        name: in C.
+        arguments: by their names.
+        returns: None: nothing, or what its first `return` shows.
+        raises: whether it has an argument `error`.
+        text: in C.
+
+    """
 
     name: str
     arguments: dict[str, Shape]
@@ -142,7 +55,7 @@ class Function:
     raises: bool = False
     text: str = ""
 
-    def call(self, arguments: list[str]) -> str:
+    def call(self, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
         return f"{self.name}({', '.join([*arguments, *(['error'] if self.raises else [])])})"
 
@@ -151,22 +64,30 @@ class Program:
     """All that a set of functions needs: structures, constants and functions in C.
 
     Attributes:
-        structures, constants, functions: their texts, each after what it needs.
+        structures, constants: their texts, by their names.
+        functions: by what they were made from.
 
     """
 
-    def __init__(self, translate: Callable[[Program, FunctionType], Function]) -> None:
+    def __init__(self, translate: Callable[[Program, FunctionType, Function], None]) -> None:
         """Begin with nothing.
 
         Args:
-            translate: makes a function of C.
+            translate: fills in the text of a function.
 
         """
         self._translate = translate
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
-        self.functions: dict[FunctionType, Function] = {}
-        self._begun: set[FunctionType] = set()
+        self.functions: dict[Hashable, Function] = {}
+        self._begun: set[Hashable] = set()
+        self._owners: dict[str, Hashable] = {}
+
+    def name(self, owner: Hashable, name: str) -> str:
+        """A name in C that only its owner has."""
+        while name in _taken() or self._owners.setdefault(name, owner) != owner:
+            name += "_"
+        return name
 
     def shape(self, hint: Any) -> Shape:
         """What a type is in C; its structures are defined."""
@@ -180,29 +101,111 @@ class Program:
                 raise Untranslatable(f"two structures have the name {part.name}")
         return shape
 
-    def constant(self, name: str, value: Any) -> Shape:
-        """The shape of a number, or of a tuple of numbers, that stands in a module."""
-        if isinstance(value, tuple):
-            shape: Shape = self.defined(structure([DOUBLE] * len(value)))
-            text = "{{" + ", ".join(repr(float(x)) for x in value) + "}}"
-        elif type(value) in (float, int):
-            shape = DOUBLE if type(value) is float else INTEGER
-            text = repr(value)
-        else:
-            raise Untranslatable(f"{name} is not a number")
-        self.constants.setdefault(name, f"static const {shape.name} {name} = {text};")
-        return shape
+    def constant(self, module: str, name: str, value: Any) -> tuple[str, Shape]:
+        """The name in C and the shape of what stands in a module: numbers, or tuples of them."""
+        value = _evened(value)
+        shape = self.defined(_shape_of_value(value, name))
+        given = self.name(("constant", module, name), c_name(module, name))
+        self.constants.setdefault(given, f"static const {shape.name} {given} = {_literal(value)};")
+        return given, shape
 
-    def function(self, function: FunctionType) -> Function:
-        """A function in C, after the functions that it calls."""
-        if function not in self.functions:
-            if function in self._begun:
-                raise Untranslatable(f"{function.__name__} calls itself")
-            self._begun.add(function)
-            self.functions[function] = self._translate(self, function)
-        return self.functions[function]
+    def function(self, function: FunctionType, shapes: Sequence[Shape] = ()) -> Function:
+        """A function in C, after the functions that it calls.
+
+        Args:
+            function: of the equations.
+            shapes: of its arguments, of which some may be vectors of any size.
+
+        """
+        hints = hints_of(function)
+        returns = hints.pop("return", None)
+        unsized = any(map(has_no_size, hints.values()))
+        key = (function, *shapes) if unsized else function
+        if key in self.functions:
+            return self.functions[key]
+        if key in self._begun:
+            raise Untranslatable(f"{function.__name__} calls itself")
+        self._begun.add(key)
+        arguments = {
+            name: shapes[i] if has_no_size(hint) and i < len(shapes) else self.shape(hint)
+            for i, (name, hint) in enumerate(hints.items())
+        }
+        name = c_name(function.__module__, function.__name__)
+        if unsized:
+            name = "_".join([name, *(shape.name for shape in arguments.values())])
+        known = returns is None or returns is type(None) or not has_no_size(returns)
+        nothing = returns in (None, type(None))
+        shape = self.shape(returns) if known and not nothing else None
+        made = Function(self.name(key, name), arguments, shape)
+        self._translate(self, function, made)
+        self.functions[key] = made
+        return made
+
+    def helper(self, name: str, arguments: dict[str, Shape], returns: Shape, body: str) -> Function:
+        """A function that is written in C, made once; it raises if it uses DIV or PLACE."""
+        if name not in self.functions:
+            self.defined(returns)
+            raises = "DIV(" in body or "PLACE(" in body
+            made = Function(name, arguments, returns, raises)
+            given = [f"{self.defined(shape).name} {a}" for a, shape in arguments.items()]
+            given += ["Error *error"] if made.raises else []
+            made.text = f"static {returns.name} {name}({', '.join(given)}) {{\n{body}\n}}"
+            self.functions[name] = made
+        return self.functions[name]
+
+
+@cache
+def _taken() -> frozenset[str]:
+    """Names of the runtime, which equations cannot have for their functions and constants."""
+    texts = [path.read_text(encoding="utf-8") for path in sorted(RUNTIME.glob("*.[ch]"))]
+    code = re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
+    return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", code))
 
 
 def c_name(module: str, name: str) -> str:
     """The name of something in C, where names of several modules stand side by side."""
     return f"{module.rsplit('.', maxsplit=1)[-1]}_{name.lstrip('_')}"
+
+
+def _evened(value: Any) -> Any:
+    """A constant, in which ints beside floats in a tuple are floats, as they are in arithmetic."""
+    if type(value) is tuple:
+        kinds = set(map(type, value))
+        return tuple(map(float, value)) if kinds == {int, float} else tuple(map(_evened, value))
+    return value
+
+
+def _shape_of_value(value: Any, name: str) -> Shape:
+    if isinstance(value, Vector):
+        return vector(len(value))
+    if isinstance(value, Matrix):
+        return matrix(len(value), len(value[0]) if value else 0)
+    if isinstance(value, tuple) and hasattr(value, "_fields"):
+        return shape_of(type(value))
+    if isinstance(value, tuple) and value:
+        return structure([_shape_of_value(part, name) for part in value])
+    scalars: dict[type, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN}
+    if type(value) in scalars:
+        return scalars[type(value)]
+    if isinstance(value, int):
+        return INTEGER  # a member of an enumeration
+    raise Untranslatable(f"{name} is not a number, nor a tuple of numbers")
+
+
+def _literal(value: Any) -> str:
+    if isinstance(value, tuple):
+        parts = ", ".join(map(_literal, value))
+        is_record = hasattr(value, "_fields") or len({type(part) for part in value}) > 1
+        return f"{{{parts}}}" if is_record else f"{{{{{parts}}}}}"
+    return number_in_c(value)
+
+
+def number_in_c(value: float) -> str:
+    """A number in C."""
+    if isinstance(value, float):
+        if isnan(value):
+            return "NAN"
+        if isinf(value):
+            return "INFINITY" if value > 0.0 else "-INFINITY"
+        return repr(value)
+    return str(int(value))

@@ -7,8 +7,10 @@ from functools import cache
 from textwrap import wrap
 
 from auv_fmu import euler
-from fmus.native.functions import LINE_WIDTH, function_in_c, laid_out
-from fmus.native.program import Function, Program, Structure, count_numbers
+from fmus.native.functions import function_in_c
+from fmus.native.layout import LINE_WIDTH, laid_out
+from fmus.native.program import Function, Program
+from fmus.native.shapes import Structure, count_numbers
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.port import FAULT, H_MAX, Port, Value

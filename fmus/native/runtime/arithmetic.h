@@ -16,9 +16,11 @@
 #pragma fp_contract(off)
 #endif
 
+#include <limits.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 
 /* Bytes of the text of an error. */
 enum { WHY = 512 };
@@ -67,16 +69,16 @@ static inline double arcsine(double x, Error *error) {
     return asin(x);
 }
 
-static inline double exponential(double x, Error *error) {
-    double y = exp(x);
+/* A result that is infinite for a finite argument is out of range. */
+static inline double bounded_result(double x, double y, Error *error) {
     if (isinf(y) && !isinf(x)) raise_error(error, "OverflowError: math range error");
     return y;
 }
 
+static inline double exponential(double x, Error *error) { return bounded_result(x, exp(x), error); }
+
 static inline double exponential_m1(double x, Error *error) {
-    double y = expm1(x);
-    if (isinf(y) && !isinf(x)) raise_error(error, "OverflowError: math range error");
-    return y;
+    return bounded_result(x, expm1(x), error);
 }
 
 static inline double logarithm(double x, Error *error) {
@@ -87,6 +89,140 @@ static inline double logarithm(double x, Error *error) {
 static inline double logarithm_1p(double x, Error *error) {
     if (x <= -1.0) raise_domain_error(error);
     return log1p(x);
+}
+
+static inline double tangent(double x, Error *error) {
+    if (isinf(x)) raise_domain_error(error);
+    return tan(x);
+}
+
+static inline double arccosine(double x, Error *error) {
+    if (x < -1.0 || x > 1.0) raise_domain_error(error);
+    return acos(x);
+}
+
+static inline double hyperbolic_cosine(double x, Error *error) {
+    return bounded_result(x, cosh(x), error);
+}
+
+static inline double hyperbolic_sine(double x, Error *error) {
+    return bounded_result(x, sinh(x), error);
+}
+
+static inline double inverse_cosh(double x, Error *error) {
+    if (x < 1.0) raise_domain_error(error);
+    return acosh(x);
+}
+
+static inline double inverse_tanh(double x, Error *error) {
+    if (x <= -1.0 || x >= 1.0) raise_domain_error(error);
+    return atanh(x);
+}
+
+static inline double logarithm_2(double x, Error *error) {
+    if (x <= 0.0) raise_domain_error(error);
+    return log2(x);
+}
+
+static inline double logarithm_10(double x, Error *error) {
+    if (x <= 0.0) raise_domain_error(error);
+    return log10(x);
+}
+
+static inline double power(double x, double y, Error *error) {
+    double z = pow(x, y);
+    if (isfinite(x) && isfinite(y) && !isfinite(z)) {
+        if (isnan(z) || x == 0.0) raise_domain_error(error);
+        raise_error(error, "OverflowError: math range error");
+    }
+    return z;
+}
+
+static inline double remainder_of(double x, double y, Error *error) {
+    double z = isinf(y) && !isinf(x) ? x : fmod(x, y);
+    if (isnan(z) && !isnan(x) && !isnan(y)) raise_domain_error(error);
+    return z;
+}
+
+/* Python's x % y: it has the sign of y. */
+static inline double modulo(double x, double y, Error *error) {
+    double z;
+    if (y == 0.0) {
+        raise_error(error, "ZeroDivisionError: float modulo");
+        return x;
+    }
+    z = fmod(x, y);
+    if (z == 0.0) return copysign(0.0, y);
+    return (y < 0.0) != (z < 0.0) ? z + y : z;
+}
+
+/* Python's x // y. */
+static inline double floor_quotient(double x, double y, Error *error) {
+    double z, n, whole;
+    if (y == 0.0) {
+        raise_error(error, "ZeroDivisionError: float floor division by zero");
+        return x;
+    }
+    z = fmod(x, y);
+    n = (x - z) / y;
+    if (z != 0.0 && (y < 0.0) != (z < 0.0)) n -= 1.0;
+    if (n == 0.0) return copysign(0.0, x / y);
+    whole = floor(n);
+    return n - whole > 0.5 ? whole + 1.0 : whole;
+}
+
+/* Integers. Python's have no limit, these have 32 bits: what exceeds them is an error. */
+
+static inline int integer(long long k, Error *error) {
+    if (k >= INT_MIN && k <= INT_MAX) return (int)k;
+    raise_error(error, "OverflowError: an integer exceeds 32 bits");
+    return 0;
+}
+
+/* A float without a fraction as an integer. */
+static inline int integer_of(double x, Error *error) {
+    if (x >= INT_MIN && x <= INT_MAX) return (int)x;
+    raise_error(error, isnan(x)   ? "ValueError: cannot convert float NaN to integer"
+                       : isinf(x) ? "OverflowError: cannot convert float infinity to integer"
+                                  : "OverflowError: an integer exceeds 32 bits");
+    return 0;
+}
+
+static inline double integer_quotient(int a, int b, Error *error) {
+    if (b == 0) raise_error(error, "ZeroDivisionError: division by zero");
+    return (double)a / b;
+}
+
+static inline int floor_integer_quotient(int a, int b, Error *error) {
+    long long n;
+    if (b == 0) {
+        raise_error(error, "ZeroDivisionError: integer division or modulo by zero");
+        return 0;
+    }
+    n = (long long)a / b;
+    return integer(n * b != a && (a < 0) != (b < 0) ? n - 1 : n, error);
+}
+
+static inline int integer_modulo(int a, int b, Error *error) {
+    long long z;
+    if (b == 0) {
+        raise_error(error, "ZeroDivisionError: integer modulo by zero");
+        return 0;
+    }
+    z = (long long)a % b;
+    return (int)(z != 0 && (z < 0) != (b < 0) ? z + b : z);
+}
+
+/* The smaller and the larger: the first one, unless the second is beyond it. */
+static inline double smaller(double a, double b) { return b < a ? b : a; }
+static inline double larger(double a, double b) { return b > a ? b : a; }
+static inline int smaller_integer(int a, int b) { return b < a ? b : a; }
+static inline int larger_integer(int a, int b) { return b > a ? b : a; }
+
+/* To the nearest integer, and from the middle to the even one. */
+static inline double nearest(double x) {
+    double y = round(x);
+    return fabs(x - y) == 0.5 ? 2.0 * round(x / 2.0) : y;
 }
 
 /* A place in an array of n elements; negative ones count from its end. */
@@ -107,5 +243,26 @@ static inline int place_in(int i, int n, Error *error) {
 #define EXPM1(x) exponential_m1(x, error)
 #define LOG(x) logarithm(x, error)
 #define LOG1P(x) logarithm_1p(x, error)
+#define LOG2(x) logarithm_2(x, error)
+#define LOG10(x) logarithm_10(x, error)
+#define TAN(x) tangent(x, error)
+#define ACOS(x) arccosine(x, error)
+#define COSH(x) hyperbolic_cosine(x, error)
+#define SINH(x) hyperbolic_sine(x, error)
+#define ACOSH(x) inverse_cosh(x, error)
+#define ATANH(x) inverse_tanh(x, error)
+#define POW(x, y) power(x, y, error)
+#define FMOD(x, y) remainder_of(x, y, error)
+#define MOD(a, b) modulo(a, b, error)
+#define FLOORDIV(a, b) floor_quotient(a, b, error)
+#define ADD(a, b) integer((long long)(a) + (b), error)
+#define SUB(a, b) integer((long long)(a) - (b), error)
+#define MUL(a, b) integer((long long)(a) * (b), error)
+#define NEG(k) integer(-(long long)(k), error)
+#define ABS(k) integer(llabs(k), error)
+#define INT_OF(x) integer_of(x, error)
+#define INT_DIV(a, b) integer_quotient(a, b, error)
+#define INT_FLOORDIV(a, b) floor_integer_quotient(a, b, error)
+#define INT_MOD(a, b) integer_modulo(a, b, error)
 
 #endif

@@ -1,0 +1,153 @@
+"""What a `for` of the language of equations runs over, in C."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from fmus.native.expressions import Code, Expressions, is_dotted_name
+from fmus.native.shapes import INTEGER, Structure, in_c
+
+
+class Loop(NamedTuple):
+    """The beginning of a loop.
+
+    Attributes:
+        before: what is computed before it: declarations.
+        head: with the open brace.
+        bound: names that get a value in each turn, and the value.
+        turns: how often it runs; None: that is not known before.
+
+    """
+
+    before: list[str]
+    head: str
+    bound: list[tuple[str, Code]]
+    turns: int | None
+
+
+def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed: set[str]) -> Loop:
+    """The loop over something.
+
+    Args:
+        within: translates expressions of the function.
+        target: what gets the values.
+        iterable: what they come from.
+        changed: names that the body changes.
+
+    Raises:
+        Untranslatable: it is nothing that a loop can run over.
+
+    """
+    for name in sorted({n.id for n in ast.walk(target) if isinstance(n, ast.Name)} & changed):
+        raise within.fail(target, f"{name} is the loop's own and cannot be changed in it")
+    if _called(within, iterable) is range:
+        assert isinstance(iterable, ast.Call)
+        return _range(within, target, iterable)
+    before: list[str] = []
+    first = next((n.id for n in ast.walk(target) if isinstance(n, ast.Name)), "x")
+    items = _Items(within, before, changed, f"{first.lstrip('_')}_")
+    place = Code(items.unused("at"), INTEGER)
+    bound, count = items.taken(target, iterable, place)
+    head = f"for (int {place.text} = 0; {place.text} < {count}; {place.text}++) {{"
+    return Loop(before, head, bound, count)
+
+
+def _called(within: Expressions, node: ast.expr) -> object:
+    return within.known(node.func) if isinstance(node, ast.Call) else None
+
+
+def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
+    if not isinstance(target, ast.Name):
+        raise within.fail(target, "more than one name for the numbers of a range")
+    arguments = [within.integer(argument, "a bound of a range") for argument in call.args]
+    if len(arguments) == 1:
+        arguments = [Code("0", INTEGER), *arguments]
+    first, stop, step = [*arguments, Code("1", INTEGER)][:3]
+    numbers = [_number(code.text) for code in (first, stop, step)]
+    if not numbers[2]:
+        raise within.fail(call, "a step of a range that is not a constant other than 0")
+    name = in_c(target.id)
+    before = []
+    if numbers[1] is None:
+        before = [f"const int {name}_stop = {stop.text};"]
+        stop = Code(f"{name}_stop", INTEGER)
+    sign = "<" if numbers[2] > 0 else ">"
+    known = None if None in numbers else len(range(*numbers))  # type: ignore[arg-type]
+    if known is None and abs(numbers[2]) > 1:
+        # The counter may pass the largest int.
+        head = f"for (long long {name}_at = {first.text}; {name}_at {sign} {stop.text}; "
+        head += f"{name}_at += {step.text}) {{"
+        return Loop(before, head, [(target.id, Code(f"(int){name}_at", INTEGER))], None)
+    change = {1: "++", -1: "--"}.get(numbers[2], f" += {step.text}")
+    head = f"for (int {name} = {first.text}; {name} {sign} {stop.text}; {name}{change}) {{"
+    return Loop(before, head, [(target.id, Code(name, INTEGER))], known)
+
+
+def _number(text: str) -> int | None:
+    return int(text) if text.removeprefix("-").isdecimal() else None
+
+
+class _Items:
+    """Takes the items of what a loop runs over apart."""
+
+    def __init__(
+        self, within: Expressions, before: list[str], changed: set[str], prefix: str
+    ) -> None:
+        self._within, self._before, self._changed = within, before, changed
+        self._prefix = prefix
+
+    def unused(self, word: str) -> str:
+        """A name that the function does not have."""
+        name = f"{self._prefix}{word}"
+        while name in self._within.names or f"{name} =" in " ".join(self._before):
+            name += "_"
+        return name
+
+    def taken(
+        self, target: ast.expr, iterable: ast.expr, place: Code
+    ) -> tuple[list[tuple[str, Code]], int]:
+        """Names with their values at a place, and how many places there are."""
+        called = _called(self._within, iterable)
+        if called is zip or called is enumerate:
+            assert isinstance(iterable, ast.Call)
+            if not isinstance(target, ast.Tuple) or iterable.keywords:
+                raise self._within.fail(target, f"{called.__name__} without a name for each part")
+            if called is enumerate:
+                first, second = target.elts
+                bound, count = self.taken(second, iterable.args[0], place)
+                return [*self._bound(first, place), *bound], count
+            if len(target.elts) != len(iterable.args):
+                raise self._within.fail(target, "another number of names than zip has parts")
+            pairs = [self.taken(t, i, place) for t, i in zip(target.elts, iterable.args)]
+            return [one for bound, _ in pairs for one in bound], min(n for _, n in pairs)
+        code = self._named(iterable, self._within.code(iterable))
+        if not isinstance(code.shape, Structure) or not code.shape.is_array:
+            raise self._within.fail(
+                iterable, "a loop over something other than a range, vector or tuple of one type"
+            )
+        item = Code(f"{code.text}.v[{place.text}]", code.shape.parts[0][1])
+        return list(self._bound(target, item)), len(code.shape.parts)
+
+    def _bound(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
+        if isinstance(target, ast.Name):
+            if target.id != "_":
+                yield target.id, code
+            return
+        assert isinstance(target, ast.Tuple)
+        parts = self._within.parts(target, code)
+        if len(parts) != len(target.elts):
+            raise self._within.fail(target, f"{len(target.elts)} names for {len(parts)} values")
+        for one, part in zip(target.elts, parts):
+            yield from self._bound(one, part)
+
+    def _named(self, node: ast.expr, code: Code) -> Code:
+        """The same, in a variable if it is no name, or if the body gives the name another value."""
+        root = next((n.id for n in ast.walk(node) if isinstance(n, ast.Name)), "")
+        if is_dotted_name(node) and root not in self._changed:
+            return code
+        name = self.unused("all")
+        self._within.program.defined(code.shape)
+        self._before.append(f"const {code.shape.name} {name} = {code.text};")
+        return Code(name, code.shape)

@@ -1,0 +1,208 @@
+"""Functions of the language of equations in both languages, side by side, bit for bit."""
+
+from __future__ import annotations
+
+import importlib.util
+import subprocess
+import sys
+from collections.abc import Sequence
+from ctypes import CDLL, POINTER, c_char, c_double, c_int, create_string_buffer
+from dataclasses import dataclass
+from enum import IntEnum
+from math import isnan
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any, get_type_hints
+
+from auv_fmu.arrays import Matrix, Vector
+from fmus.native.functions import function_in_c
+from fmus.native.language import CONSTANTS, MATHEMATICS
+from fmus.native.program import RUNTIME, Function, Program
+from fmus.native.shapes import DOUBLE, Shape, Structure, hints_of, shape_of
+from fmus.ports.port import Refusal
+
+#: As FMUs are compiled, with every warning an error.
+FLAGS = (
+    "-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-function",
+    "-ffp-contract=off", "-fPIC", "-shared",
+)  # fmt: skip
+
+#: What a test module begins with.
+HEAD = f"""\
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from math import isnan
+from math import {", ".join(sorted(MATHEMATICS | CONSTANTS))}
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector, interpolate, solve
+from fmus.ports.port import Refusal
+
+"""
+
+_WHY = 512
+
+_INCLUDES = """\
+#include "arithmetic.h"
+#include <string.h>
+"""
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a function gives: numbers, or an error with its text."""
+
+    numbers: tuple[float, ...] = ()
+    error: str = ""
+
+    @property
+    def bits(self) -> tuple[str, ...]:
+        """The numbers by their bits, but for NaN, of which there is one."""
+        return tuple("nan" if isnan(x) else float(x).hex() for x in self.numbers)
+
+    @property
+    def kind(self) -> str:
+        """What has been raised, without its text: of two errors C may meet the other one first."""
+        return "raised" if self.error else ""
+
+
+def module_of(text: str, folder: Path, name: str = "own") -> ModuleType:
+    """A module from its text."""
+    path = folder / f"{name}.py"
+    path.write_text(text, encoding="utf-8")
+    specification = importlib.util.spec_from_file_location(name, path)
+    assert specification is not None and specification.loader is not None
+    module = importlib.util.module_from_spec(specification)
+    sys.modules[name] = module
+    specification.loader.exec_module(module)
+    return module
+
+
+class Twins:
+    """The functions of a module in Python and in C."""
+
+    def __init__(
+        self, module: ModuleType, folder: Path, command: Sequence[str] = ("cc", "-O2")
+    ) -> None:
+        """Translate and compile all public functions of a module."""
+        self.functions: dict[str, FunctionType] = {
+            name: function
+            for name, function in vars(module).items()
+            if isinstance(function, FunctionType)
+            and function.__module__ == module.__name__
+            and not name.startswith("_")
+        }
+        self.text = c_text(self.functions)
+        source = folder / "functions.c"
+        source.write_text(self.text)
+        library = folder / f"functions_{abs(hash(tuple(command)))}.so"
+        process = subprocess.run(
+            [*command, *FLAGS, "-I", str(RUNTIME), "-o", library, source, "-lm"],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        assert process.returncode == 0, process.stderr
+        self._library = CDLL(str(library))
+
+    def python(self, name: str, numbers: Sequence[float]) -> Answer:
+        """What Python gives."""
+        function = self.functions[name]
+        hints = hints_of(function)
+        hints.pop("return")
+        values = iter(numbers)
+        arguments = [_made(hint, values) for hint in hints.values()]
+        try:
+            result = function(*arguments)
+        except Refusal as error:
+            return Answer(error=str(error))
+        except Exception as error:
+            return Answer(error=f"{type(error).__name__}: {error}")
+        return Answer(tuple(map(float, _flat(result))))
+
+    def c(self, name: str, numbers: Sequence[float]) -> Answer:
+        """What C gives."""
+        function = self.functions[name]
+        n = len(_leaves(shape_of(hints_of(function)["return"]), ""))
+        given, taken = (c_double * max(len(numbers), 1))(*numbers), (c_double * max(n, 1))()
+        why = create_string_buffer(_WHY)
+        call = getattr(self._library, f"call_{name}")
+        call.restype, call.argtypes = c_int, [POINTER(c_double), POINTER(c_double), POINTER(c_char)]
+        if call(given, taken, why):
+            return Answer(error=why.value.decode())
+        return Answer(tuple(taken)[:n])
+
+
+def c_text(functions: dict[str, FunctionType]) -> str:
+    """Functions in C, with a function `call_...` for each that takes and gives plain numbers."""
+    program = Program(function_in_c)
+    made = {name: program.function(function) for name, function in functions.items()}
+    return "\n\n".join(
+        [
+            _INCLUDES,
+            *program.structures.values(),
+            *program.constants.values(),
+            *(function.text for function in program.functions.values()),
+            *(_shim(name, function) for name, function in made.items()),
+        ]
+    ) + "\n"  # fmt: skip
+
+
+def _shim(name: str, function: Function) -> str:
+    assert function.returns is not None
+    lines, place = ["Error error[1] = {{0}};"], 0
+    for argument, shape in function.arguments.items():
+        lines.append(f"{shape.name} given_{argument};")
+        for leaf, part in _leaves(shape, f"given_{argument}"):
+            cast = "" if part == DOUBLE else f"({part.name})"
+            lines.append(f"{leaf} = {cast}in[{place}];")
+            place += 1
+    call = function.call([f"given_{argument}" for argument in function.arguments])
+    lines.append(f"const {function.returns.name} result = {call};")
+    leaves = _leaves(function.returns, "result")
+    lines += [f"out[{i}] = {leaf};" for i, (leaf, _) in enumerate(leaves)]
+    lines += [f"memcpy(why, error->why, {_WHY});", "(void)in; return error->raised;"]
+    body = "\n".join(f"    {line}" for line in lines)
+    head = f"int call_{name}(const double in[], double out[], char why[])"
+    return f"{head};\n{head} {{\n{body}\n}}"
+
+
+def _leaves(shape: Shape, name: str) -> list[tuple[str, Shape]]:
+    """The numbers in something of a shape, and their types."""
+    if not isinstance(shape, Structure):
+        return [(name, shape)]
+    return [leaf for suffix, part in shape.parts for leaf in _leaves(part, name + suffix)]
+
+
+def _made(hint: Any, values: Any) -> Any:
+    """A value of a type from the next numbers."""
+    shape = shape_of(hint)
+    if not isinstance(shape, Structure):
+        plain = hint if isinstance(hint, type) else float
+        number = next(values)
+        return plain(int(number)) if issubclass(plain, IntEnum) else plain(number)
+    if shape.made is Vector:
+        return Vector([next(values) for _ in shape.parts])
+    if shape.made is Matrix:
+        return Matrix([_made_row(part, values) for _, part in shape.parts])
+    if shape.made:
+        return shape.made(*(_made(part, values) for part in hints_of(shape.made).values()))
+    return tuple(_made(part, values) for part in hint.__args__)
+
+
+def _made_row(shape: Shape, values: Any) -> list[float]:
+    assert isinstance(shape, Structure)
+    return [next(values) for _ in shape.parts]
+
+
+def _flat(value: Any) -> list[float]:
+    if isinstance(value, tuple):
+        return [number for part in value for number in _flat(part)]
+    return [value]
+
+
+def sizes_of(function: FunctionType) -> list[Any]:
+    """The types of all numbers that a function takes."""
+    hints = get_type_hints(function, include_extras=True)
+    hints.pop("return")
+    return [part for hint in hints.values() for _, part in _leaves(shape_of(hint), "")]
