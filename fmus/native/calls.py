@@ -103,7 +103,7 @@ class Calls(Expressions):
         if called in (*_PLAIN, *_RAISING, *_OF_ONE) and len(node.args) != arguments:
             raise self.fail(node, f"{called.__name__} with {len(node.args)} arguments")
         if called in _PLAIN or called in _RAISING:
-            texts = [self.number(argument).text for argument in node.args]
+            texts = [self.number(argument).argument for argument in node.args]
             self.made.raises |= called in _RAISING
             return Code(f"{(_PLAIN | _RAISING)[called]}({', '.join(texts)})", DOUBLE)
         if called is len:
@@ -121,21 +121,20 @@ class Calls(Expressions):
             text = f"{number.within(PRODUCT)} * {number_in_c(_FACTORS[called])}"
             code = Code(text, DOUBLE, PRODUCT)
         elif called in _TESTS:
-            code = Code(
-                f"{_TESTS[called]}((double){operand.within(UNARY)}) != 0", BOOLEAN, EQUALITY
-            )
+            number = Code(f"(double){operand.within(UNARY)}", DOUBLE)
+            code = Code(f"{_TESTS[called]}({number.argument}) != 0", BOOLEAN, EQUALITY)
         elif called is bool:
             code = Code(f"{operand.within(EQUALITY + 1)} != 0", BOOLEAN, EQUALITY)
         elif called is float:
             code = Code(f"(double){operand.within(UNARY)}", DOUBLE, UNARY) if is_whole else operand
         elif called is abs and is_whole:
-            code = Code(f"ABS({operand.text})", INTEGER)
+            code = Code(f"ABS({operand.argument})", INTEGER)
         elif called is abs:
             code = Code(f"fabs({operand.text})", DOUBLE)
         elif is_whole:
             code = Code(operand.text, INTEGER, operand.binding)
         else:
-            code = Code(f"INT_OF({_TO_INTEGER[called]}({operand.text}))", INTEGER)
+            code = Code(f"INT_OF({_TO_INTEGER[called]}({operand.argument}))", INTEGER)
         self.made.raises |= code.text.startswith(("ABS", "INT_OF"))
         return code
 

@@ -9,6 +9,7 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from enum import IntEnum
+from functools import cache
 from itertools import count
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -60,6 +61,12 @@ class Code(NamedTuple):
     def within(self, binding: int) -> str:
         """The text as an operand of what binds so tightly."""
         return self.text if self.binding >= binding else f"({self.text})"
+
+    @property
+    def argument(self) -> str:
+        """The text as an argument of a macro, which takes the commas of a literal for its own."""
+        outside = re.sub(r"\(.*?\)", "", self.text)
+        return f"({self.text})" if "{" in outside or "}" in outside else self.text
 
 
 class Expressions:
@@ -237,7 +244,7 @@ class Expressions:
             )
         where = self.integer(place, "a subscript")
         self.made.raises = True
-        text = f"{code.within(POSTFIX)}.v[PLACE({where.text}, {len(parts)})]"
+        text = f"{code.within(POSTFIX)}.v[PLACE({where.argument}, {len(parts)})]"
         return Code(text, parts[0][1])
 
     def _slice(self, node: ast.Subscript, places: ast.Slice, code: Code) -> Code:
@@ -275,7 +282,7 @@ class Expressions:
             text = f"{left.within(binding)} {sign} {right.within(binding + 1)}"
             return Code(text, DOUBLE, binding)
         self.made.raises = True
-        return Code(f"{_OF_INTEGERS[type(node.op)]}({left.text}, {right.text})", INTEGER)
+        return Code(f"{_OF_INTEGERS[type(node.op)]}({left.argument}, {right.argument})", INTEGER)
 
     def _divided(self, node: ast.BinOp, left: Code, right: Code, is_float: bool) -> Code:
         of_floats, of_integers = _DIVISIONS[type(node.op)]
@@ -285,7 +292,7 @@ class Expressions:
         self.made.raises = True
         function = of_floats if is_float else of_integers
         shape = DOUBLE if is_float or is_quotient else INTEGER
-        return Code(f"{function}({left.text}, {right.text})", shape)
+        return Code(f"{function}({left.argument}, {right.argument})", shape)
 
     def _of_arrays(self, node: ast.BinOp, left: Code, right: Code) -> Code:
         operation = arrays.binary(self.program, node.op, left.shape, right.shape)
@@ -319,7 +326,7 @@ class Expressions:
             return self.calling(arrays.negative(self.program, operand.shape), [operand.text])
         if operand.shape in WHOLE and not isinstance(node.operand, ast.Constant):
             self.made.raises = True
-            return Code(f"NEG({operand.text})", INTEGER)
+            return Code(f"NEG({operand.argument})", INTEGER)
         if operand.shape not in NUMBERS:
             raise self.fail(node, f"{operand.shape.word} where a number is wanted")
         shape = INTEGER if operand.shape in WHOLE else DOUBLE
@@ -452,12 +459,17 @@ def _sign_of(operator: ast.operator) -> str:
 
 def _home(module: str, name: str) -> str:
     """The module that a constant was defined in, seen from one that uses it."""
-    tree = ast.parse(inspect.getsource(sys.modules[module]))
-    for node in tree.body:
-        names = [alias.name for alias in node.names] if isinstance(node, ast.ImportFrom) else []
-        if name in names:
-            return _home(str(node.module), name)  # type: ignore[attr-defined]
-    return module
+    origin = _origins(sys.modules[module]).get(name)
+    return module if origin is None else _home(origin, name)
+
+
+@cache
+def _origins(module: ModuleType) -> dict[str, str]:
+    """Where the names come from that a module imports."""
+    imports = [
+        n for n in ast.parse(inspect.getsource(module)).body if isinstance(n, ast.ImportFrom)
+    ]
+    return {alias.name: str(node.module) for node in imports for alias in node.names}
 
 
 def _initializer(code: Code) -> str:

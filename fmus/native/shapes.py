@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
 
 from auv_fmu import vectors
@@ -194,6 +195,7 @@ def declaration(shape: Structure) -> str:
     return head + "\n".join(["typedef struct {", *lines, f"}} {shape.name};"])
 
 
+@cache
 def _comments(made: Any) -> dict[str, str]:
     """What `#:` says of the fields of a class, as comments."""
     if made is None:

@@ -1,0 +1,437 @@
+"""Random programs of the language of equations: in Python and in C they do the same.
+
+    PYTHONPATH=tests python -m fuzz.programs --runs 10000
+
+Each program is a function of a few numbers, made from a seed, that returns all of its variables. It
+is run in both languages with usual and with odd numbers. C may refuse an integer of more than 32
+bits where Python goes on; else both give the same bits, or both raise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from random import Random
+from typing import NamedTuple
+
+from support.hosts import sanitizers
+from support.language import HEAD, TOO_LARGE, Answer, Twins, module_of, sizes_of
+
+#: Programs in one module, and how often each is run.
+BATCH, TRIALS = 100, 12
+
+#: Options of a compiler that ends a process which does what C does not define.
+SANITIZED = ("-O1", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
+
+#: What the programs of a module share.
+_SHARED = '''
+class Mode(IntEnum):
+    """An enumeration."""
+
+    OFF = 0
+    LOW = 1
+    HIGH = 7
+
+
+class Record(NamedTuple):
+    """A record."""
+
+    x: float
+    v: Annotated[Vector, 3]
+    k: int = 3
+    on: bool = True
+    mode: Mode = Mode.LOW
+
+
+XS = Vector((-2.0, -0.5, 0.0, 1.0, 4.0))
+YS = Vector((3.0, -1.0, 0.0, 0.5, 0.25))
+A = Matrix(((2.0, -1.0, 0.5), (0.0, 1.5, -0.25), (1.0, 0.0, 3.0)))
+PRIMES = (2, 3, 5, 7)
+'''
+
+FLOAT, INT, BOOL, V3, V2, M33, M23, RECORD = (
+    "float", "int", "bool", "Annotated[Vector, 3]", "Annotated[Vector, 2]",
+    "Annotated[Matrix, 3, 3]", "Annotated[Matrix, 2, 3]", "Record",
+)  # fmt: skip
+TYPES = (FLOAT, INT, BOOL, V3, V2, M33, M23, RECORD)
+_SIZES = {V3: 3, V2: 2}
+
+#: Functions of `math` of one and of two numbers.
+_OF_ONE = (
+    "sin", "cos", "tan", "atan", "tanh", "exp", "expm1", "sqrt", "log", "log1p", "log2", "log10",
+    "asin", "acos", "sinh", "cosh", "asinh", "acosh", "atanh", "fabs", "degrees", "radians", "abs",
+)  # fmt: skip
+_OF_TWO = ("atan2", "copysign", "fmod", "pow", "min", "max")
+
+_NUMBERS = ("0.0", "-0.0", "1.0", "0.5", "2.0", "-3.25", "1e-9", "1e300", "inf", "pi", "1e-310")
+
+Variables = dict[str, str]
+
+
+class Program:
+    """One program on its way, from a seed."""
+
+    def __init__(self, name: str, seed: int) -> None:
+        self._random = Random(seed)
+        self._name, self._count = name, 0
+        self._lines: list[str] = []
+
+    def text(self) -> str:
+        """The function."""
+        arguments: Variables = {"x": FLOAT, "y": FLOAT, "k": INT, "on": BOOL, "v": V3}
+        if self._random.random() < 0.3:
+            arguments["r"] = RECORD
+        variables = dict(arguments)
+        self._block(variables, "    ", self._random.randint(3, 8), depth=0)
+        results = list(variables)
+        hints = ", ".join(variables[name] for name in results)
+        given = ", ".join(f"{name}: {hint}" for name, hint in arguments.items())
+        head = f"def {self._name}({given}) -> tuple[{hints}]:"
+        return "\n".join([head, *self._lines, f"    return ({', '.join(results)},)"]) + "\n"
+
+    def _new(self, hint: str) -> str:
+        self._count += 1
+        return f"{hint.strip('AnotedVcrMix[], ')[:1] or 'a'}_{self._count}"
+
+    def _add(self, indent: str, line: str) -> None:
+        self._lines.append(indent + line)
+
+    # Statements
+
+    def _block(self, known: Variables, indent: str, n: int, depth: int, loop: bool = False) -> None:
+        self._add(indent, "pass")
+        for _ in range(n):
+            choices = [self._assign, self._assign, self._assign, self._change, self._swap]
+            if depth < 3:
+                choices += [self._if, self._for, self._while, self._local]
+            self._random.choice(choices)(known, indent, depth)
+            if loop and self._random.random() < 0.1:
+                self._add(indent, f"if {self._expression(BOOL, known, 1)}:")
+                self._add(indent, f"    {self._random.choice(('break', 'continue'))}")
+        if self._random.random() < 0.03:
+            self._add(indent, f"if {self._expression(BOOL, known, 1)}:")
+            value = self._expression(FLOAT, known, 1)
+            self._add(indent, f'    raise Refusal(f"no {{{value}:g}} here")')
+
+    def _assign(self, known: Variables, indent: str, depth: int) -> None:
+        hint = self._random.choice(TYPES)
+        value, name = self._expression(hint, known, 3), self._new(hint)
+        self._add(indent, f"{name} = {value}")
+        known[name] = hint
+
+    def _change(self, known: Variables, indent: str, depth: int) -> None:
+        name = self._random.choice([n for n, hint in known.items() if hint in (FLOAT, INT, V3)])
+        sign = self._random.choice("+-" if known[name] != FLOAT else "+-*/")
+        value = self._expression(known[name], known, 2)
+        self._add(indent, f"{name} {sign}= {value}")
+
+    def _swap(self, known: Variables, indent: str, depth: int) -> None:
+        hint = self._random.choice((FLOAT, INT, V3))
+        names = [name for name, h in known.items() if h == hint]
+        one, other = self._random.choice(names), self._random.choice(names)
+        if one != other:
+            self._add(indent, f"{one}, {other} = {other}, {self._expression(hint, known, 2)}")
+
+    def _if(self, known: Variables, indent: str, depth: int) -> None:
+        self._add(indent, f"if {self._expression(BOOL, known, 2)}:")
+        inside = []
+        for word in ("", "elif", "else"):
+            if word == "elif" and self._random.random() < 0.6:
+                continue
+            if word:
+                test = f" {self._expression(BOOL, known, 2)}" if word == "elif" else ""
+                self._add(indent, f"{word}{test}:")
+            branch = dict(known)
+            self._block(branch, f"{indent}    ", self._random.randint(1, 3), depth + 1)
+            inside.append(branch)
+        # What every branch has given a value has one after it.
+        hint = self._random.choice((FLOAT, INT))
+        name = self._new(hint)
+        if self._random.random() < 0.5:
+            self._add(indent, f"if {self._expression(BOOL, known, 1)}:")
+            self._add(indent, f"    {name} = {self._expression(hint, known, 1)}")
+            self._add(indent, "else:")
+            self._add(indent, f"    {name} = {self._expression(hint, known, 1)}")
+            known[name] = hint
+
+    def _for(self, known: Variables, indent: str, depth: int) -> None:
+        inside, name = dict(known), self._new(FLOAT)
+        kind = self._random.randrange(5)
+        if kind == 0:
+            stop = self._random.choice(("3", "1, 4", "4, 0, -1", "0, 7, 3", f"{name}_n"))
+            if stop == f"{name}_n":
+                self._add(indent, f"{name}_n = {self._expression(INT, known, 1)} % 4")
+                known[f"{name}_n"] = inside[f"{name}_n"] = INT
+            self._add(indent, f"for {name} in range({stop}):")
+            inside[name] = INT
+        elif kind == 1:
+            self._add(indent, f"for {name} in {self._expression(V3, known, 1)}:")
+            inside[name] = FLOAT
+        elif kind == 2:
+            self._add(indent, f"for {name}, {name}_b in zip(XS, {self._vector(known)}):")
+            inside |= {name: FLOAT, f"{name}_b": FLOAT}
+        elif kind == 3:
+            self._add(indent, f"for {name}_k, {name} in enumerate({self._vector(known)}):")
+            inside |= {f"{name}_k": INT, name: FLOAT}
+        else:
+            self._add(indent, f"for {name} in PRIMES:")
+            inside[name] = INT
+        before = set(inside)
+        self._loop_body(inside, known, before, indent, depth)
+
+    def _vector(self, known: Variables) -> str:
+        names = [name for name, hint in known.items() if hint in (V3, V2)]
+        return self._random.choice([*names, "XS", "YS"])
+
+    def _while(self, known: Variables, indent: str, depth: int) -> None:
+        name = self._new(INT)
+        self._add(indent, f"{name} = {self._random.randint(1, 4)}")
+        known[name] = INT
+        test = self._expression(BOOL, known, 1)
+        self._add(indent, f"while {name} > 0 and {test}:")
+        self._add(indent, f"    {name} -= 1")
+        inside = {n: hint for n, hint in known.items() if n != name}
+        self._loop_body(inside, known, set(inside), indent, depth)
+
+    def _loop_body(
+        self, inside: Variables, known: Variables, before: set[str], indent: str, depth: int
+    ) -> None:
+        # The loop's own names cannot be changed in it.
+        own = before - known.keys()
+        readable = dict(inside)
+        changeable = {n: hint for n, hint in inside.items() if n not in own}
+        if own:
+            name = sorted(own)[0]
+            self._add(f"{indent}    ", f"{name}_c = {name}")
+            changeable[f"{name}_c"] = readable[name]
+        self._block(changeable, f"{indent}    ", self._random.randint(1, 3), depth + 1, loop=True)
+
+    def _local(self, known: Variables, indent: str, depth: int) -> None:
+        name = self._new(BOOL)
+        self._add(indent, f"def {name}_f(p: float, n: int) -> float:")
+        own: Variables = {"p": FLOAT, "n": INT}
+        self._add(indent, f"    q = {self._expression(FLOAT, own, 2)}")
+        self._add(indent, f"    return {self._expression(FLOAT, {**own, 'q': FLOAT}, 2)}")
+        given = self._expression(FLOAT, known, 1), self._expression(INT, known, 1)
+        self._add(indent, f"{name} = {name}_f({', '.join(given)})")
+        known[name] = FLOAT
+
+    # Expressions
+
+    def _expression(self, hint: str, known: Variables, depth: int) -> str:
+        names = [name for name, h in known.items() if h == hint]
+        if depth <= 0 and names:
+            return self._random.choice(names)
+        makers = {
+            FLOAT: self._float, INT: self._int, BOOL: self._bool, V3: self._v, V2: self._v2,
+            M33: self._m33, M23: self._m23, RECORD: self._record,
+        }  # fmt: skip
+        if names and self._random.random() < 0.25:
+            return self._random.choice(names)
+        return makers[hint](known, depth - 1)
+
+    def _float(self, known: Variables, depth: int) -> str:
+        if depth < 0:
+            return self._random.choice(_NUMBERS)
+        of = self._expression
+        a, b = of(FLOAT, known, depth), of(FLOAT, known, depth)
+        records = [name for name, hint in known.items() if hint == RECORD]
+        options = [
+            f"({a} + {b})", f"({a} - {b})", f"{a} * {b}", f"({a} / {b})", f"-{a}", f"({a} % {b})",
+            f"({a} // {b})", f"{self._random.choice(_OF_ONE)}({a})",
+            f"{self._random.choice(_OF_TWO)}({a}, {b})", self._random.choice(_NUMBERS),
+            f"({a} if {of(BOOL, known, depth)} else {b})", f"{of(V3, known, depth)}[{self._place()}]",
+            f"{of(V3, known, depth)}[{of(INT, known, depth)} % 4]", f"({of(V3, known, depth)} @ XS[1:4])",
+            f"{of(V3, known, depth)}.sum()", f"({of(INT, known, depth)} * {a})", f"float({of(INT, known, depth)})",
+            f"interpolate({a}, XS, YS)", f"max({of(V3, known, depth)})", f"({of(INT, known, depth)} / {self._int(known, depth)})",
+            f"{of(M33, known, depth)}[{self._place()}, 1]", f"{of(M23, known, depth)}[1, {self._place()}]",
+            f"({a} + 2)", f"(3 - {a})",
+        ]  # fmt: skip
+        options += [f"{name}.x" for name in records]
+        return self._random.choice(options)
+
+    def _place(self) -> str:
+        return self._random.choice(("0", "1", "-1"))
+
+    def _int(self, known: Variables, depth: int) -> str:
+        if depth < 0:
+            return self._random.choice(("0", "1", "2", "7", "-5"))
+        of = self._expression
+        a, b = of(INT, known, depth), of(INT, known, depth)
+        x = of(FLOAT, known, depth)
+        options = [
+            f"({a} + {b})", f"({a} - {b})", f"{a} * {b}", f"({a} // {b})", f"({a} % {b})", f"abs({a})",
+            f"min({a}, {b})", f"max({a}, {b}, 2)", f"({a} if {of(BOOL, known, depth)} else {b})",
+            f"int({x})", f"round({x})", f"floor({x})", f"ceil({x})", f"PRIMES[{a} % 4]",
+            f"len({self._vector(known)})", f"int({of(BOOL, known, depth)})", "Mode.HIGH", f"-{a}",
+            "5", "1",
+        ]  # fmt: skip
+        options += [f"{name}.k" for name, hint in known.items() if hint == RECORD]
+        return self._random.choice(options)
+
+    def _bool(self, known: Variables, depth: int) -> str:
+        if depth < 0:
+            return self._random.choice(("True", "False"))
+        of = self._expression
+        hint = self._random.choice((FLOAT, INT))
+        a, b = of(hint, known, depth), of(hint, known, depth)
+        options = [
+            *(f"({a} {sign} {b})" for sign in ("<", "<=", ">", ">=", "==", "!=")),
+            f"({of(BOOL, known, depth)} and {of(BOOL, known, depth)})", f"isnan({of(FLOAT, known, depth)})",
+            f"({of(BOOL, known, depth)} or {of(BOOL, known, depth)})", f"(not {of(BOOL, known, depth)})",
+            f"isfinite({of(FLOAT, known, depth)})", f"({of(FLOAT, known, depth)} > {of(INT, known, depth)})",
+            f"bool({a})",
+        ]  # fmt: skip
+        options += [f"({name}.mode == Mode.LOW)" for name, h in known.items() if h == RECORD]
+        return self._random.choice(options)
+
+    def _v(self, known: Variables, depth: int) -> str:
+        of = self._expression
+        if depth < 0:
+            return "XS[1:4]"
+        a, b = of(V3, known, depth), of(V3, known, depth)
+        x, k = of(FLOAT, known, depth), of(INT, known, depth)
+        options = [
+            f"({a} + {b})", f"({a} - {b})", f"({x} * {a})", f"({a} * {x})", f"({a} / {x})", f"(-{a})",
+            f"(A @ {a})", f"({of(M33, known, depth)} @ {a})", f"{a}.replaced({k} % 4, {x})",
+            f"Vector(({x}, {of(FLOAT, known, depth)}, {k}))", f"({of(M23, known, depth)}.T @ {of(V2, known, depth)})",
+            f"Vector(each * {x} for each in {self._of_three(known)})", f"solve(A, {a})",
+            f"Vector({x} + each for each in range(3))", f"{of(M33, known, depth)}[{k} % 3]",
+            f"Vector(one - other for one, other in zip({self._of_three(known)}, XS))", f"({a} * 2)",
+        ]  # fmt: skip
+        options += [f"{name}.v" for name, hint in known.items() if hint == RECORD]
+        return self._random.choice(options)
+
+    def _of_three(self, known: Variables) -> str:
+        return self._random.choice([n for n, hint in known.items() if hint == V3] or ["XS[1:4]"])
+
+    def _v2(self, known: Variables, depth: int) -> str:
+        of = self._expression
+        if depth < 0:
+            return "YS[:2]"
+        options = [
+            f"Vector(({of(FLOAT, known, depth)}, {of(FLOAT, known, depth)}))", f"{self._of_three(known)}[1:]",
+            f"({of(M23, known, depth)} @ {of(V3, known, depth)})", f"({of(V2, known, depth)} + YS[3:])",
+        ]  # fmt: skip
+        return self._random.choice(options)
+
+    def _m33(self, known: Variables, depth: int) -> str:
+        of = self._expression
+        if depth < 0:
+            return "A"
+        a = of(M33, known, depth)
+        options = [
+            "A", f"({a} @ {of(M33, known, depth)})", f"({a} + A)", f"({a} - A.T)", f"{a}.T", f"(-{a})",
+            f"({of(FLOAT, known, depth)} * {a})", f"({a} / {of(FLOAT, known, depth)})",
+            f"({of(M23, known, depth)}.T @ {of(M23, known, depth)})",
+            f"{a}.replaced({of(INT, known, depth)} % 3, {of(V3, known, depth)})",
+            f"Matrix((p + q * {of(FLOAT, known, depth)} for q in range(3)) for p in range(3))",
+        ]  # fmt: skip
+        return self._random.choice(options)
+
+    def _m23(self, known: Variables, depth: int) -> str:
+        of = self._expression
+        if depth < 0:
+            return "Matrix((XS[:3], YS[1:4]))"
+        options = [
+            f"Matrix(({of(V3, known, depth)}, {of(V3, known, depth)}))", f"({of(M23, known, depth)} @ A)",
+            f"Matrix(((1.0, {of(FLOAT, known, depth)}, 0.0), (2.0, 0.5, {of(INT, known, depth)})))",
+        ]  # fmt: skip
+        return self._random.choice(options)
+
+    def _record(self, known: Variables, depth: int) -> str:
+        of = self._expression
+        names = [name for name, hint in known.items() if hint == RECORD]
+        x = of(FLOAT, known, depth)
+        options = [f"Record({x}, {of(V3, known, depth)}, on={of(BOOL, known, depth)})",
+                   f"Record(v={of(V3, known, depth)}, x={x}, k={of(INT, known, depth)})"]  # fmt: skip
+        options += [f"{name}._replace(x={x}, mode=Mode.HIGH)" for name in names]
+        return self._random.choice(options)
+
+
+class Finding(NamedTuple):
+    """A program that does not do the same in both languages."""
+
+    seed: int
+    given: Sequence[float]
+    python: Answer
+    c: Answer
+
+
+def numbers_for(random: Random, types: Sequence[object]) -> list[float]:
+    """Arguments, usual and odd ones."""
+    odd = (0.0, -0.0, 1.0, -1.0, math.inf, -math.inf, math.nan, 1e308, -1e308, 5e-324, 1e-160, 1e9)
+    found: list[float] = []
+    for shape in types:
+        word = getattr(shape, "word", "")
+        if word == "a float":
+            found.append(random.choice(odd) if random.random() < 0.2 else random.uniform(-4.0, 4.0))
+        elif word == "a bool":
+            found.append(random.randint(0, 1))
+        else:
+            large = random.random() < 0.1
+            found.append(random.randint(-70_000, 70_000) if large else random.randint(0, 1))
+    return found
+
+
+def same(python: Answer, c: Answer) -> bool:
+    """Whether both answers are one."""
+    if c.error == TOO_LARGE:
+        return True
+    return python.bits == c.bits and bool(python.error) == bool(c.error)
+
+
+def tried(seeds: Sequence[int], command: Sequence[str]) -> Iterator[Finding]:
+    """Findings among the programs of some seeds."""
+    texts = [Program(f"program_{seed}", seed).text() for seed in seeds]
+    with tempfile.TemporaryDirectory() as folder:
+        module = module_of("\n\n".join([HEAD + _SHARED, *texts]), Path(folder), f"own_{seeds[0]}")
+        twins = Twins(module, Path(folder), command)
+        for seed in seeds:
+            name, random = f"program_{seed}", Random(seed)
+            for _ in range(TRIALS):
+                given = numbers_for(random, sizes_of(twins.functions[name]))
+                python, c = twins.python(name, given), twins.c(name, given)
+                if not same(python, c):
+                    yield Finding(seed, given, python, c)
+                    break
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m fuzz.programs", description=__doc__)
+    parser.add_argument("--runs", type=int, default=1000, help="programs (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the first program")
+    parser.add_argument("--show", action="store_true", help="print the program of the first seed")
+    parser.add_argument("--compiler", default="cc -O2", help="command (default: %(default)s)")
+    parser.add_argument("--sanitize", action="store_true", help="compile with sanitizers")
+    options = parser.parse_args()
+    if options.show:
+        print(Program("program", options.seed).text())
+        return 0
+    if options.sanitize and "ASAN_OPTIONS" not in os.environ:
+        command = [sys.executable, "-m", "fuzz.programs", *sys.argv[1:]]
+        with sanitizers() as reports:
+            status = subprocess.run(command, check=False).returncode
+            print(reports, end="")
+        return status
+    compiler = ("gcc", *SANITIZED) if options.sanitize else options.compiler.split()
+    wrong, seeds = 0, range(options.seed, options.seed + options.runs)
+    for start in range(0, len(seeds), BATCH):
+        for finding in tried(seeds[start : start + BATCH], compiler):
+            wrong += 1
+            print(
+                f"seed {finding.seed}: {[*finding.given]}\n  Python {finding.python}\n  C {finding.c}"
+            )
+    print(f"{len(seeds)} programs, {wrong} of them differ")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
