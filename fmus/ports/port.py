@@ -38,7 +38,7 @@ class Port:
         causality: `input`, `output`, `parameter`, or `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
         type: of FMI: `Real`, `Integer`, `Boolean` or `String`.
-        unit: of a Real, a key of :data:`fmus.ports.description.UNITS`.
+        unit: of a Real, as :mod:`fmus.ports.units` reads it.
         start: value before anything is set. Outputs have none.
         description: one line.
         minimum, maximum: inclusive bounds of a number.
