@@ -12,16 +12,16 @@ gives the ports `u`, `y.x` and `y.z`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from auv_fmu.arrays import Matrix, Vector
 from fmus.ports.groups import Field, ParameterSet
-from fmus.ports.port import POSITIVE, Port, Refusal
+from fmus.ports.port import POSITIVE, Misdeclared, Port, Refusal
 
-__all__ = ("POSITIVE", "Misdeclared", "Refusal", "Variable", "declared")
+__all__ = ("POSITIVE", "Refusal", "Variable", "declared", "ports_in")
 
 
 @dataclass(frozen=True)
@@ -48,20 +48,6 @@ class Variable:
     feedthrough: tuple[str, ...] | None = None
 
 
-class Misdeclared(TypeError):
-    """A declaration that cannot be; the text says why.
-
-    Attributes:
-        place: the class or the function, and the field, that it is about.
-
-    """
-
-    def __init__(self, place: tuple[str, ...], why: str) -> None:
-        """Say what is wrong, and where."""
-        self.place = place
-        super().__init__(f"{'.'.join(place)}: {why}")
-
-
 class _Part(NamedTuple):
     """One number of a field."""
 
@@ -82,46 +68,76 @@ _TYPES: dict[Any, tuple[str, Any]] = {
 _ONLY = {"feedthrough": "output", "tunable": "parameter"}
 
 
-def declared(made: Any, causality: str, prefix: str = "", given: Any = None) -> dict[str, Field]:
-    """The ports of each field of a class, with a dictionary of its fields.
+def declared(made: Any, causality: str, direct: tuple[str, ...] = ()) -> dict[str, Field]:
+    """The ports of each field of a class, by the names of its fields.
 
     Args:
         made: the class.
         causality: of the ports: `input`, `output` or `parameter`.
-        prefix: of their names.
-        given: a value of the class with other start values than the class's own.
+        direct: what outputs depend on that do not say it: fields of the inputs, which stand in
+            `feedthrough` of the ports.
 
     Raises:
         Misdeclared: a field is wrong, or says too little.
 
     """
+    return _declared(made, causality, direct, "", None)
+
+
+def _declared(
+    made: Any, causality: str, direct: tuple[str, ...], prefix: str, given: Any
+) -> dict[str, Field]:
     name = getattr(made, "__name__", str(made))
-    if not (isinstance(made, type) and issubclass(made, tuple) and hasattr(made, "_fields")):
-        raise Misdeclared((name,), f"is no NamedTuple; write class {name}(NamedTuple)")
-    starts = dict(made._field_defaults) if given is None else given._asdict()  # type: ignore[attr-defined]
+    if not (isinstance(made, type) and hasattr(made, "_field_defaults")):
+        raise _wrong((name,), f"is no NamedTuple; write class {name}(NamedTuple)")
+    starts = dict(made._field_defaults) if given is None else given._asdict()
     fields: dict[str, Field] = {}
     for field, hint in _hints(made).items():
         place, start = (name, field), starts.get(field)
         inner, notes = _annotated(hint)
-        if isinstance(inner, type) and hasattr(inner, "_fields"):
-            start = _checked_instance(start, inner, place)
-            below = declared(inner, causality, f"{prefix}{field}.", start)
+        if isinstance(inner, type) and hasattr(inner, "_field_defaults"):
+            if start is not None and not isinstance(start, inner):
+                raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
+            below = _declared(inner, causality, direct, f"{prefix}{field}.", start)
             fields[field] = ParameterSet(inner, **below)
             continue
-        said = [note for note in notes if isinstance(note, Variable)]
-        if len(said) != 1:
-            example = f'{field}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
-            raise Misdeclared(place, f"has no unit and no description; write {example}")
-        parts = list(_parts(inner, notes, said[0], start, place))
+        said = _said(notes, causality, place, inner)
+        parts = list(_parts(inner, notes, said, start, place))
         if causality == "parameter" and any(part.start is None for part in parts):
-            raise Misdeclared(place, "has no default value, which a parameter starts with")
-        _check(said[0], causality, place)
-        ports = tuple(
-            _port(f"{prefix}{field}{part.name}", causality, said[0], part, place) for part in parts
-        )
-        is_one = parts[0].name == ""
-        fields[field] = ports[0] if is_one else ports
+            raise _wrong(place, "has no default value, which a parameter starts with")
+        if causality == "output" and said.feedthrough is None:
+            said = replace(said, feedthrough=direct)
+        ports = [_port(f"{prefix}{field}{part.name}", causality, said, part, place) for part in parts]
+        fields[field] = tuple(ports) if parts[0].name else ports[0]
     return fields
+
+
+def ports_in(field: Field) -> Sequence[Port]:
+    """The ports of a field."""
+    if isinstance(field, Port):
+        return (field,)
+    return field if isinstance(field, tuple) else field.ports
+
+
+def _wrong(place: tuple[str, ...], why: str) -> Misdeclared:
+    return Misdeclared(f"{'.'.join(place)} {why}", *place)
+
+
+def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner: Any) -> Variable:
+    """What a field says of its ports, if that can be said of them."""
+    found = [note for note in notes if isinstance(note, Variable)]
+    if len(found) != 1:
+        example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
+        raise _wrong(place, f"has no unit and no description; write {example}")
+    [said] = found
+    for name, of in _ONLY.items():
+        if getattr(said, name) not in (None, False) and causality != of:
+            raise _wrong(place, f"is no {of}, and {name} is for {of}s")
+    if causality == "output" and (said.minimum, said.maximum) != (None, None):
+        raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
+    if isinstance(said.feedthrough, str):
+        raise _wrong(place, f"has the feedthrough {said.feedthrough}; write a tuple of names")
+    return said
 
 
 def _hints(made: Any) -> dict[str, Any]:
@@ -130,7 +146,7 @@ def _hints(made: Any) -> dict[str, Any]:
     except NameError as error:
         missing = str(error).split("'")[1]
         named = [f for f, hint in made.__annotations__.items() if missing in str(hint)]
-        raise Misdeclared((made.__name__, *named[:1]), f"{error}; import it") from None
+        raise _wrong((made.__name__, *named[:1]), f"has a type that is not known: {error}") from None
 
 
 def _annotated(hint: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -148,12 +164,6 @@ def _word(hint: Any) -> str:
     return hint.__name__ if isinstance(hint, type) and not get_args(hint) else str(hint)
 
 
-def _checked_instance(start: Any, wanted: type, place: tuple[str, ...]) -> Any:
-    if start is not None and not isinstance(start, wanted):
-        raise Misdeclared(place, f"starts with {start!r:.40}, which is no {wanted.__name__}")
-    return start
-
-
 def _parts(
     hint: Any, notes: tuple[Any, ...], said: Variable, start: Any, place: tuple[str, ...]
 ) -> Iterator[_Part]:
@@ -161,7 +171,7 @@ def _parts(
     shape, number = _shape(hint, notes, place)
     if said.members and (len(shape) != 1 or shape[0] != len(said.members)):
         size = " x ".join(map(str, shape)) or "one"
-        raise Misdeclared(place, f"has {len(said.members)} members for {size} numbers")
+        raise _wrong(place, f"has {len(said.members)} members for {size} numbers")
     names = [f".{member}" for member in said.members] or [
         f"[{','.join(map(str, at))}]" if at else "" for at in _places(shape)
     ]
@@ -176,18 +186,18 @@ def _shape(hint: Any, notes: tuple[Any, ...], place: tuple[str, ...]) -> tuple[t
         sizes = tuple(note for note in notes if type(note) is int)
         if len(sizes) != (1 if hint is Vector else 2) or min(sizes) < 1:
             example = f"Annotated[{_word(hint)}, Variable(...)]"
-            raise Misdeclared(place, f"a {hint.__name__} needs its size; write {example}")
+            raise _wrong(place, f"is a {hint.__name__} without its size; write {example}")
         return sizes, float
     if get_origin(hint) is tuple:
         elements = [*dict.fromkeys(get_args(hint))]
         if len(elements) != 1 or get_args(hint) == ((),):
-            raise Misdeclared(place, "a tuple has elements of one type, as in tuple[float, float]")
+            raise _wrong(place, "has elements of several types; write a NamedTuple")
         below, number = _shape(elements[0], (), place)
         return (len(get_args(hint)), *below), number
     if hint in _TYPES or (isinstance(hint, type) and issubclass(hint, IntEnum)):
         return (), hint
     kinds = "float, int, bool, an IntEnum, a tuple of them, Vector, Matrix or a NamedTuple"
-    raise Misdeclared(place, f"{_word(hint)} is no type of a port; use {kinds}")
+    raise _wrong(place, f"has the type {_word(hint)}; use {kinds}")
 
 
 def _places(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
@@ -204,27 +214,16 @@ def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterato
     if not shape:
         yield start
     elif not isinstance(start, tuple) or len(start) != shape[0]:
-        raise Misdeclared(place, f"starts with {start!r:.40}, which has not {shape[0]} elements")
+        raise _wrong(place, f"starts with {start!r:.40}, which has not {shape[0]} elements")
     else:
         for part in start:
             yield from _flat(part, shape[1:], place)
 
 
-def _check(said: Variable, causality: str, place: tuple[str, ...]) -> None:
-    """Hold what a field says against what can be said of its ports."""
-    for name, of in _ONLY.items():
-        if getattr(said, name) not in (None, False) and causality != of:
-            raise Misdeclared(place, f"{name} is for {of}s")
-    if causality == "output" and (said.minimum, said.maximum) != (None, None):
-        raise Misdeclared(place, "minimum and maximum are for inputs and parameters")
-    if isinstance(said.feedthrough, str):
-        raise Misdeclared(place, f"feedthrough is a tuple; write ({said.feedthrough!r},)")
-
-
 def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
     kind, start, choices, bounds = _meant(part, causality, place)
     if kind != "Real" and said.unit != "1":
-        raise Misdeclared(place, f"only a float has a unit, not {_word(part.type)}")
+        raise _wrong(place, f"is of the type {_word(part.type)}; only a float has a unit")
     variability = "tunable" if said.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
@@ -238,11 +237,12 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
         start,
         *(bounds or (said.minimum, said.maximum)),
         choices,
+        tuple(said.feedthrough or ()),
     )
     try:
         port.checked(start)
     except Refusal as refusal:
-        raise Misdeclared(place, f"starts with {refusal}") from None
+        raise _wrong(place, f"starts with {refusal}") from None
     return replace(port, start=None) if causality == "output" else port
 
 
@@ -257,7 +257,7 @@ def _meant(part: _Part, causality: str, place: tuple[str, ...]) -> tuple[str, An
     members = list(number)
     start = members[0] if start is None else start
     if not isinstance(start, number):
-        raise Misdeclared(place, f"starts with {start!r:.40}, which is no {number.__name__}")
+        raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
     if causality == "parameter":
         return "String", start.name, {one.name: one for one in members}, None
     bounds = (int(min(members)), int(max(members))) if causality == "input" else None

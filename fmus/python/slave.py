@@ -68,7 +68,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
     said = definition.behaviour
     places = slices([port for port in definition.ports if port.causality == "output"])
     members: dict[str, Any] = {
-        "__module__": modules[0].__package__,
+        "__module__": modules[0].__package__ or modules[0].__name__,
         "__doc__": definition.summary,
         **definition.about,
         "description": definition.description,
