@@ -100,6 +100,14 @@ class Expressions:
         self.functions: dict[str, tuple[Function, list[str]]] = {}
         self.program, self.path, self.scope = program, path, scope
         self.numbers = count(1)
+        self._made_up: set[str] = set()
+
+    def unused(self, name: str) -> str:
+        """A name for C only, which the function has not and gets now."""
+        names = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
+        found = next(n for n in names if n not in self.names | self._made_up)
+        self._made_up.add(found)
+        return found
 
     def fail(self, node: ast.AST, what: str) -> Untranslatable:
         """What to raise, with the line."""
@@ -194,10 +202,11 @@ class Expressions:
         value = self.known(node)
         if value is None:
             raise self.fail(node, f"the name {ast.unparse(node)} is not known here")
-        if isinstance(value, float) and vars(math).get(name) == value:
-            return Code(number_in_c(value), DOUBLE)
         # It bears the name of the module that it stands in, wherever it was imported.
-        module = _home(self.scope["__name__"], name)
+        is_dotted = isinstance(node, ast.Attribute) and self.known(node.value) is math
+        module = "math" if is_dotted else _home(self.scope["__name__"], name)
+        if module == "math":
+            return Code(number_in_c(value), DOUBLE)
         if isinstance(value, IntEnum):
             module, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
         try:
@@ -460,7 +469,7 @@ def _sign_of(operator: ast.operator) -> str:
 def _home(module: str, name: str) -> str:
     """The module that a constant was defined in, seen from one that uses it."""
     origin = _origins(sys.modules[module]).get(name)
-    return module if origin is None else _home(origin, name)
+    return module if origin is None else origin if origin == "math" else _home(origin, name)
 
 
 @cache

@@ -279,7 +279,7 @@ class _Translation:
         """Values that are all computed before the first is stored, as Python does."""
         codes = []
         for i, (_, value) in enumerate(pairs):
-            code, name = self._in_c.code(value), self._unused(f"next_{i}_{target.lineno}")
+            code, name = self._in_c.code(value), self._in_c.unused(f"next_{i}")
             self._in_c.program.defined(code.shape)
             yield f"const {_declared(code.shape)}{name} = {code.text};"
             codes.append(Code(name, code.shape))
@@ -297,22 +297,14 @@ class _Translation:
         for alike in _alike(list(self._taken_apart(target, code))):
             yield self._stored(target, alike)
 
-    def _unused(self, name: str) -> str:
-        while name in self._in_c.names:
-            name += "_"
-        self._in_c.names.add(name)
-        return name
-
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
         """A name for what is taken apart: the name of the function it comes from."""
         name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
-        first = next((n for n in sorted(_names(target)) if n != "_"), "_")
-        first = next(
-            (n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_"), first
-        )
+        found = (n.id for n in ast.walk(target) if isinstance(n, ast.Name) and n.id != "_")
+        first = next(found, "_")
         called = {n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name)}
         taken = name in self._in_c.local or name in called
-        return self._unused(f"{name}_{first}" if taken else name.lstrip("_"))
+        return self._in_c.unused(f"{name}_{first}" if taken else name.lstrip("_"))
 
     def _taken_apart(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
         if isinstance(target, ast.Name):

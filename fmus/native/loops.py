@@ -47,8 +47,8 @@ def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed
         return _range(within, target, iterable)
     before: list[str] = []
     first = next((n.id for n in ast.walk(target) if isinstance(n, ast.Name)), "x")
-    items = _Items(within, before, changed, f"{first.lstrip('_')}_")
-    place = Code(items.unused("at"), INTEGER)
+    items = _Items(within, before, changed, first.lstrip("_") or "x")
+    place = Code(within.unused(f"{first.lstrip('_') or 'x'}_at"), INTEGER)
     bound, count = items.taken(target, iterable, place)
     head = f"for (int {place.text} = 0; {place.text} < {count}; {place.text}++) {{"
     return Loop(before, head, bound, count)
@@ -71,15 +71,18 @@ def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
     name = in_c(target.id)
     before = []
     if numbers[1] is None:
-        before = [f"const int {name}_stop = {stop.text};"]
-        stop = Code(f"{name}_stop", INTEGER)
+        end = within.unused(f"{name}_stop")
+        before = [f"const int {end} = {stop.text};"]
+        stop = Code(end, INTEGER)
     sign = "<" if numbers[2] > 0 else ">"
     known = None if None in numbers else len(range(*numbers))  # type: ignore[arg-type]
     if known is None and abs(numbers[2]) > 1:
         # The counter may pass the largest int.
-        head = f"for (long long {name}_at = {first.text}; {name}_at {sign} {stop.text}; "
-        head += f"{name}_at += {step.text}) {{"
-        return Loop(before, head, [(target.id, Code(f"(int){name}_at", INTEGER))], None)
+        at = within.unused(f"{name}_at")
+        head = (
+            f"for (long long {at} = {first.text}; {at} {sign} {stop.text}; {at} += {step.text}) {{"
+        )
+        return Loop(before, head, [(target.id, Code(f"(int){at}", INTEGER))], None)
     change = {1: "++", -1: "--"}.get(numbers[2], f" += {step.text}")
     head = f"for (int {name} = {first.text}; {name} {sign} {stop.text}; {name}{change}) {{"
     return Loop(before, head, [(target.id, Code(name, INTEGER))], known)
@@ -93,17 +96,9 @@ class _Items:
     """Takes the items of what a loop runs over apart."""
 
     def __init__(
-        self, within: Expressions, before: list[str], changed: set[str], prefix: str
+        self, within: Expressions, before: list[str], changed: set[str], name: str
     ) -> None:
-        self._within, self._before, self._changed = within, before, changed
-        self._prefix = prefix
-
-    def unused(self, word: str) -> str:
-        """A name that the function does not have."""
-        name = f"{self._prefix}{word}"
-        while name in self._within.names or f"{name} =" in " ".join(self._before):
-            name += "_"
-        return name
+        self._within, self._before, self._changed, self._name = within, before, changed, name
 
     def taken(
         self, target: ast.expr, iterable: ast.expr, place: Code
@@ -143,11 +138,11 @@ class _Items:
             yield from self._bound(one, part)
 
     def _named(self, node: ast.expr, code: Code) -> Code:
-        """The same, in a variable if it is no name, or if the body gives the name another value."""
-        root = next((n.id for n in ast.walk(node) if isinstance(n, ast.Name)), "")
-        if is_dotted_name(node) and root not in self._changed:
+        """The same, in a variable if it is no name, or if the body changes what it is made of."""
+        used = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
+        if is_dotted_name(node) and not used & self._changed:
             return code
-        name = self.unused("all")
+        name = self._within.unused(f"{self._name}_all")
         self._within.program.defined(code.shape)
         self._before.append(f"const {code.shape.name} {name} = {code.text};")
         return Code(name, code.shape)

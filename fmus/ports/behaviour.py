@@ -13,7 +13,7 @@ from inspect import signature
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
-from fmus.ports.groups import Nothing
+from fmus.ports.groups import Nothing, count_values, hints_of
 from fmus.ports.port import Misdeclared
 
 
@@ -22,18 +22,20 @@ class Hooks(Protocol):
 
     Args:
         parameters: what `PARAMETERS` in ports.py makes of the values of the parameters.
-        inputs: NamedTuple with one tuple of numbers for each group of input ports, in their order.
+        inputs: NamedTuple with a number, tuple, vector or matrix for each group of input ports, in
+            their order.
         state: NamedTuple of all that a step depends on besides inputs and parameters;
             :class:`~fmus.ports.groups.Nothing` for a component without memory.
         derived: what `derive` makes of the state.
-        outputs: a dictionary of the type `Outputs`.
+        outputs: of the type `Outputs`.
         t: time at the beginning of the step, or of the run [s].
         h: length of an internal step [s], at most `h_max`.
         n: how many internal steps a communication step has.
 
     """
 
-    #: TypedDict with one tuple of numbers for each group of output ports, in their order.
+    #: TypedDict or NamedTuple with a number, tuple, vector or matrix for each group of output
+    #: ports, in their order.
     Outputs: type
 
     #: What is logged, once an instance, when `restarted` is called; `{t:g}` is the time.
@@ -226,7 +228,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         said["Outputs"],
         types.get("parameters", Nothing),
         "".join(noisy),
-        len(get_args(hints["measured"]["n"])) if "measured" in hooks else 0,
+        count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),
     )
 
@@ -234,7 +236,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
 def _types(where: str, hook: FunctionType) -> dict[str, Any]:
     """The types of a hook's arguments and of what it returns."""
     try:
-        hints = get_type_hints(hook)
+        hints = hints_of(hook)
     except NameError as error:
         why = f"has a type that is not known: {error}"
         raise Misdeclared(f"{where} {why}", hook.__name__) from None

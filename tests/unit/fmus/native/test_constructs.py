@@ -1,0 +1,350 @@
+"""Each construct of the language of equations gives the same bits in Python and in C.
+
+Numbers come from everywhere: overflow, underflow, division by zero and domain errors are among them.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from importlib.util import find_spec
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fmus.native.language import CONSTANTS, MATHEMATICS
+from support.language import HEAD, TOO_LARGE, Twins, module_of, sizes_of
+
+ZIG = (sys.executable, "-m", "ziglang", "cc")
+
+#: Compilers, and how much they change.
+COMMANDS = {
+    "gcc -O0": ("gcc", "-O0"),
+    "gcc -O2": ("gcc", "-O2"),
+    "clang -O0": ("clang", "-O0"),
+    "clang -O2": ("clang", "-O2"),
+    "zig -O0": (*ZIG, "-O0"),
+    "zig -O2": (*ZIG, "-O2"),
+}
+
+#: What the functions share.
+SHARED = '''
+class Mode(IntEnum):
+    """An enumeration."""
+
+    OFF = 0
+    HEAT = 2
+
+
+class Inner(NamedTuple):
+    """A record in a record."""
+
+    a: float
+    n: int = 7
+
+
+class Record(NamedTuple):
+    """A record."""
+
+    x: float
+    v: Annotated[Vector, 3]
+    inner: Inner
+    on: bool = True
+    mode: Mode = Mode.OFF
+
+
+XS, YS = Vector((-2.0, -0.5, 1.0, 4.0)), Vector((3.0, -1.0, 0.5, 0.25))
+A = Matrix(((2.0, -1.0, 0.5), (0.0, 1.5, -0.25)))
+POWERS = (1, 2, 4, 8)
+NESTED = ((1.0, 2.5), (-3.0, 0.125))
+START = Inner(0.5)
+'''
+
+#: A name for each construct, and a function that consists of little else.
+CONSTRUCTS = {
+    **{
+        name: f"def f(x: float) -> float:\n    return {name}(x)\n"
+        for name in sorted(
+            MATHEMATICS
+            - {"atan2", "copysign", "fmod", "pow", "isfinite", "isinf", "isnan", "ceil", "floor", "trunc"}
+        )
+    },
+    **{
+        name: f"def f(x: float, y: float) -> float:\n    return {name}(x, y)\n"
+        for name in ("atan2", "copysign", "fmod", "pow", "min", "max")
+    },
+    **{
+        name: f"def f(x: float) -> bool:\n    return {name}(x)\n"
+        for name in ("isfinite", "isinf", "isnan", "bool")
+    },
+    **{
+        name: f"def f(x: float) -> int:\n    return {name}(x)\n"
+        for name in ("ceil", "floor", "trunc", "int", "round")
+    },
+    **{
+        name: f"def f(x: float) -> float:\n    return x * math.{name}\n"
+        for name in sorted(CONSTANTS)
+    },
+    **{
+        f"float {sign}": f"def f(x: float, y: float) -> float:\n    return x {sign} y\n"
+        for sign in ("+", "-", "*", "/", "//", "%")
+    },
+    **{
+        f"int {sign}": f"def f(k: int, n: int) -> int:\n    return k {sign} n\n"
+        for sign in ("+", "-", "*", "//", "%")
+    },
+    **{
+        f"mixed {sign}": f"def f(x: float, n: int) -> float:\n    return 3 {sign} x {sign} n\n"
+        for sign in ("+", "-", "*", "/", "//", "%")
+    },
+    **{
+        f"comparison {sign}": (
+            "def f(x: float, y: float, k: int) -> tuple[bool, bool]:\n"
+            f"    return x {sign} y, k {sign} x\n"
+        )
+        for sign in ("<", "<=", ">", ">=", "==", "!=")
+    },
+    "int /": "def f(k: int, n: int) -> float:\n    return k / n\n",
+    "int min max": "def f(k: int, n: int) -> tuple[int, int]:\n    return min(k, n, 5), max(k, n)\n",
+    "minus": "def f(x: float, k: int) -> tuple[float, int]:\n    return -x, -k\n",
+    "abs": "def f(x: float, k: int) -> tuple[float, int]:\n    return abs(x), abs(k)\n",
+    "float of": "def f(k: int, on: bool) -> tuple[float, float]:\n    return float(k), float(on)\n",
+    "int of bool": "def f(on: bool) -> int:\n    return int(on) + 1\n",
+    "min max of three": "def f(x: float, y: float) -> float:\n    return max(min(x, y, 1.0), -1.0, y)\n",
+    "min max of a vector": (
+        "def f(v: Annotated[Vector, 4]) -> tuple[float, float]:\n    return min(v), max(v)\n"
+    ),
+    "chain": "def f(x: float, y: float) -> bool:\n    return -1.0 < x <= y < 3.0\n",
+    "and or not": (
+        "def f(x: float, y: float, on: bool) -> bool:\n"
+        "    return (x > 0.0 and 1.0 / x > y) or not (on or y != 0.0 and x / y < 1.0)\n"
+    ),
+    "conditional expression": (
+        "def f(x: float, y: float) -> float:\n    return x / y if y else (1.0 if x > 0.0 else -x)\n"
+    ),
+    "if elif else": (
+        "def f(x: float, k: int) -> float:\n"
+        "    if x > 1.0:\n        y = x / k\n    elif k > 3:\n        y = 1.0 / x\n"
+        "    else:\n        y = x\n        y += 1.0\n    return y\n"
+    ),
+    "for range": (
+        "def f(x: float, n: int) -> float:\n"
+        "    total = 0.0\n    for k in range(n % 7):\n        total += x / (k + 1)\n"
+        "    for k in range(5, -3, -2):\n        total -= k * x\n    return total\n"
+    ),
+    "for vector": (
+        "def f(v: Annotated[Vector, 3]) -> float:\n"
+        "    total = 1.0\n    for x in v:\n        total = total * x + 1.0\n    return total\n"
+    ),
+    "for matrix": (
+        "def f(B: Annotated[Matrix, 2, 3]) -> float:\n"
+        "    total = 0.0\n    for row in B:\n        for x in row:\n            total += x\n"
+        "    return total\n"
+    ),
+    "for tuple": (
+        "def f(x: float) -> float:\n"
+        "    for a, b in NESTED:\n        x = a * x + b\n    for k in POWERS:\n        x -= k\n"
+        "    return x\n"
+    ),
+    "for zip enumerate": (
+        "def f(v: Annotated[Vector, 3], x: float) -> float:\n"
+        "    for k, (a, b) in enumerate(zip(v, XS)):\n        x += (a - b) * k\n    return x\n"
+    ),
+    "what a loop runs over stays what it was": (
+        "def f(v: Annotated[Vector, 3], k: int) -> Annotated[Vector, 3]:\n"
+        "    for x in v:\n        v = x * v\n"
+        "    for x in A[k % 2]:\n        k += 1\n        v = v.replaced(k % 3, x)\n    return v\n"
+    ),
+    "break continue": (
+        "def f(x: float, n: int) -> float:\n"
+        "    for k in range(20):\n        if k % 3 == n % 3:\n            continue\n"
+        "        x = x * 0.5 + k\n        if x > 12.0:\n            break\n    return x\n"
+    ),
+    "while": (
+        "def f(x: float) -> tuple[float, int]:\n"
+        "    k = 0\n    while abs(x) > 1e-3 and k < 50:\n        x /= 3.0\n        k += 1\n"
+        "    return x, k\n"
+    ),
+    "assignments": (
+        "def f(x: float, y: float, k: int) -> tuple[float, float, int]:\n"
+        "    x, y = y, x + y\n    a: float = x\n    a *= 2.0\n    a -= y\n    k += 2\n    k *= k\n"
+        "    (x, y), k = (y, a), k - 1\n    return x, y, k\n"
+    ),
+    "taken apart": (
+        "def f(r: Record) -> float:\n"
+        "    x, v, (a, n), on, mode = r\n    p, _, q = v\n    return x + p * q - a * n + on - mode\n"
+    ),
+    "local function": (
+        "def f(x: float, y: float) -> float:\n"
+        "    def g(a: float) -> float:\n        return a / x\n"
+        "    def h(b: float) -> float:\n        return g(b) + g(b * y)\n    return h(2.0) - h(y)\n"
+    ),
+    "record": (
+        "def f(x: float, v: Annotated[Vector, 3], k: int) -> Record:\n"
+        "    first = Record(x, v, Inner(x / 2.0), mode=Mode.HEAT)\n"
+        "    return first._replace(on=first.inner.n > k, inner=START._replace(n=k))\n"
+    ),
+    "enumeration": (
+        "def f(r: Record) -> tuple[bool, int]:\n"
+        "    mode = Mode.HEAT if r.on else r.mode\n    return mode == Mode.OFF, mode + 1\n"
+    ),
+    "constants": (
+        "def f(k: int) -> tuple[int, float, float]:\n"
+        "    return POWERS[k % 4], NESTED[k % 2][-1], START.a\n"
+    ),
+    "element": "def f(v: Annotated[Vector, 3], k: int) -> float:\n    return v[k] + v[0] - v[-1]\n",
+    "element of a matrix": (
+        "def f(B: Annotated[Matrix, 2, 3], i: int, j: int) -> float:\n"
+        "    return B[i, j] + B[i][j] - B[-1, 0] * A[1, j]\n"
+    ),
+    "slice": (
+        "def f(v: Annotated[Vector, 4]) -> tuple[float, float]:\n"
+        "    w = v[1:3]\n    return w @ v[::2], Vector((*v[2:], 1.0, *w)).sum()\n"
+    ),
+    "len": "def f(v: Annotated[Vector, 4]) -> int:\n    return len(v) * len(A)\n",
+    "vector + -": (
+        "def f(v: Annotated[Vector, 3], w: Annotated[Vector, 3]) -> Annotated[Vector, 3]:\n"
+        "    return -(v + w) - w\n"
+    ),
+    "vector * /": (
+        "def f(v: Annotated[Vector, 3], x: float, k: int) -> Annotated[Vector, 3]:\n"
+        "    return 2 * v / x - x * v * k\n"
+    ),
+    "vector @": (
+        "def f(v: Annotated[Vector, 3], w: Annotated[Vector, 3]) -> float:\n    return v @ w + v.sum()\n"
+    ),
+    "replaced": (
+        "def f(v: Annotated[Vector, 3], k: int, x: float) -> Annotated[Vector, 3]:\n"
+        "    return v.replaced(k, x).replaced(-1, 2)\n"
+    ),
+    "matrix + - * /": (
+        "def f(B: Annotated[Matrix, 2, 3], x: float) -> Annotated[Matrix, 2, 3]:\n"
+        "    return x * (A - B) / 3.0 + -B * 2\n"
+    ),
+    "matrix @": (
+        "def f(B: Annotated[Matrix, 2, 3], v: Annotated[Vector, 3]) -> tuple[\n"
+        "    Annotated[Matrix, 3, 3], Annotated[Vector, 2]\n]:\n    return A.T @ B, B @ v\n"
+    ),
+    "matrix replaced": (
+        "def f(B: Annotated[Matrix, 2, 3], k: int) -> Annotated[Matrix, 2, 3]:\n"
+        "    return B.replaced(k, A[0])\n"
+    ),
+    "vector of an expression": (
+        "def f(v: Annotated[Vector, 3], x: float) -> Annotated[Vector, 3]:\n"
+        "    return Vector(a / x + k for k, a in enumerate(v)) - Vector(x * k for k in range(3))\n"
+    ),
+    "matrix of an expression": (
+        "def f(v: Annotated[Vector, 3], x: float) -> Annotated[Matrix, 3, 2]:\n"
+        "    return Matrix((a * x + j for j in range(2)) for a in v)\n"
+    ),
+    "tuple of an expression": (
+        "def f(x: float) -> tuple[int, int, int]:\n    return tuple(int(k * x) for k in range(3))\n"
+    ),
+    "matrix of rows": (
+        "def f(v: Annotated[Vector, 2], x: float) -> Annotated[Matrix, 2, 2]:\n"
+        "    return Matrix((v, (x, 1))) @ Matrix((Vector((x, 0.0)), v))\n"
+    ),
+    "interpolate": "def f(x: float) -> float:\n    return interpolate(x, XS, YS)\n",
+    "solve": (
+        "def f(B: Annotated[Matrix, 2, 2], v: Annotated[Vector, 2]) -> Annotated[Vector, 2]:\n"
+        "    return solve(B, v)\n"
+    ),
+    "raise": (
+        "def f(x: float, k: int) -> float:\n"
+        "    if x > 1.0:\n        raise Refusal(f\"100 % of {x:.3f} or {x:g} in {k}\")\n"
+        "    if k > 1:\n        raise ValueError(\"no\")\n    return x\n"
+    ),
+    "ring buffer": (
+        "def f(v: Annotated[Vector, 4], x: float, k: int) -> tuple[float, Annotated[Vector, 4], int]:\n"
+        "    at = k % 4\n    return v[at], v.replaced(at, x), (at + 1) % 4\n"
+    ),
+    "names of C": (
+        "def f(double: float, error: int, int_: float) -> float:\n"
+        "    switch, sin = double / int_, 1.0\n    register = switch + sin\n    return register * error\n"
+    ),
+}  # fmt: skip
+
+floats = st.floats() | st.floats(-3.0, 3.0) | st.sampled_from([0.0, -0.0, 1.0, 0.5, 5e-324, 1e308])
+integers = st.integers(-(2**31), 2**31 - 1) | st.integers(-5, 8)
+KINDS = {"a float": floats, "an int": integers, "a bool": st.integers(0, 1)}
+
+
+def text_of() -> str:
+    functions = [text.replace("def f(", f"def f{i}(") for i, text in enumerate(CONSTRUCTS.values())]
+    return "\n\n".join([HEAD + SHARED, *functions])
+
+
+@pytest.fixture(scope="module")
+def twins(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Twins]:
+    return {}
+
+
+def twins_of(kept: dict[str, Twins], command: str, factory: pytest.TempPathFactory) -> Twins:
+    """All functions, compiled once."""
+    if command not in kept:
+        folder = factory.mktemp("constructs")
+        name = f"constructs_{len(kept)}"
+        kept[command] = Twins(module_of(text_of(), folder, name), folder, COMMANDS[command])
+    return kept[command]
+
+
+def marked(command: str) -> Any:
+    is_zig = command.startswith("zig")
+    there = find_spec("ziglang") is not None if is_zig else shutil.which(COMMANDS[command][0])
+    missing = pytest.mark.skipif(not there, reason=f"{command.split()[0]} is not installed")
+    return pytest.param(command, marks=[missing, *([pytest.mark.slow] if is_zig else [])])
+
+
+@pytest.mark.parametrize("command", [marked(command) for command in COMMANDS])
+@pytest.mark.parametrize("name", CONSTRUCTS)
+def test_python_and_c_agree_bit_for_bit(
+    twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory, command: str, name: str
+):
+    both = twins_of(twins, command, tmp_path_factory)
+    function = f"f{[*CONSTRUCTS].index(name)}"
+    types = sizes_of(both.functions[function])
+
+    @given(st.tuples(*(KINDS[shape.word] for shape in types)))
+    @settings(max_examples=60, deadline=None)
+    def agree(numbers: tuple[float, ...]) -> None:
+        python, c = both.python(function, numbers), both.c(function, numbers)
+        if c.error == TOO_LARGE:
+            # C has no room where Python goes on: it says so, and gives no other number.
+            return
+        assert python.bits == c.bits
+        assert bool(python.error) == bool(c.error)
+
+    agree()
+
+
+@pytest.mark.parametrize("name", ["int +", "int *", "floor"])
+def test_an_integer_that_c_cannot_hold_is_refused(
+    twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory, name: str
+):
+    command = next(c for c in ("gcc -O2", "clang -O2") if shutil.which(COMMANDS[c][0]))
+    both = twins_of(twins, command, tmp_path_factory)
+    function = f"f{[*CONSTRUCTS].index(name)}"
+    given_ = (2.0**31,) if name == "floor" else (2**31 - 1, 2**31 - 1)
+    assert both.c(function, given_).error == TOO_LARGE
+    assert not isnan(sum(given_))
+
+
+def test_functions_are_files_of_one_folder(tmp_path: Path):
+    """What a component's modules import from beside them is translated with it."""
+    (tmp_path / "helpers_beside.py").write_text(
+        "from __future__ import annotations\n\n\ndef half(x: float) -> float:\n    return x / 2.0\n"
+    )
+    text = (
+        HEAD
+        + "from helpers_beside import half\n\n\ndef f(x: float) -> float:\n    return half(x)\n"
+    )
+    sys.path.insert(0, str(tmp_path))
+    try:
+        both = Twins(module_of(text, tmp_path, "with_helpers"), tmp_path)
+    finally:
+        sys.path.remove(str(tmp_path))
+    assert both.c("f", [3.0]).numbers == both.python("f", [3.0]).numbers == (1.5,)
