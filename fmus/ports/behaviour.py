@@ -242,8 +242,8 @@ def _types(where: str, hook: FunctionType) -> dict[str, Any]:
         raise Misdeclared(f"{where} {why}", hook.__name__) from None
     for name in (*signature(hook).parameters, "return"):
         if name not in hints:
-            what = "does not say what it returns" if name == "return" else f"takes {name} of no type"
-            raise Misdeclared(f"{where} {what}", hook.__name__)
+            why = f"takes {name} of no type" if name != "return" else "does not say what it returns"
+            raise Misdeclared(f"{where} {why}", hook.__name__)
     return hints
 
 

@@ -107,7 +107,8 @@ def _declared(
             raise _wrong(place, "has no default value, which a parameter starts with")
         if causality == "output" and said.feedthrough is None:
             said = replace(said, feedthrough=direct)
-        ports = [_port(f"{prefix}{field}{part.name}", causality, said, part, place) for part in parts]
+        named = [(f"{prefix}{field}{part.name}", part) for part in parts]
+        ports = [_port(name, causality, said, part, place) for name, part in named]
         fields[field] = tuple(ports) if parts[0].name else ports[0]
     return fields
 
@@ -146,7 +147,8 @@ def _hints(made: Any) -> dict[str, Any]:
     except NameError as error:
         missing = str(error).split("'")[1]
         named = [f for f, hint in made.__annotations__.items() if missing in str(hint)]
-        raise _wrong((made.__name__, *named[:1]), f"has a type that is not known: {error}") from None
+        why = f"has a type that is not known: {error}"
+        raise _wrong((made.__name__, *named[:1]), why) from None
 
 
 def _annotated(hint: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -180,7 +182,9 @@ def _parts(
         yield _Part(name, name.strip(".[]"), number, first)
 
 
-def _shape(hint: Any, notes: tuple[Any, ...], place: tuple[str, ...]) -> tuple[tuple[int, ...], Any]:
+def _shape(
+    hint: Any, notes: tuple[Any, ...], place: tuple[str, ...]
+) -> tuple[tuple[int, ...], Any]:
     """How many numbers a type has along each dimension, and of which type."""
     if hint in (Vector, Matrix):
         sizes = tuple(note for note in notes if type(note) is int)
