@@ -295,7 +295,9 @@ def twins_of(kept: dict[str, Twins], command: str, factory: pytest.TempPathFacto
 def marked(command: str) -> Any:
     is_zig = command.startswith("zig")
     there = find_spec("ziglang") is not None if is_zig else shutil.which(COMMANDS[command][0])
-    missing = pytest.mark.skipif(not there, reason=f"{command.split()[0]} is not installed")
+    missing = pytest.mark.skipif(
+        not there, reason=f"{command.split(maxsplit=1)[0]} is not installed"
+    )
     return pytest.param(command, marks=[missing, *([pytest.mark.slow] if is_zig else [])])
 
 
