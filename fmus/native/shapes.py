@@ -160,16 +160,18 @@ def structure(items: list[Shape], name: str | None = None) -> Structure:
     return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
 
 
-def leaves_of(shape: Shape, name: str = "") -> list[tuple[str, Scalar]]:
-    """The numbers in something of a shape: how each is written after its name, and its type."""
-    if isinstance(shape, Scalar):
-        return [(name, shape)]
-    return [leaf for suffix, part in shape.parts for leaf in leaves_of(part, name + suffix)]
-
-
 def count_numbers(shape: Shape) -> int:
-    """How many numbers a shape holds."""
-    return len(leaves_of(shape))
+    """How many numbers a shape holds.
+
+    Raises:
+        TypeError: some of them are not doubles.
+
+    """
+    if isinstance(shape, Structure):
+        return sum(count_numbers(part) for _, part in shape.parts)
+    if shape != DOUBLE:
+        raise TypeError(f"{shape.name} among numbers")
+    return 1
 
 
 def inner_structures(shape: Shape) -> Iterator[Structure]:

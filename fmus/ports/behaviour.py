@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from inspect import signature
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, get_args, get_type_hints
 
-from fmus.ports.groups import Nothing, count_values, hints_of
+from fmus.ports.groups import Nothing
 
 
 class Hooks(Protocol):
@@ -58,8 +58,7 @@ class Hooks(Protocol):
         a value was set.
 
         Returns:
-            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`; only outputs, if
-            there is no state.
+            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`.
 
         """
 
@@ -150,7 +149,6 @@ class Behaviour(NamedTuple):
         hooks: all by name; None for one that it does not have.
         state, derived, inputs, outputs, parameters: types that they take and return; derived is
             None without `derive`.
-        is_stateless: whether `begin` and `advance` give only outputs.
         noisy: the group of outputs that `measured` gives; empty: there is none.
         draws: how many numbers it takes.
         restarted: the text `RESTARTED`.
@@ -163,7 +161,6 @@ class Behaviour(NamedTuple):
     inputs: Any
     outputs: Any
     parameters: Any
-    is_stateless: bool
     noisy: str
     draws: int
     restarted: str
@@ -199,9 +196,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         own = isinstance(value, FunctionType) and value.__module__ == where
         if own and name not in HOOKS and not name.startswith("_"):
             raise TypeError(f"{where}.{name} is not one of the hooks {', '.join(HOOKS)}")
-    hints = {name: hints_of(hook) for name, hook in hooks.items()}
+    hints = {name: get_type_hints(hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
-    groups = hints_of(said["Outputs"])
+    groups = get_type_hints(said["Outputs"])
     noisy = [name for name in hints.get("measured", ()) if name in groups]
     for name, found in hints.items():
         known = (*HOOKS[name], *noisy, "return")
@@ -213,13 +210,12 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         raise TypeError(f"{where}.measured takes {len(noisy)} groups of outputs, not one")
     return Behaviour(
         {name: hooks.get(name) for name in HOOKS},
-        types.get("state", Nothing),
+        types["state"],
         hints["derive"]["return"] if "derive" in hooks else None,
         types.get("inputs", Nothing),
         said["Outputs"],
-        types.get("parameters", Nothing),
-        hints["begin"]["return"] is said["Outputs"],
+        types["parameters"],
         "".join(noisy),
-        count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
+        len(get_args(hints["measured"]["n"])) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),
     )

@@ -40,14 +40,13 @@ LONGEST_MESSAGE = 500
 class Store:
     """Values of all ports.
 
-    A port's value reference is its place among the ports. All inputs and all outputs lie in lists
-    of their own, in their order, so that a host that passes them all as Reals in one call costs
+    A port's value reference is its place among the ports. All Real inputs and all Real outputs lie
+    in lists of their own, in their order, so that a host that passes them all in one call costs
     one comparison instead of one look-up a value.
 
     Attributes:
         ports: of the component, `fault` last.
-        input_references, output_references: of the inputs and outputs.
-        real_references: of the inputs, if all of them are Reals.
+        input_references, output_references: of the Real inputs and outputs.
         inputs, outputs: their values.
         parameters: by name.
         fault: whether a value or a step was discarded.
@@ -59,13 +58,8 @@ class Store:
         self.input_references = self._references("input")
         self.output_references = self._references("output")
         self.fault_references = [len(ports)]
-        inputs = [self.ports[reference] for reference in self.input_references]
-        all_real = all(port.type == "Real" for port in inputs)
-        self.real_references = self.input_references if all_real else None
-        self.inputs: list[Any] = [
-            MISSING[port.type] if port.start is None else port.start for port in inputs
-        ]
-        self.outputs: list[Any] = self.no_outputs()
+        self.inputs = [0.0] * len(self.input_references)
+        self.outputs = [0.0] * len(self.output_references)
         self.parameters: dict[str, Value] = {
             port.name: port.start
             for port in ports
@@ -77,12 +71,8 @@ class Store:
         return [
             reference
             for reference, port in enumerate(self.ports)
-            if port.causality == causality and port is not FAULT
+            if port.causality == causality and port.type == "Real"
         ]
-
-    def no_outputs(self) -> list[Any]:
-        """The outputs where there is no state."""
-        return [MISSING[self.ports[reference].type] for reference in self.output_references]
 
     def port(self, reference: int, *types: str) -> Port:
         """The port of one of some types that has a value reference.
@@ -112,11 +102,9 @@ class Store:
             return self.fault
         if port.causality == "parameter":
             return self.parameters[port.name]
-        is_input = port.causality == "input"
-        references = self.input_references if is_input else self.output_references
-        values = self.inputs if is_input else self.outputs
-        value: Value = values[references.index(reference)]
-        return value
+        if port.causality == "input":
+            return self.inputs[self.input_references.index(reference)]
+        return self.outputs[self.output_references.index(reference)]
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
@@ -195,14 +183,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         return store.outputs if vrs == store.output_references else self._get(vrs, "Real")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        if self._stale:
-            self._refresh_outputs(vrs)
         return self._get(vrs, "Integer")
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         store = self._store
-        if self._stale:
-            self._refresh_outputs(vrs)
         return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
 
     def get_string(self, vrs: list[int]) -> list[str]:
@@ -211,7 +195,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[float]) -> None:
         store = self._store
         # A sum is finite only if every value is; _set finds out which one was not.
-        if vrs == store.real_references and self._mode == STEPPING and isfinite(sum(values)):
+        if vrs == store.input_references and self._mode == STEPPING and isfinite(sum(values)):
             store.inputs = values
         else:
             self._set(vrs, values, "Real")
@@ -273,8 +257,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 continue
             port.checked(value)
             if port.causality == "input":
-                number = float(value) if port.type == "Real" else value
-                inputs[store.input_references.index(reference)] = number
+                inputs[store.input_references.index(reference)] = float(value)
             else:
                 parameters = {**parameters, port.name: value}
         if parameters is not store.parameters and self._mode == STEPPING:

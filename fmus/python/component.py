@@ -21,7 +21,7 @@ from pythonfmu.enums import Fmi2Status
 
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS, internal_steps, longest_step
 from fmus.ports.description import EXPERIMENT, complete
-from fmus.ports.groups import ParameterSet, packing, unpacking
+from fmus.ports.groups import ParameterSet, packing, slices, unpacking
 from fmus.ports.port import H_MAX, Refusal, Value
 from fmus.python.callbacks import (
     INITIALISING,
@@ -33,7 +33,6 @@ from fmus.python.callbacks import (
 )
 from fmus.python.state import (
     Snapshot,
-    check_integers,
     checked,
     from_bytes,
     measuring,
@@ -124,8 +123,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         }
         cls._unpack = staticmethod(unpacking(inputs, ports["input"], cls.group_of))
         cls._pack = staticmethod(packing(outputs, ports["output"]))
-        cls._unpack_outputs = staticmethod(unpacking(outputs, ports["output"], {}))
-        cls._has_integers = any(port.type == "Integer" for port in ports["output"])
+        cls._output_places = slices(ports["output"])
         cls._norm = staticmethod(measuring(cls._state_type))
         cls._samples = cls.sample is not Component.sample
         # PythonFMU looks methods up by names that miss Python's cache: the first class has them.
@@ -173,7 +171,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             try:
                 self._begin()
             except BaseException as error:
-                self._state, self._store.outputs = None, self._store.no_outputs()
+                self._state, self._store.outputs = None, [0.0] * len(self._store.outputs)
                 return f"initialisation refused: {describe_error(error)}"
             self._stale = False
         return ""
@@ -233,12 +231,10 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             return False
         return True
 
-    def _accept(self, state: State, values: list[Any]) -> None:
+    def _accept(self, state: State, values: list[float]) -> None:
         """Take over state and outputs, if no number of theirs is out of bounds."""
         if not self._norm(state) <= LARGEST_STATE:
             raise Refusal(f"the state is not finite, or exceeds {LARGEST_STATE:g}")
-        if self._has_integers:
-            check_integers(*(value for value in values if isinstance(value, int)))
         if not isfinite(sum(values)):
             # What is finite may still be too large to be added up.
             for reference, value in zip(self._store.output_references, values):
@@ -309,8 +305,9 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
 
-    def _check_outputs(self, parameters: Parameters, state: State, values: list[Any]) -> None:
-        expected = self.expected(parameters, state, self._unpack_outputs(values))
+    def _check_outputs(self, parameters: Parameters, state: State, values: list[float]) -> None:
+        groups: Any = {group: tuple(values[at]) for group, at in self._output_places.items()}
+        expected = self.expected(parameters, state, groups)
         if expected is not None and not nearly_equal(self._pack(expected), values):
             raise Refusal("its outputs do not match its state")
 

@@ -18,7 +18,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import cache
-from itertools import repeat
 from math import isfinite
 from random import Random
 from types import ModuleType, new_class
@@ -28,7 +27,7 @@ from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import define
-from fmus.ports.groups import SCOPE, Nothing, gathered, hints_of, parts_of, slices
+from fmus.ports.groups import slices
 from fmus.ports.port import Refusal
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
 
@@ -80,9 +79,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
     }
     scope = {
         **said.hooks,
-        **SCOPE,
         "Random": Random,
-        "nothing": Nothing(),
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
     }
@@ -123,8 +120,7 @@ def _steps(said: Behaviour) -> Iterator[str]:
                 "    return self._latest, outputs",
             ]
         else:
-            state = "nothing, " if said.is_stateless else ""
-            lines += [f"    return {state}{_call(said, hook)}"]
+            lines += [f"    return {_call(said, hook)}"]
         yield "\n".join(lines)
 
 
@@ -140,15 +136,10 @@ def _checks(said: Behaviour) -> Iterator[str]:
 def _noise(said: Behaviour, place: slice | None) -> Iterator[str]:
     """How an output gets its noise."""
     if place is not None:
-        hook = said.hooks["measured"]
-        assert hook is not None
-        hints = hints_of(hook)
-        n = gathered(hints["n"], repeat("gauss(0.0, 1.0)"))
-        places = range(place.start, place.stop)
-        values = gathered(hints[said.noisy], iter(f"values[{i}]" for i in places))
-        call = _call(said, "measured", **{"n": n, said.noisy: values})
-        noisy = f"({call},)" if parts_of(hints["return"]) is None else call
+        n = "".join(["gauss(0.0, 1.0), "] * said.draws)
+        values = "".join(f"values[{i}], " for i in range(place.start, place.stop))
+        call = _call(said, "measured", **{"n": f"({n})", said.noisy: f"({values})"})
         yield (
             "def sample(self, values):\n    gauss = self._random.gauss\n"
-            f"    values[{place.start}:{place.stop}] = noisy = {noisy}\n    return noisy"
+            f"    values[{place.start}:{place.stop}] = noisy = {call}\n    return noisy"
         )

@@ -13,9 +13,8 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from itertools import count
 from math import hypot, isclose
-from typing import Annotated, Any, Callable, TypedDict, Union, get_args, get_origin
+from typing import Any, Callable, TypedDict, Union, get_args, get_origin, get_type_hints
 
-from fmus.ports.groups import class_of, parts_of
 from fmus.ports.port import Refusal, Value
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
 
@@ -28,9 +27,6 @@ _UNUSABLE = "unusable"
 #: How far results from the same numbers may differ between two machines.
 _ROUNDING = 1e-9
 
-#: Integers in a state are below it.
-_MOST_INTEGERS = 2**31
-
 #: Key of the checksum in the bytes of a state.
 _CHECKSUM = "checksum"
 
@@ -38,48 +34,43 @@ _CHECKSUM = "checksum"
 def measuring(hint: type) -> Callable[[Any], float]:
     """A function that gives the Euclidean norm of all floats of a state: NaN if one is NaN.
 
-    It refuses integers that exceed 32 bits. It runs once a step, and written out it costs a third
-    of a loop.
+    It runs once a step, and written out it costs a third of a loop.
     """
-    names, floats, integers = (f"x{i}" for i in count()), [], []
+    names, floats = (f"x{i}" for i in count()), []
 
     def target(hint: Any) -> str:
-        hints = parts_of(hint)
+        hints = _elements(hint)
         if hints is not None:
             return f"({''.join(f'{target(k)}, ' for k in hints)})"
-        name, kind = next(names), class_of(hint)
-        if kind is float:
+        name = next(names)
+        if hint is float:
             floats.append(name)
-        elif _is_integer(kind):
-            integers.append(name)
-        elif kind not in _SCALARS:
+        elif hint not in _SCALARS:
             floats.append(f"norm({name})")
         return name
 
-    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm, "check_integers": check_integers}
+    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm}
     pattern = target(hint)
     norm = f"hypot({', '.join(floats)})" if floats else "0.0"
-    check = f" check_integers({', '.join(integers)})\n" if integers else ""
-    text = f"def function(state):\n {pattern} = state\n{check} return {norm}"
+    text = f"def function(state):\n {pattern} = state\n return {norm}"
     exec(text, scope)
     function: Callable[[Any], float] = scope["function"]
     return function
-
-
-def check_integers(*values: int) -> None:
-    """Refuse integers that FMI and C have no room for."""
-    if not all(-_MOST_INTEGERS <= value < _MOST_INTEGERS for value in values):
-        raise OverflowError("an integer exceeds 32 bits")
-
-
-def _is_integer(hint: Any) -> bool:
-    return isinstance(hint, type) and issubclass(hint, int) and hint is not bool
 
 
 def _norm(value: Any) -> float:
     if isinstance(value, (list, tuple)):
         return hypot(*map(_norm, value))
     return value if isinstance(value, float) else 0.0
+
+
+def _elements(hint: Any) -> list[Any] | None:
+    """The types of the elements of a tuple that is always of the same length."""
+    if isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields"):
+        hints = get_type_hints(hint)
+        return [hints[name] for name in hint._fields]
+    arguments = get_args(hint)
+    return [*arguments] if get_origin(hint) is tuple and Ellipsis not in arguments else None
 
 
 def restored(hint: Any, value: Any) -> Any:
@@ -93,23 +84,19 @@ def restored(hint: Any, value: Any) -> Any:
         Refusal: it is of another type or length, or not finite.
 
     """
-    hints = parts_of(hint)
+    hints = _elements(hint)
     if hints is not None:
         if not isinstance(value, (list, tuple)) or len(value) != len(hints):
             raise Refusal(f"{_shown(value)} instead of {len(hints)} values")
-        return tuple.__new__(class_of(hint), map(restored, hints, value))
-    if get_origin(hint) is Annotated:
-        hint = class_of(hint)
+        made = map(restored, hints, value)
+        return hint._make(made) if hasattr(hint, "_make") else tuple(made)
     if _is_union(hint):
         return _as_one_of(get_args(hint), value)
     if hint is float and type(value) in (float, int):
         if not abs(value) <= sys.float_info.max:
             raise Refusal("a value is not finite")
         return value
-    if _is_integer(hint) and isinstance(value, int) and not isinstance(value, bool):
-        check_integers(value)
-        return hint(value)
-    if (hint in _SCALARS or _is_integer(hint)) and type(value) is not hint:
+    if hint in _SCALARS and type(value) is not hint:
         raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
     return frozen(value)
 
@@ -145,8 +132,8 @@ class Snapshot(TypedDict):
     mode: str
     start_time: float
     parameters: dict[str, Value]
-    inputs: list[Any]
-    outputs: list[Any]
+    inputs: list[float]
+    outputs: list[float]
     state: Any  #: NamedTuple of the component, None before the initialisation
     hidden: Any  #: what the component keeps outside its state
     fault: bool
@@ -233,7 +220,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, hint: type) -
     )
 
 
-def _values(store: Store, references: Sequence[int], values: Any) -> list[Any]:
+def _values(store: Store, references: Sequence[int], values: Any) -> list[float]:
     if not isinstance(values, (list, tuple)) or len(values) != len(references):
         raise Refusal("its values do not match the ports")
     for reference, value in zip(references, values):

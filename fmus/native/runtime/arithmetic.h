@@ -21,7 +21,6 @@
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
-#include <string.h>
 
 /* Bytes of the text of an error. */
 enum { WHY = 512 };
@@ -179,9 +178,6 @@ static inline int integer(long long k, Error *error) {
     raise_error(error, "OverflowError: an integer exceeds 32 bits");
     return 0;
 }
-
-/* Whether a number is an integer of 32 bits. */
-static inline int is_integer(double x) { return x >= INT_MIN && x <= INT_MAX && x == trunc(x); }
 
 /* A float without a fraction as an integer. */
 static inline int integer_of(double x, Error *error) {

@@ -1,8 +1,8 @@
 /* Values of ports, and what may be done with them.
  *
- * A port's value reference tells its place in the table. All inputs and all outputs lie side by
- * side as doubles, in their order, so that a host that passes them all as Reals in one call costs
- * one comparison.
+ * A port's value reference tells its place in the table. All Real inputs and all Real outputs lie
+ * side by side, in their order, so that a host that passes them all in one call costs one
+ * comparison.
  */
 #include <math.h>
 #include <string.h>
@@ -25,9 +25,6 @@ static const port *port_at(uint32_t reference) {
     uint32_t place = reference - FIRST_REFERENCE;
     return place < N_PORTS ? &ports[place] : NULL;
 }
-
-/* Whether it is the last one, which every component has. */
-static int is_fault(const port *port) { return port == &ports[N_PORTS - 1]; }
 
 /* The port of a type that has a value reference. */
 static const port *port_of(uint32_t reference, fmi_type type) {
@@ -113,7 +110,7 @@ static double number_of(call *this, uint32_t reference, fmi_type type) {
     }
     if (port->causality == PARAMETER) return parameter(&run->parameters, port);
     if (port->causality == INPUT) return run->inputs.values[port->place];
-    if (is_fault(port)) return run->fault;
+    if (port->type == BOOLEAN) return run->fault;
     return run->moments[run->now].outputs.values[port->place];
 }
 
@@ -124,23 +121,16 @@ static int are_all(const uint32_t references[], const uint32_t all[], size_t n) 
 
 static int has_output(const uint32_t references[], size_t n) {
     for (size_t i = 0; i < n; i++) {
-        const port *port = port_at(references[i]);
-        if (port != NULL && port->causality == OUTPUT && !is_fault(port)) return 1;
+        const port *port = port_of(references[i], REAL);
+        if (port != NULL && port->causality == OUTPUT) return 1;
     }
     return 0;
 }
 
-/* Lets outputs be those of the values that were set, if there are outputs among the references. */
-static void refresh_outputs(call *this, const uint32_t references[], size_t n) {
-    message why;
-    if (this->instance->stale && has_output(references, n) && !refresh(this->instance, &why)) {
-        refuse_to_get(this, &why);
-    }
-}
-
 static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
     instance *it = this->instance;
-    refresh_outputs(this, references, n);
+    message why;
+    if (it->stale && has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
     if (n == MODEL_OUTPUTS && are_all(references, output_references, n)) {
         memcpy(values, it->run.moments[it->run.now].outputs.values, n * sizeof *values);
         return;
@@ -149,12 +139,10 @@ static void get_reals(call *this, const uint32_t references[], size_t n, double 
 }
 
 static int32_t get_integer(call *this, uint32_t reference) {
-    refresh_outputs(this, &reference, 1);
     return (int32_t)number_of(this, reference, INTEGER);
 }
 
 static int get_boolean(call *this, uint32_t reference) {
-    refresh_outputs(this, &reference, 1);
     return number_of(this, reference, BOOLEAN) != 0.0;
 }
 
@@ -271,7 +259,7 @@ static int all_finite(const double values[], size_t n) {
 
 static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
     run *run = &this->instance->run;
-    if (n == MODEL_INPUTS && n == REAL_INPUTS && run->mode == STEPPING && are_all(references, input_references, n) &&
+    if (n == MODEL_INPUTS && run->mode == STEPPING && are_all(references, input_references, n) &&
         all_finite(values, n)) {
         memcpy(run->inputs.values, values, n * sizeof *values);
         return;

@@ -98,7 +98,7 @@ def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
         behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
 
 
-@pytest.mark.parametrize("path", ["native/glue.py", "python/slave.py"])
+@pytest.mark.parametrize("path", ["native/translator.py", "python/slave.py"])
 def test_both_kinds_call_every_hook(path):
     text = (package_folder("fmus") / path).read_text(encoding="utf-8")
     assert set(re.findall(r"""["'](\w+)["']""", text)) >= HOOKS.keys()
