@@ -140,8 +140,8 @@ class Calls(Expressions):
 
     def _length(self, node: ast.Call) -> Code:
         shape = self.code(node.args[0]).shape
-        if not isinstance(shape, Structure):
-            raise self.fail(node, "len of a number")
+        if not isinstance(shape, Structure) or not is_dotted_name(node.args[0]):
+            raise self.fail(node, "len of a number, or of something that has no name")
         return Code(str(len(shape.parts)), INTEGER)
 
     def _extreme(self, node: ast.Call, word: str) -> Code:

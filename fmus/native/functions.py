@@ -210,11 +210,12 @@ class _Translation:
         """A function within this one, as a function of its own that gets what it captures."""
         body = ast.Module(node.body, [])
         inner, captured = self._in_c.inside(body, node.name)
+        own = {argument.arg for argument in node.args.args}
+        captured = [name for name in captured if name not in own]
         for name in captured:
             if self._assigned[name] > (name not in self._made.arguments):
                 raise self._in_c.fail(node, f"{name}, which {node.name} uses, is changed")
         given: dict[str, Any] = {a.arg: self._shape(a.annotation) for a in node.args.args}
-        captured = [name for name in captured if name not in given]
         made = inner.made
         made.arguments = {**given, **{name: self._in_c.local[name] for name in captured}}
         nothing = isinstance(node.returns, ast.Constant) and node.returns.value is None
