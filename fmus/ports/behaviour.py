@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from inspect import signature
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple, Protocol, get_args, get_type_hints
+from typing import Any, NamedTuple, Protocol, get_type_hints
 
-from fmus.ports.groups import Nothing
+from fmus.ports.groups import Nothing, count_values, hints_of
 
 
 class Hooks(Protocol):
@@ -21,18 +21,20 @@ class Hooks(Protocol):
 
     Args:
         parameters: what `PARAMETERS` in ports.py makes of the values of the parameters.
-        inputs: NamedTuple with one tuple of numbers for each group of input ports, in their order.
+        inputs: NamedTuple with a number, tuple, vector or matrix for each group of input ports, in
+            their order.
         state: NamedTuple of all that a step depends on besides inputs and parameters;
             :class:`~fmus.ports.groups.Nothing` for a component without memory.
         derived: what `derive` makes of the state.
-        outputs: a dictionary of the type `Outputs`.
+        outputs: of the type `Outputs`.
         t: time at the beginning of the step, or of the run [s].
         h: length of an internal step [s], at most `h_max`.
         n: how many internal steps a communication step has.
 
     """
 
-    #: TypedDict with one tuple of numbers for each group of output ports, in their order.
+    #: TypedDict or NamedTuple with a number, tuple, vector or matrix for each group of output
+    #: ports, in their order.
     Outputs: type
 
     #: What is logged, once an instance, when `restarted` is called; `{t:g}` is the time.
@@ -196,7 +198,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         own = isinstance(value, FunctionType) and value.__module__ == where
         if own and name not in HOOKS and not name.startswith("_"):
             raise TypeError(f"{where}.{name} is not one of the hooks {', '.join(HOOKS)}")
-    hints = {name: get_type_hints(hook) for name, hook in hooks.items()}
+    hints = {name: hints_of(hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
     noisy = [name for name in hints.get("measured", ()) if name in groups]
@@ -216,6 +218,6 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         said["Outputs"],
         types["parameters"],
         "".join(noisy),
-        len(get_args(hints["measured"]["n"])) if "measured" in hooks else 0,
+        count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),
     )

@@ -151,7 +151,7 @@ def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
             direct = [places[name] for name in port.feedthrough if name in places]
             # fault is false at the start, unless what is set is refused.
             start = [places[name] for name in port.initially]
-            initial = [*direct, *start, *parameters] if port.type == "Real" else []
+            initial = [] if port == FAULT else [*direct, *start, *parameters]
             yield Dependency(places[port.name], direct, initial)
 
 

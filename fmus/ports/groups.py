@@ -8,9 +8,21 @@ number in the wrong place.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from enum import IntEnum
 from itertools import groupby
-from typing import Any, Generic, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    Generic,
+    NamedTuple,
+    TypeVar,
+    Union,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
+from auv_fmu.arrays import Matrix, Vector
 from fmus.ports.port import Port, Value
 from fmus.ports.quantities import group_name
 
@@ -33,12 +45,86 @@ def slices(ports: Sequence[Port]) -> dict[str, slice]:
     return found
 
 
+def hints_of(owner: Any) -> dict[str, Any]:
+    """Types of the fields of a class, or of the arguments of a function, with their sizes."""
+    return get_type_hints(owner, include_extras=True)
+
+
+def parts_of(hint: Any) -> list[Any] | None:
+    """The types of the elements of a tuple, a vector, a matrix or a NamedTuple; None: a number."""
+    if get_origin(hint) is Annotated:
+        hint, *notes = get_args(hint)
+        sizes = [note for note in notes if type(note) is int]
+        if hint is Vector:
+            return [float] * sizes[0]
+        if hint is Matrix:
+            return [Annotated[Vector, sizes[1]]] * sizes[0]
+    if is_record(hint):
+        return list(hints_of(hint).values())
+    arguments = get_args(hint)
+    return [*arguments] if get_origin(hint) is tuple and Ellipsis not in arguments else None
+
+
+def is_record(hint: Any) -> bool:
+    """Whether a type is a NamedTuple."""
+    return is_class(hint, tuple) and hasattr(hint, "_fields")
+
+
+def is_class(hint: Any, base: type) -> bool:
+    """Whether a type is a class, and no `tuple[float]`, that is made from a base."""
+    return isinstance(hint, type) and get_origin(hint) is None and issubclass(hint, base)
+
+
+def class_of(hint: Any) -> Any:
+    """A type without what is noted beside it."""
+    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
+
+
+def count_values(hint: Any) -> int:
+    """How many numbers a type holds."""
+    parts = parts_of(hint)
+    return 1 if parts is None else sum(map(count_values, parts))
+
+
+def scalars_of(hint: Any) -> Iterator[Any]:
+    """The types of the numbers that a type holds, in their order."""
+    parts = parts_of(hint)
+    if parts is None:
+        yield class_of(hint)
+        return
+    for part in parts:
+        yield from scalars_of(part)
+
+
+def is_whole(hint: Any) -> bool:
+    """Whether a type is one of integers, or an enumeration of them."""
+    return hint is int or is_class(hint, IntEnum)
+
+
+def reals_first(ports: Sequence[Port]) -> list[Port]:
+    """Ports in the order of their values, in which a host can pass all Reals in one call."""
+    return sorted(ports, key=lambda port: port.type != "Real")
+
+
 def _sizes(fields: type) -> dict[str, int]:
     """The fields of a NamedTuple or TypedDict and how many values each holds."""
-    return {
-        name: len(get_args(hint)) if get_origin(hint) is tuple else 1
-        for name, hint in get_type_hints(fields).items()
-    }
+    return {name: count_values(hint) for name, hint in hints_of(fields).items()}
+
+
+def _check_types(fields: type, hint: Any, ports: Sequence[Port]) -> None:
+    """Raise TypeError if a number of a type has a port of another one."""
+    for scalar, port in zip(scalars_of(hint), ports):
+        if is_class(scalar, IntEnum):
+            fitting: tuple[str, ...] = ("Integer",) if port.causality == "output" else ("String",)
+        else:
+            fitting = _FITTING.get(scalar, ())
+        if port.type not in fitting:
+            where, name = fields.__qualname__, getattr(scalar, "__name__", scalar)
+            raise TypeError(f"{where}: {port.name} is of type {name}, its port is a {port.type}")
+
+
+#: Types of ports, by those of Python.
+_FITTING = {float: ("Real",), int: ("Integer", "String"), bool: ("Boolean",)}
 
 
 def _hold(fields: type, ports: Sequence[Port], groups: Mapping[str, str]) -> dict[str, slice]:
@@ -48,16 +134,18 @@ def _hold(fields: type, ports: Sequence[Port], groups: Mapping[str, str]) -> dic
     declared = [(group, place.stop - place.start) for group, place in places.items()]
     if said != declared:
         raise TypeError(f"{fields.__qualname__} has the groups {said}, its ports are {declared}")
+    for hint, place in zip(hints_of(fields).values(), places.values()):
+        _check_types(fields, hint, ports[place])
     return places
 
 
 def unpacking(
     made: type[T], ports: Sequence[Port], groups: Mapping[str, str]
-) -> Callable[[Sequence[float]], T]:
-    """A function that makes groups from the values of ports.
+) -> Callable[[Sequence[Value]], T]:
+    """A function that makes groups from the values of ports, Reals first.
 
     Args:
-        made: NamedTuple with one tuple a group, in the order of the ports.
+        made: NamedTuple or TypedDict with a number or a tuple a group, in the order of the ports.
         ports: with one value each.
         groups: of fields that bear another name than their group.
 
@@ -65,39 +153,95 @@ def unpacking(
         TypeError: `made` has other groups than the ports.
 
     """
-    places = _hold(made, ports, groups).values()
-    if not places:
+    if not _hold(made, ports, groups):
         nothing = made()
         return lambda values: nothing
     names = [f"x{i}" for i in range(len(ports))]
-    text = "".join(f"({', '.join(names[place])},), " for place in places)
-    return _compiled(
-        f"({', '.join(names)},) = values\n return make(made, ({text}))", "values", made
-    )
+    ordered = [names[i] for i in sorted(range(len(ports)), key=lambda i: ports[i].type != "Real")]
+    found = iter(names)
+    scope = {"made": made, **SCOPE}
+    fields = {name: gathered(hint, found, scope) for name, hint in hints_of(made).items()}
+    if issubclass(made, tuple):
+        result = f"make(made, ({''.join(f'{text}, ' for text in fields.values())}))"
+    else:
+        result = f"{{{', '.join(f'{name!r}: {text}' for name, text in fields.items())}}}"
+    return _compiled(f"({', '.join(ordered)},) = values\n return {result}", "values", scope)
 
 
-def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[float]]:
-    """A function that makes the values of ports from groups.
+def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
+    """The text of a value of a type, from the names of its numbers; the scope gets its classes."""
+    parts = parts_of(hint)
+    if parts is None:
+        return next(names)
+    text = f"({''.join(f'{gathered(part, names, scope)}, ' for part in parts)})"
+    kind = class_of(hint)
+    if not is_class(kind, tuple):
+        return text
+    name = f"class_{kind.__name__}"
+    scope[name] = kind
+    return f"make({name}, {text})"
+
+
+def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[Value]]:
+    """A function that makes the values of ports, Reals first, from groups.
+
+    It raises OverflowError for an integer that FMI has no room for.
 
     Args:
-        given: TypedDict with one tuple a group, in the order of the ports.
+        given: TypedDict or NamedTuple with a number or a tuple a group, in the order of the ports.
         ports: to have one value each.
 
     Raises:
         TypeError: `given` has other groups than the ports.
 
     """
-    groups = ", ".join(f"*groups[{name!r}]" for name in _hold(given, ports, {}))
-    return _compiled(f"return [{groups}]", "groups", given)
+    _hold(given, ports, {})
+    is_tuple = issubclass(given, tuple)
+    texts = [
+        text
+        for name, hint in hints_of(given).items()
+        for text in scattered(hint, f"groups.{name}" if is_tuple else f"groups[{name!r}]")
+    ]
+    values = ", ".join(text for text, _ in sorted(texts, key=lambda it: it[1] is not float))
+    return _compiled(f"return [{values}]", "groups", {**SCOPE})
 
 
-def _compiled(body: str, argument: str, made: type) -> Callable[..., Any]:
+def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:
+    """The texts of the numbers in something, one or several alike each, and their type."""
+    parts = parts_of(hint)
+    if parts is None:
+        scalar = class_of(hint)
+        yield f"whole({text})" if is_whole(scalar) else text, scalar
+    elif parts and parts_of(parts[0]) is None and all(part is parts[0] for part in parts):
+        scalar = class_of(parts[0])
+        yield f"*map(whole, {text})" if is_whole(scalar) else f"*{text}", scalar
+    else:
+        for i, part in enumerate(parts):
+            yield from scattered(part, f"{text}[{i}]")
+
+
+def whole(value: int) -> int:
+    """An integer, or a member of an enumeration, as an integer of 32 bits.
+
+    Raises:
+        OverflowError: it has more.
+
+    """
+    if not -(2**31) <= value < 2**31:
+        raise OverflowError("an integer exceeds 32 bits")
+    return int(value)
+
+
+#: What compiled functions may use.
+SCOPE: Mapping[str, Any] = {"make": tuple.__new__, "whole": whole}
+
+
+def _compiled(body: str, argument: str, scope: dict[str, Any]) -> Callable[..., Any]:
     """A function from its text.
 
     It runs once a step in each component, and a loop over the groups costs several times the
     same thing written out.
     """
-    scope: dict[str, Any] = {"made": made, "make": tuple.__new__}
     exec(f"def function({argument}):\n {body}", scope)
     function: Callable[..., Any] = scope["function"]
     return function
@@ -114,8 +258,8 @@ class ParameterSet(Generic[T]):
 
         Args:
             made: NamedTuple of the equations.
-            fields: for each field a port, the ports of a tuple, or the set of a nested NamedTuple,
-                in the order that the ports shall have.
+            fields: for each field a port, the ports of a tuple, vector or matrix, or the set of a
+                nested NamedTuple, in the order that the ports shall have.
 
         Raises:
             TypeError: the fields are not `made`'s, or not of their sizes.
@@ -123,12 +267,20 @@ class ParameterSet(Generic[T]):
         """
         sizes = _sizes(made)  # type: ignore[arg-type]
         declared = {
-            name: len(field) if isinstance(field, tuple) else 1 for name, field in fields.items()
+            name: 1
+            if isinstance(field, Port)
+            else len(field if isinstance(field, tuple) else field.ports)
+            for name, field in fields.items()
         }
         if declared != sizes:
             raise TypeError(f"{made} has the fields {sizes}, its parameters are {declared}")
         self._made = made
+        self._hints = hints_of(made)
         self._fields = fields
+        for name, field in fields.items():
+            if not isinstance(field, ParameterSet):
+                ports = (field,) if isinstance(field, Port) else field
+                _check_types(made, self._hints[name], ports)  # type: ignore[arg-type]
 
     @property
     def ports(self) -> tuple[Port, ...]:
@@ -152,18 +304,43 @@ class ParameterSet(Generic[T]):
             if isinstance(field, Port):
                 yield field, (name,)
             elif isinstance(field, tuple):
-                yield from ((port, (name, i)) for i, port in enumerate(field))
+                yield from (
+                    (port, (name, *at)) for port, at in zip(field, _places(self._hints[name]))
+                )
             else:
                 yield from ((port, (name, *path)) for port, path in field._leaves())
 
     def of(self, values: Mapping[str, Value]) -> T:
         """The parameter set with these values of its ports, by name."""
-        return self._made(**{name: _taken(field, values) for name, field in self._fields.items()})
+        hints = self._hints
+        return self._made(
+            **{name: _taken(field, hints[name], values) for name, field in self._fields.items()}
+        )
 
 
-def _taken(field: Field, values: Mapping[str, Value]) -> object:
+def _taken(field: Field, hint: Any, values: Mapping[str, Value]) -> object:
     if isinstance(field, ParameterSet):
         return field.of(values)
     if isinstance(field, Port):
         return field.meaning(values[field.name])
-    return tuple(values[port.name] for port in field)
+    return filled(hint, iter([port.meaning(values[port.name]) for port in field]))
+
+
+def filled(hint: Any, values: Iterator[Any]) -> Any:
+    """A value of a type from its numbers."""
+    parts = parts_of(hint)
+    if parts is None:
+        return next(values)
+    elements = tuple(filled(part, values) for part in parts)
+    made = class_of(hint)
+    return tuple.__new__(made, elements) if is_class(made, tuple) else elements
+
+
+def _places(hint: Any) -> Iterator[tuple[str | int, ...]]:
+    """Where the numbers of a type lie in it."""
+    parts = parts_of(hint)
+    if parts is None:
+        yield ()
+        return
+    for i, part in enumerate(parts):
+        yield from ((i, *rest) for rest in _places(part))

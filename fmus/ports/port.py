@@ -68,6 +68,22 @@ class Port:
             Refusal: it is of another type, not finite, out of range, or not one of the choices.
 
         """
+        self.sound(value)
+        if isinstance(value, str):
+            return value
+        if self.minimum is not None and value < self.minimum:
+            raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
+        if self.maximum is not None and value > self.maximum:
+            raise Refusal(f"{self.name} = {value:g}: must be at most {self.maximum:g}")
+        return value
+
+    def sound(self, value: Value) -> None:
+        """Refuse what is no value of this port, in whatever range it has.
+
+        Raises:
+            Refusal: it is of another type, not finite, or not one of the choices.
+
+        """
         if type(value) not in _TYPES[self.type]:
             raise Refusal(f"{self.name} = {value!r:.20}: must be a {self.type}")
         if isinstance(value, str):
@@ -77,11 +93,6 @@ class Port:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
         elif self.type == "Integer" and not -(2**31) <= value < 2**31:
             raise Refusal(f"{self.name} = {value!r:.20}: must fit into 32 bits")
-        elif self.minimum is not None and value < self.minimum:
-            raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
-        elif self.maximum is not None and value > self.maximum:
-            raise Refusal(f"{self.name} = {value:g}: must be at most {self.maximum:g}")
-        return value
 
     def meaning(self, value: Value) -> object:
         """What the equations take for a value of this port."""

@@ -40,14 +40,17 @@ LONGEST_MESSAGE = 500
 class Store:
     """Values of all ports.
 
-    A port's value reference is its place among the ports. All Real inputs and all Real outputs lie
-    in lists of their own, in their order, so that a host that passes them all in one call costs
-    one comparison instead of one look-up a value.
+    A port's value reference is its place among the ports. All inputs and all outputs lie in lists
+    of their own, Reals first and in their order, so that a host that passes these all in one call
+    costs one comparison instead of one look-up a value.
 
     Attributes:
         ports: of the component, `fault` last.
-        input_references, output_references: of the Real inputs and outputs.
-        inputs, outputs: their values.
+        inputs, outputs: values of all but `fault`.
+        input_references, output_references: of them, in the order of their values.
+        real_inputs, real_outputs: the references of the Reals among them.
+        has_others: whether there are outputs that are not Reals.
+        free_inputs: the references of the Real inputs, none of which has a range; else None.
         parameters: by name.
         fault: whether a value or a step was discarded.
 
@@ -55,11 +58,26 @@ class Store:
 
     def __init__(self, ports: Sequence[Port]) -> None:
         self.ports = (*ports, FAULT)
-        self.input_references = self._references("input")
-        self.output_references = self._references("output")
+        references = [*range(len(ports))]
+        references.sort(key=lambda reference: ports[reference].type != "Real")
+        self.input_references = [r for r in references if ports[r].causality == "input"]
+        self.output_references = [r for r in references if ports[r].causality == "output"]
+        self.real_inputs = [r for r in self.input_references if ports[r].type == "Real"]
+        self.real_outputs = [r for r in self.output_references if ports[r].type == "Real"]
+        self.has_others = self.real_outputs != self.output_references
+        limits = [limit for r in self.real_inputs for limit in (ports[r].minimum, ports[r].maximum)]
+        self.free_inputs = self.real_inputs if all(limit is None for limit in limits) else None
         self.fault_references = [len(ports)]
-        self.inputs = [0.0] * len(self.input_references)
-        self.outputs = [0.0] * len(self.output_references)
+        self.inputs: list[Value] = [
+            MISSING[ports[r].type] if ports[r].start is None else ports[r].start
+            for r in self.input_references
+        ]
+        self.outputs = self.no_outputs()
+        self._places = {
+            reference: place
+            for found in (self.input_references, self.output_references)
+            for place, reference in enumerate(found)
+        }
         self.parameters: dict[str, Value] = {
             port.name: port.start
             for port in ports
@@ -67,12 +85,13 @@ class Store:
         }
         self.fault = False
 
-    def _references(self, causality: str) -> list[int]:
-        return [
-            reference
-            for reference, port in enumerate(self.ports)
-            if port.causality == causality and port.type == "Real"
-        ]
+    def no_outputs(self) -> list[Value]:
+        """The outputs where there is no state."""
+        return [MISSING[self.ports[reference].type] for reference in self.output_references]
+
+    def place(self, reference: int) -> int:
+        """Where the value of an input or an output lies."""
+        return self._places[reference]
 
     def port(self, reference: int, *types: str) -> Port:
         """The port of one of some types that has a value reference.
@@ -103,8 +122,8 @@ class Store:
         if port.causality == "parameter":
             return self.parameters[port.name]
         if port.causality == "input":
-            return self.inputs[self.input_references.index(reference)]
-        return self.outputs[self.output_references.index(reference)]
+            return self.inputs[self._places[reference]]
+        return self.outputs[self._places[reference]]
 
 
 class Callbacks(Fmi2Slave):  # type: ignore[misc]
@@ -175,28 +194,35 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     # Values
 
-    def get_real(self, vrs: list[int]) -> list[float]:
+    def get_real(self, vrs: list[int]) -> list[Any]:
         store = self._store
         if self._stale:
             self._refresh_outputs(vrs)
+        if vrs != store.real_outputs:
+            return self._get(vrs, "Real")
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
-        return store.outputs if vrs == store.output_references else self._get(vrs, "Real")
+        return store.outputs[: len(vrs)] if store.has_others else store.outputs
 
     def get_integer(self, vrs: list[int]) -> list[int]:
+        if self._stale:
+            self._refresh_outputs(vrs)
         return self._get(vrs, "Integer")
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         store = self._store
+        if self._stale:
+            self._refresh_outputs(vrs)
         return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
 
     def get_string(self, vrs: list[int]) -> list[str]:
         return self._get(vrs, "String")
 
-    def set_real(self, vrs: list[int], values: list[float]) -> None:
+    def set_real(self, vrs: list[int], values: list[Any]) -> None:
         store = self._store
         # A sum is finite only if every value is; _set finds out which one was not.
-        if vrs == store.input_references and self._mode == STEPPING and isfinite(sum(values)):
-            store.inputs = values
+        if vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
+            others = store.inputs[len(values) :]
+            store.inputs = [*values, *others] if others else values
         else:
             self._set(vrs, values, "Real")
 
@@ -257,7 +283,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 continue
             port.checked(value)
             if port.causality == "input":
-                inputs[store.input_references.index(reference)] = float(value)
+                inputs[store.place(reference)] = float(value) if port.type == "Real" else value
             else:
                 parameters = {**parameters, port.name: value}
         if parameters is not store.parameters and self._mode == STEPPING:

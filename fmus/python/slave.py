@@ -27,7 +27,7 @@ from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import define
-from fmus.ports.groups import slices
+from fmus.ports.groups import SCOPE, gathered, hints_of, reals_first, scattered, slices
 from fmus.ports.port import Refusal
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
 
@@ -66,7 +66,8 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
     """
     definition = define(name, *modules)
     said = definition.behaviour
-    places = slices([port for port in definition.ports if port.causality == "output"])
+    outputs = reals_first([port for port in definition.ports if port.causality == "output"])
+    places = slices([port for port in outputs if port.type == "Real"])
     members: dict[str, Any] = {
         "__module__": modules[0].__package__,
         "__doc__": definition.summary,
@@ -77,13 +78,14 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
         "group_of": definition.group_of,
         "_latest": None,
     }
-    scope = {
+    scope: dict[str, Any] = {
+        **SCOPE,
         **said.hooks,
         "Random": Random,
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
     }
-    for method in (*_steps(said), *_checks(said), *_noise(said, places.get(said.noisy))):
+    for method in (*_steps(said), *_checks(said), *_noise(said, places.get(said.noisy), scope)):
         exec(method, scope, members)
     base: Any = Noisy if said.noisy else Component
     types = (said.state, said.inputs, said.outputs, said.parameters)
@@ -133,13 +135,18 @@ def _checks(said: Behaviour) -> Iterator[str]:
             yield f"def {hook}(self, {arguments}):\n    return {call}"
 
 
-def _noise(said: Behaviour, place: slice | None) -> Iterator[str]:
-    """How an output gets its noise."""
+def _noise(said: Behaviour, place: slice | None, scope: dict[str, Any]) -> Iterator[str]:
+    """How an output gets its noise; the names that it needs are put into the scope."""
     if place is not None:
-        n = "".join(["gauss(0.0, 1.0), "] * said.draws)
-        values = "".join(f"values[{i}], " for i in range(place.start, place.stop))
-        call = _call(said, "measured", **{"n": f"({n})", said.noisy: f"({values})"})
+        assert said.hooks["measured"] is not None
+        hints = {**hints_of(said.hooks["measured"]), said.noisy: hints_of(said.outputs)[said.noisy]}
+        drawn = iter(["gauss(0.0, 1.0)"] * said.draws)
+        values = iter([f"values[{i}]" for i in range(place.start, place.stop)])
+        n, before = gathered(hints["n"], drawn, scope), gathered(hints[said.noisy], values, scope)
+        flat = ", ".join(text for text, _ in scattered(hints[said.noisy], "noisy"))
+        after = "noisy" if flat == "*noisy" else f"({flat},)"
         yield (
             "def sample(self, values):\n    gauss = self._random.gauss\n"
-            f"    values[{place.start}:{place.stop}] = noisy = {call}\n    return noisy"
+            f"    noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}\n"
+            f"    values[{place.start}:{place.stop}] = noisy = {after}\n    return noisy"
         )

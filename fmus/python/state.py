@@ -10,11 +10,13 @@ import json
 import sys
 from binascii import crc32
 from collections.abc import Mapping, Sequence
+from enum import IntEnum
 from functools import partial
 from itertools import count
 from math import hypot, isclose
-from typing import Any, Callable, TypedDict, Union, get_args, get_origin, get_type_hints
+from typing import Any, Callable, TypedDict, Union, get_args, get_origin
 
+from fmus.ports.groups import class_of, is_class, parts_of, whole
 from fmus.ports.port import Refusal, Value
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
 
@@ -34,25 +36,30 @@ _CHECKSUM = "checksum"
 def measuring(hint: type) -> Callable[[Any], float]:
     """A function that gives the Euclidean norm of all floats of a state: NaN if one is NaN.
 
-    It runs once a step, and written out it costs a third of a loop.
+    It runs once a step, and written out it costs a third of a loop. It raises OverflowError for an
+    integer that an FMU in C has no room for.
     """
-    names, floats = (f"x{i}" for i in count()), []
+    names, floats, integers = (f"x{i}" for i in count()), [], []
 
     def target(hint: Any) -> str:
-        hints = _elements(hint)
+        hints = parts_of(hint)
         if hints is not None:
             return f"({''.join(f'{target(k)}, ' for k in hints)})"
-        name = next(names)
+        name, hint = next(names), class_of(hint)
         if hint is float:
             floats.append(name)
+        elif hint is int:
+            integers.append(f"whole({name}); ")
+        elif is_class(hint, IntEnum):
+            pass  # one of its members
         elif hint not in _SCALARS:
             floats.append(f"norm({name})")
         return name
 
-    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm}
+    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm, "whole": whole}
     pattern = target(hint)
     norm = f"hypot({', '.join(floats)})" if floats else "0.0"
-    text = f"def function(state):\n {pattern} = state\n return {norm}"
+    text = f"def function(state):\n {pattern} = state\n {''.join(integers)}return {norm}"
     exec(text, scope)
     function: Callable[[Any], float] = scope["function"]
     return function
@@ -64,15 +71,6 @@ def _norm(value: Any) -> float:
     return value if isinstance(value, float) else 0.0
 
 
-def _elements(hint: Any) -> list[Any] | None:
-    """The types of the elements of a tuple that is always of the same length."""
-    if isinstance(hint, type) and issubclass(hint, tuple) and hasattr(hint, "_fields"):
-        hints = get_type_hints(hint)
-        return [hints[name] for name in hint._fields]
-    arguments = get_args(hint)
-    return [*arguments] if get_origin(hint) is tuple and Ellipsis not in arguments else None
-
-
 def restored(hint: Any, value: Any) -> Any:
     """A state, or a part of one, as it was before memory or JSON took it.
 
@@ -81,23 +79,30 @@ def restored(hint: Any, value: Any) -> Any:
         value: the state or part, perhaps with lists instead of tuples.
 
     Raises:
-        Refusal: it is of another type or length, or not finite.
+        Refusal: it is of another type or length, not finite, of more than 32 bits, or not a member
+            of its enumeration.
 
     """
-    hints = _elements(hint)
+    hints, hint = parts_of(hint), class_of(hint)
     if hints is not None:
         if not isinstance(value, (list, tuple)) or len(value) != len(hints):
             raise Refusal(f"{_shown(value)} instead of {len(hints)} values")
-        made = map(restored, hints, value)
-        return hint._make(made) if hasattr(hint, "_make") else tuple(made)
+        made = [*map(restored, hints, value)]
+        return tuple.__new__(hint if is_class(hint, tuple) else tuple, made)
     if _is_union(hint):
         return _as_one_of(get_args(hint), value)
     if hint is float and type(value) in (float, int):
         if not abs(value) <= sys.float_info.max:
             raise Refusal("a value is not finite")
         return value
+    if is_class(hint, IntEnum):
+        if type(value) not in (int, hint) or value not in [*hint]:
+            raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
+        return hint(value)
     if hint in _SCALARS and type(value) is not hint:
         raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
+    if hint is int and not -(2**31) <= value < 2**31:
+        raise Refusal("an integer exceeds 32 bits")
     return frozen(value)
 
 
@@ -132,8 +137,8 @@ class Snapshot(TypedDict):
     mode: str
     start_time: float
     parameters: dict[str, Value]
-    inputs: list[float]
-    outputs: list[float]
+    inputs: list[Value]
+    outputs: list[Value]
     state: Any  #: NamedTuple of the component, None before the initialisation
     hidden: Any  #: what the component keeps outside its state
     fault: bool
@@ -220,11 +225,13 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, hint: type) -
     )
 
 
-def _values(store: Store, references: Sequence[int], values: Any) -> list[float]:
+def _values(store: Store, references: Sequence[int], values: Any) -> list[Value]:
     if not isinstance(values, (list, tuple)) or len(values) != len(references):
         raise Refusal("its values do not match the ports")
     for reference, value in zip(references, values):
-        store.ports[reference].checked(value)
+        port = store.ports[reference]
+        # An output is in no range: no step looks at one.
+        port.sound(value) if port.causality == "output" else port.checked(value)
     return [*values]
 
 

@@ -15,6 +15,8 @@ static run new_run(void) {
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER) {
             put_parameter(&it.parameters, &ports[i], ports[i].start);
+        } else if (ports[i].causality == INPUT) {
+            it.inputs.values[ports[i].place] = ports[i].start;
         }
     }
     return it;
@@ -52,9 +54,9 @@ static int accept(instance *it, const Error *error, message *why) {
     if (!bounded(&next->state)) {
         return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
     }
-    for (int i = 0; i < MODEL_OUTPUTS; i++) {
+    for (int i = 0; i < REAL_OUTPUTS; i++) {
         if (!isfinite(next->outputs.values[i])) {
-            return in_range(port_at(output_references[i]), next->outputs.values[i], why);
+            return is_finite(port_at(output_references[i]), next->outputs.values[i], why);
         }
     }
     if (MODEL_DRAWS > 0) {

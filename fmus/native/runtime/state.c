@@ -4,7 +4,7 @@
  * are IEEE 754 doubles, all others have four bytes:
  *
  *     MAGIC, identity, mode, start time, time,
- *     parameters and inputs in the order of their ports, outputs,
+ *     parameters in the order of their ports, inputs and outputs, of both Reals before others,
  *     whether there is a state, and if so: the numbers of the state, and of the noise the words of
  *     the generator, the place of the next, whether there is a next number, and it;
  *     fault;
@@ -61,8 +61,27 @@ static void put_real(writer *to, double real) {
     put_word(to, (uint32_t)(bits >> 32));
 }
 
-static void put_reals(writer *to, const double reals[], size_t n) {
-    for (size_t i = 0; i < n; i++) put_real(to, reals[i]);
+/* Numbers of one type. */
+static void put_numbers(writer *to, fmi_type type, const double numbers[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (type == REAL) {
+            put_real(to, numbers[i]);
+        } else {
+            put_word(to, (uint32_t)(int32_t)numbers[i]);
+        }
+    }
+}
+
+/* Values of ports: Reals, and others. */
+static void put_values(writer *to, const double values[], size_t reals, size_t n) {
+    put_numbers(to, REAL, values, reals);
+    put_numbers(to, INTEGER, values + reals, n - reals);
+}
+
+static void put_state(writer *to, const double values[]) {
+    for (size_t i = 0; i < N_STATE_NUMBERS; values += state_numbers[i++].n) {
+        put_numbers(to, state_numbers[i].type, values, state_numbers[i].n);
+    }
 }
 
 static void put_text(writer *to, string text) {
@@ -87,17 +106,13 @@ static void put_run(writer *to, const run *it) {
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality != PARAMETER) continue;
         double number = parameter(&it->parameters, &ports[i]);
-        if (ports[i].type == REAL) {
-            put_real(to, number);
-        } else {
-            put_word(to, (uint32_t)(int32_t)number);
-        }
+        put_numbers(to, ports[i].type, &number, 1);
     }
-    put_reals(to, it->inputs.values, MODEL_INPUTS);
-    put_reals(to, now->outputs.values, MODEL_OUTPUTS);
+    put_values(to, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
+    put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     put_word(to, (uint32_t)it->begun);
     if (it->begun) {
-        put_reals(to, now->state.values, MODEL_STATE);
+        put_state(to, now->state.values);
         if (MODEL_DRAWS > 0) put_noise(to, &it->noise);
     }
     put_word(to, (uint32_t)it->fault);
@@ -166,8 +181,15 @@ static double take_real(reader *from) {
     return real;
 }
 
-static void take_reals(reader *from, double reals[], size_t n) {
-    for (size_t i = 0; i < n; i++) reals[i] = take_real(from);
+static void take_numbers(reader *from, fmi_type type, double numbers[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        numbers[i] = type == REAL ? take_real(from) : (int32_t)take_word(from);
+    }
+}
+
+static void take_values(reader *from, double values[], size_t reals, size_t n) {
+    take_numbers(from, REAL, values, reals);
+    take_numbers(from, INTEGER, values + reals, n - reals);
 }
 
 /* A text that messages have room for, without a zero in it. */
@@ -192,24 +214,53 @@ static int take_truth(reader *from) {
     return word <= 1 ? (int)word : -1;
 }
 
+static int is_truth(double number) { return number == 0.0 || number == 1.0; }
+
+/* Whether a number can be a port's; an output is in no range, as no step looks at one. */
+static int good_value(const port *port, double number, message *why) {
+    if (port->type == BOOLEAN && !is_truth(number)) {
+        return compose(why, "%s: must be a Boolean", port->name);
+    }
+    if (port->type == STRING) {
+        return text_of(port, number) != NULL ||
+               compose(why, "%s: is not one of the choices", port->name);
+    }
+    return port->causality == OUTPUT ? is_finite(port, number, why) : in_range(port, number, why);
+}
+
 static int good_values(const double values[], size_t n, const uint32_t references[],
                        message *why) {
     for (size_t i = 0; i < n; i++) {
-        if (!in_range(port_at(references[i]), values[i], why)) return 0;
+        if (!good_value(port_at(references[i]), values[i], why)) return 0;
     }
     return 1;
 }
 
 static int take_parameter(reader *from, parameter_values *values, const port *port, message *why) {
-    double number = port->type == REAL ? take_real(from) : (int32_t)take_word(from);
-    if (port->type == BOOLEAN && number != 0.0 && number != 1.0) {
-        return compose(why, "%s: must be a Boolean", port->name);
-    }
-    if (port->type == STRING && text_of(port, number) == NULL) {
-        return compose(why, "%s: is not one of the choices", port->name);
-    }
-    if (port->type != STRING && !in_range(port, number, why)) return 0;
+    double number;
+    take_numbers(from, port->type, &number, 1);
+    if (!good_value(port, number, why)) return 0;
     put_parameter(values, port, number);
+    return 1;
+}
+
+/* Whether a number can be one of the state. */
+static int good_number(const numbers *of, double number, message *why) {
+    if (of->type == REAL) return isfinite(number) || compose(why, "a value is not finite");
+    if (of->type == BOOLEAN && !is_truth(number)) {
+        return compose(why, "%f is not of type bool", number);
+    }
+    return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
+           compose(why, "%f is not of type %s", number, of->name);
+}
+
+static int take_state(reader *from, double values[], message *why) {
+    for (size_t i = 0; i < N_STATE_NUMBERS; values += state_numbers[i++].n) {
+        take_numbers(from, state_numbers[i].type, values, state_numbers[i].n);
+        for (size_t k = 0; k < state_numbers[i].n; k++) {
+            if (!good_number(&state_numbers[i], values[k], why)) return 0;
+        }
+    }
     return 1;
 }
 
@@ -251,8 +302,8 @@ static int take_run(reader *from, run *it, message *why) {
             return 0;
         }
     }
-    take_reals(from, it->inputs.values, MODEL_INPUTS);
-    take_reals(from, now->outputs.values, MODEL_OUTPUTS);
+    take_values(from, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
+    take_values(from, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     if (!good_values(it->inputs.values, MODEL_INPUTS, input_references, why) ||
         !good_values(now->outputs.values, MODEL_OUTPUTS, output_references, why)) {
         return 0;
@@ -266,10 +317,7 @@ static int take_run(reader *from, run *it, message *why) {
         return compose(why, "it has steps, or outputs, without a state");
     }
     if (it->begun) {
-        take_reals(from, now->state.values, MODEL_STATE);
-        if (!all_finite(now->state.values, MODEL_STATE)) {
-            return compose(why, "a value is not finite");
-        }
+        if (!take_state(from, now->state.values, why)) return 0;
         if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, why)) return 0;
     }
     it->fault = take_truth(from);
@@ -278,10 +326,12 @@ static int take_run(reader *from, run *it, message *why) {
            compose(why, "it has missing or unknown parts");
 }
 
-static int nearly_equal(const double one[], const double other[], size_t n) {
-    for (size_t i = 0; i < n; i++) {
+/* Whether two lists of outputs are the same, but for the rounding of Reals. */
+static int nearly_equal(const double one[], const double other[]) {
+    for (int i = 0; i < MODEL_OUTPUTS; i++) {
         double larger = fmax(fabs(one[i]), fabs(other[i]));
-        if (!(fabs(one[i] - other[i]) <= NEAR * fmax(larger, 1.0))) return 0;
+        double most = i < REAL_OUTPUTS ? NEAR * fmax(larger, 1.0) : 0.0;
+        if (!(fabs(one[i] - other[i]) <= most)) return 0;
     }
     return 1;
 }
@@ -298,7 +348,7 @@ static int can_be_reached(run *it, message *why) {
     model_derive(parameters, &now->state.groups, &error);
     model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
     if (error.raised) return compose(why, "%s", error.why);
-    if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
+    if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values)) {
         return compose(why, "its outputs do not match its state");
     }
     return 1;
