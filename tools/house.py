@@ -32,7 +32,7 @@ REASONS = {
     "fmus/ports/controllers.py": "in the FMUs of controllers only",
     "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
-    "fmus/python/own.py": "a program of its own: python -m fmus.python.own",
+    "fmus/python/own.py": "slaves of PythonFMU only, which no component needs",
     "orchestrator/commands/listing.py": "imports nothing that takes longer than the command",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/exchange/hosts/drivers.py": "a function for each tool, and nothing of ours",

@@ -69,7 +69,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
     outputs = reals_first([port for port in definition.ports if port.causality == "output"])
     places = slices([port for port in outputs if port.type == "Real"])
     members: dict[str, Any] = {
-        "__module__": modules[0].__package__,
+        "__module__": modules[0].__package__ or modules[0].__name__,
         "__doc__": definition.summary,
         **definition.about,
         "description": definition.description,
