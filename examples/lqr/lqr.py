@@ -19,6 +19,7 @@ connect `u` to a cart whose position and velocity come back as `p` and `v`.
 
 from __future__ import annotations
 
+from math import inf
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
@@ -72,12 +73,13 @@ def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
     def gain(P: Matrix) -> Matrix:
         return (B.T @ P @ A) / (parameters.r + (B.T @ P @ B)[0, 0])
 
-    P, K, change, rounds = Q, gain(Q), 1.0, 0
-    while change > ACCURACY and rounds < ROUNDS:
+    P, K, change, rounds = Q, gain(Q), inf, 0
+    while change > ACCURACY * max(K[0]) and rounds < ROUNDS:
         P = Q + A.T @ P @ (A - B @ K)
         better = gain(P)
-        change = max(Vector(abs(off) for off in (better - K)[0])) / max(better[0])
-        K, rounds = better, rounds + 1
+        change = max(Vector(abs(difference) for difference in (better - K)[0]))
+        K = better
+        rounds += 1
     if rounds == ROUNDS:
         raise Refusal(f"the gain has not converged after {ROUNDS} rounds")
     return _seen(State(K, rounds), inputs)
