@@ -78,8 +78,7 @@ def _rate(
     parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]
 ) -> Annotated[Vector, 3]:
     """The derivative of current, speed and angle."""
-    R, L, k, J, b = parameters
     i, speed = x[0], x[1]
-    return Vector(
-        ((inputs.u - R * i - k * speed) / L, (k * i - b * speed - inputs.load) / J, speed)
-    )
+    voltage = inputs.u - parameters.R * i - parameters.k * speed
+    torque = parameters.k * i - parameters.b * speed - inputs.load
+    return Vector((voltage / parameters.L, torque / parameters.J, speed))

@@ -25,7 +25,9 @@ from typing import Annotated, NamedTuple
 from auv_fmu.linear_algebra import Matrix, Vector, solve
 from fmus.ports.variable import POSITIVE, Variable
 
-IDENTITY = Matrix(tuple(tuple(float(i == j) for j in range(4)) for i in range(4)))
+IDENTITY = Matrix(
+    ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+)
 
 
 class Parameters(NamedTuple):
@@ -77,9 +79,9 @@ def advance(
 
 
 def _dynamics(parameters: Parameters) -> Annotated[Matrix, 4, 4]:
-    m1, m2, k, d, k_tyre = parameters
-    body = (-k / m1, -d / m1, k / m1, d / m1)
-    wheel = (k / m2, d / m2, -(k + k_tyre) / m2, -d / m2)
+    k, d = parameters.k, parameters.d
+    body = Vector((-k, -d, k, d)) / parameters.m_body
+    wheel = Vector((k, d, -k - parameters.k_tyre, -d)) / parameters.m_wheel
     return Matrix(((0.0, 1.0, 0.0, 0.0), body, (0.0, 0.0, 0.0, 1.0), wheel))
 
 
