@@ -74,9 +74,7 @@ def advance(
     return State(x), Outputs(x[0], x[1], x[2])
 
 
-def _rate(
-    parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]
-) -> Annotated[Vector, 3]:
+def _rate(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]) -> Annotated[Vector, 3]:
     """The derivative of current, speed and angle."""
     i, speed = x[0], x[1]
     voltage = inputs.u - parameters.R * i - parameters.k * speed

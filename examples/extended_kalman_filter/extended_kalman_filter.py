@@ -10,8 +10,9 @@ slope at the best estimate there is; see Bar-Shalom, Li and Kirubarajan, Estimat
 Applications to Tracking and Navigation, section 10.3. The inverse of S is never computed: `solve`
 gives each row of the gain.
 
-The filter starts from the first measurement. A target at the origin has no bearing: the step is
-refused. With the default values a target rests 1 km away. Look at `position` and `range_error`.
+The filter starts from a guess, and from how good that is. A target at the origin has no bearing:
+the step is refused. With the default values a target rests 1 km away, and the estimate goes there
+from 150 m off. Look at `position` and `range_error`.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from fmus.ports.port import Refusal
 from fmus.ports.variable import POSITIVE, Variable
 
 _XY = ("x", "y")
+GUESS = Vector((700.0, 700.0))  #: [m]
 
 
 class Parameters(NamedTuple):
@@ -32,7 +34,9 @@ class Parameters(NamedTuple):
     q: Annotated[float, Variable("m2/s3", "Density of the acceleration", 0.0, tunable=True)] = 1.0
     std_range: Annotated[float, Variable("m", "Standard deviation of a range", POSITIVE)] = 10.0
     std_bearing: Annotated[float, Variable("rad", "The same of a bearing", POSITIVE)] = 0.01
-    std_speed: Annotated[float, Variable("m/s", "The same of the speed at the start", 0.0)] = 30.0
+    position0: Annotated[Vector, 2, Variable("m", "First estimate", members=_XY)] = GUESS
+    std_position0: Annotated[float, Variable("m", "Its standard deviation", 0.0)] = 200.0
+    std_velocity0: Annotated[float, Variable("m/s", "The same of the velocity", 0.0)] = 10.0
 
 
 class Inputs(NamedTuple):
@@ -57,15 +61,12 @@ class Outputs(NamedTuple):
     range_error: Annotated[float, Variable("m", "Measured less expected range")]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    c, s = cos(inputs.bearing), sin(inputs.bearing)
-    x = Vector((inputs.range * c, inputs.range * s, 0.0, 0.0))
-    a, b = parameters.std_range, inputs.range * parameters.std_bearing
-    xx, yy, xy = a * a * c * c + b * b * s * s, a * a * s * s + b * b * c * c, (a * a - b * b) * s * c
-    v = parameters.std_speed * parameters.std_speed
-    P = Matrix(((xx, xy, 0.0, 0.0), (xy, yy, 0.0, 0.0), (0.0, 0.0, v, 0.0), (0.0, 0.0, 0.0, v)))
-    return _seen(x, P, 0.0)
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start: the target is believed to rest."""
+    a, b = parameters.std_position0, parameters.std_velocity0
+    x = Vector((parameters.position0[0], parameters.position0[1], 0.0, 0.0))
+    std = Matrix(((a, 0.0, 0.0, 0.0), (0.0, a, 0.0, 0.0), (0.0, 0.0, b, 0.0), (0.0, 0.0, 0.0, b)))
+    return _seen(x, std @ std, 0.0)
 
 
 def advance(
@@ -73,13 +74,12 @@ def advance(
 ) -> tuple[State, Outputs]:
     """State and outputs after a measurement, which is taken every h seconds."""
     F = Matrix(((1.0, 0.0, h, 0.0), (0.0, 1.0, 0.0, h), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
-    a, b, c = h * h * h / 3, h * h / 2, h
-    Q = Matrix(((a, 0.0, b, 0.0), (0.0, a, 0.0, b), (b, 0.0, c, 0.0), (0.0, b, 0.0, c)))
+    a, b = h * h * h / 3, h * h / 2
+    Q = Matrix(((a, 0.0, b, 0.0), (0.0, a, 0.0, b), (b, 0.0, h, 0.0), (0.0, b, 0.0, h)))
     x, P = F @ state.x, F @ state.P @ F.T + Q * parameters.q
-    px, py = x[0], x[1]
-    r = sqrt(px * px + py * py)
+    px, py, r = x[0], x[1], sqrt(x[0] * x[0] + x[1] * x[1])
     if r < 1e-3:
-        raise Refusal(f"the target is {r:g} m from the radar, too near for a bearing")
+        raise Refusal(f"the target is {r:g} m from the radar: too near for a bearing")
     H = Matrix(((px / r, py / r, 0.0, 0.0), (-py / (r * r), px / (r * r), 0.0, 0.0)))
     R = Matrix(((parameters.std_range, 0.0), (0.0, parameters.std_bearing)))
     S = H @ P @ H.T + R @ R

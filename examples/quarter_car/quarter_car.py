@@ -85,9 +85,7 @@ def _dynamics(parameters: Parameters) -> Annotated[Matrix, 4, 4]:
     return Matrix(((0.0, 1.0, 0.0, 0.0), body, (0.0, 0.0, 0.0, 1.0), wheel))
 
 
-def _seen(
-    parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 4]
-) -> tuple[State, Outputs]:
+def _seen(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 4]) -> tuple[State, Outputs]:
     acceleration = _dynamics(parameters)[1] @ x
     force = parameters.k_tyre * (inputs.road - x[2])
     return State(x), Outputs(x[0], x[2], acceleration, force)

@@ -68,7 +68,5 @@ def advance(
     return _seen(parameters, inputs, x)
 
 
-def _seen(
-    parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]
-) -> tuple[State, Outputs]:
+def _seen(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]) -> tuple[State, Outputs]:
     return State(x), Outputs(parameters.C @ x + parameters.D @ inputs.u)

@@ -5,9 +5,8 @@
 
 On each leg from one waypoint to the next the robot steers for a point on the line, `lookahead`
 metres ahead of it. `offset` is how far it is to the left of the line, and dies out like
-exp(-distance / lookahead) where it is small. This is line-of-sight guidance; see
-T. I. Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, section 12.3, which holds
-on land too. A leg ends `radius` metres before its waypoint, and the last waypoint ends the drive.
+exp(-distance / lookahead) where it is small. This is known as line-of-sight guidance. A leg ends
+`radius` metres before its waypoint, and the last waypoint ends the drive.
 
 A shorter `lookahead` cuts corners more sharply, and begins to swing where the robot turns too
 slowly for it. With the default values the robot drives around a square of 20 m. Plot `position.y`
@@ -16,7 +15,7 @@ over `position.x`, and look at `offset` and `waypoint`.
 
 from __future__ import annotations
 
-from math import atan2, cos, pi, sin, sqrt
+from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
@@ -65,7 +64,8 @@ class Outputs(NamedTuple):
 def check(parameters: Parameters) -> None:
     """Refuse a path that stays at a waypoint, where there is no course."""
     for k in range(COUNT - 1):
-        if parameters.path[k] == parameters.path[k + 1]:
+        leg = parameters.path[k + 1] - parameters.path[k]
+        if leg @ leg == 0:
             raise Refusal(f"waypoints {k + 1} and {k + 2} are the same")
 
 

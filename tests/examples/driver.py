@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Mapping
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import signature
@@ -27,6 +28,8 @@ def load(name: str) -> ModuleType:
     spec = spec_from_file_location(f"examples_{name}", EXAMPLES / name / f"{name}.py")
     assert spec and spec.loader
     module = module_from_spec(spec)
+    # Its annotations are text, which is evaluated where it was written.
+    sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
 
@@ -57,7 +60,7 @@ def run(
     if hasattr(module, "check"):
         _call(module.check, given)
     noise = Random(_call(module.seed, given)) if hasattr(module, "seed") else Random(0)
-    given["state"], outputs = _call(module.begin, given)
+    given["state"], outputs = _step(module.begin, given)
     seen: Run = {"time": []}
     _record(module, seen, 0.0, _measured(module, given, outputs, noise))
     if "n" in signature(module.advance).parameters:
@@ -68,7 +71,7 @@ def run(
     for k in range(round(stop_time / step)):
         given["t"] = k * step
         given["inputs"] = _filled(module, "Inputs", inputs(k * step))
-        given["state"], outputs = _call(module.advance, given)
+        given["state"], outputs = _step(module.advance, given)
         _record(module, seen, (k + 1) * step, _measured(module, given, outputs, noise))
     return seen
 
@@ -76,6 +79,12 @@ def run(
 def _call(hook: Callable[..., Any], given: Mapping[str, Any]) -> Any:
     """What a hook returns; it takes those arguments that it has."""
     return hook(*(given[name] for name in signature(hook).parameters))
+
+
+def _step(hook: Callable[..., Any], given: Mapping[str, Any]) -> tuple[Any, Any]:
+    """State and outputs; a component without a state returns its outputs only."""
+    found = _call(hook, given)
+    return (_Nothing(), found) if hasattr(found, "_asdict") else found
 
 
 def _filled(module: ModuleType, name: str, values: Mapping[str, Any]) -> Any:
