@@ -1,15 +1,15 @@
-"""A lithium-ion cell as an equivalent circuit: a source, a resistance and an RC pair.
+"""A lithium-ion cell as an equivalent circuit: a source, a resistance and two RC pairs.
 
     d(charge)/dt  = -i / (3600 capacity)
-    d(v_rc)/dt    = (R1 i - v_rc) / (R1 C1)
-    voltage       = source(charge) - R0 i - v_rc
+    d(v[k])/dt    = (R[k] i - v[k]) / (R[k] C[k])
+    voltage       = source(charge) - R0 i - v[1] - v[2]
 
 The voltage of the source is a table over the charge, between whose points it is interpolated. `R0`
-gives the jump at a change of current, R1 and C1 the slow relaxation after it. See G. L. Plett,
-Battery Management Systems, volume 1, chapter 2. The table is typical of such a cell, and not
-measured on any.
+gives the jump at a change of current, the pairs a faster and a slower relaxation after it. See
+G. L. Plett, Battery Management Systems, volume 1, chapter 2. The table is typical of such a cell,
+and not measured on any.
 
-The charge is counted exactly for a held current, and the RC pair is solved exactly. A cell that is
+The charge is counted exactly for a held current, and the pairs are solved exactly. A cell that is
 empty gives no current, and one that is full takes none: `i` is 0 then. The voltage depends on the
 current directly, the charge does not, which its `feedthrough=()` says.
 
@@ -33,8 +33,10 @@ class Parameters(NamedTuple):
 
     capacity: Annotated[float, Variable("A.h", "Capacity", minimum=POSITIVE)] = 2.5
     R0: Annotated[float, Variable("Ohm", "Resistance in series", minimum=0.0)] = 0.03
-    R1: Annotated[float, Variable("Ohm", "Resistance of the pair", minimum=POSITIVE)] = 0.02
-    C1: Annotated[float, Variable("F", "Capacitance of the pair", minimum=POSITIVE)] = 2000.0
+    R: Annotated[Vector, 2, Variable("Ohm", "Resistance of a pair", POSITIVE)] = Vector(
+        (0.015, 0.01)
+    )
+    C: Annotated[Vector, 2, Variable("F", "Capacitance of a pair", POSITIVE)] = Vector((1e3, 2e4))
     charge0: Annotated[float, Variable("1", "Charge at the start", 0.0, 1.0)] = 1.0
 
 
@@ -48,7 +50,7 @@ class State(NamedTuple):
     """What it contains."""
 
     charge: Annotated[float, Variable("1", "Charge")]
-    v_rc: Annotated[float, Variable("V", "Voltage of the pair")]
+    v: Annotated[Vector, 2, Variable("V", "Voltage of a pair")]
 
 
 class Outputs(NamedTuple):
@@ -62,7 +64,7 @@ class Outputs(NamedTuple):
 
 def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
     """State and outputs at the start."""
-    return _seen(parameters, State(parameters.charge0, 0.0), inputs)
+    return _seen(parameters, State(parameters.charge0, Vector((0.0, 0.0))), inputs)
 
 
 def advance(
@@ -71,9 +73,11 @@ def advance(
     """State and outputs after a step of h seconds with a held current."""
     i = _current(state, inputs)
     charge = min(max(state.charge - i * h / (3600 * parameters.capacity), 0.0), 1.0)
-    target = parameters.R1 * i
-    v_rc = target + (state.v_rc - target) * exp(-h / (parameters.R1 * parameters.C1))
-    return _seen(parameters, State(charge, v_rc), inputs)
+    v = Vector(
+        R * i + (v - R * i) * exp(-h / (R * C))
+        for v, R, C in zip(state.v, parameters.R, parameters.C)
+    )
+    return _seen(parameters, State(charge, v), inputs)
 
 
 def _current(state: State, inputs: Inputs) -> float:
@@ -84,5 +88,5 @@ def _current(state: State, inputs: Inputs) -> float:
 
 def _seen(parameters: Parameters, state: State, inputs: Inputs) -> tuple[State, Outputs]:
     i = _current(state, inputs)
-    voltage = interpolate(state.charge, CHARGES, SOURCE) - parameters.R0 * i - state.v_rc
+    voltage = interpolate(state.charge, CHARGES, SOURCE) - parameters.R0 * i - state.v.sum()
     return state, Outputs(voltage, i, state.charge, state.charge <= 0)

@@ -3,10 +3,10 @@
     (M + m) p'' + m l cos(a) a'' = u - c p' + m l sin(a) a'^2
     m l cos(a) p'' + m l^2 a''   = m g l sin(a)
 
-`p` is the position of the cart and `a` the angle of the pendulum, which is 0 where it stands
+`p` is the position of the cart and `angle` the angle a of the pendulum, which is 0 where it stands
 upright, and positive to the right. The rod has no mass. Lagrange's equations give both lines; see
-K. J. Astrom and R. M. Murray, Feedback Systems, section 3.2. They are linear in the accelerations,
-which `solve` finds, and stepped by the Runge-Kutta method of fourth order.
+the balance systems of K. J. Åström and R. M. Murray, Feedback Systems. They are linear in the
+accelerations, which `solve` finds, and stepped by the Runge-Kutta method of fourth order.
 
 With the default values the pendulum falls over from 0.1 rad and swings. There is no friction, so
 `energy` stays constant: how much it drifts shows how good a step is. Look at `p`, `angle` and

@@ -12,7 +12,7 @@ gives each row of the gain.
 
 The filter starts from a guess, and from how good that is. A target at the origin has no bearing:
 the step is refused. With the default values a target rests 1 km away, and the estimate goes there
-from 150 m off. Look at `position` and `range_error`.
+from 280 m off. Look at `position` and `range_error`.
 """
 
 from __future__ import annotations

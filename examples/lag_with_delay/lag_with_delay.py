@@ -10,7 +10,7 @@ exactly for the value that leaves the line.
 `measured` adds the noise: a component asks for standard normal numbers by the argument `n`, and
 `seed` says where they start. The same seed gives the same noise in each run.
 
-Lag with dead time is the standard model of slow processes; see Astrom and Hagglund, Advanced PID
+Lag with dead time is the standard model of slow processes; see Åström and Hägglund, Advanced PID
 Control, chapter 2. With the default values a step from 20 to 80 degC arrives after 2 s, and `y` has
 passed 63 % of it after 5 s. Look at `x` and `y`.
 """

@@ -5,7 +5,7 @@
     dI/dt = K / Ti (r - y) + (u - v) / Tt        v: the value of u before it is limited
     Td / N dD/dt + D = -K Td dy/dt
 
-This is the form of Astrom and Wittenmark, Computer-Controlled Systems, section 8.5. `b` weights the
+This is the form of Åström and Wittenmark, Computer-Controlled Systems, section 8.5. `b` weights the
 set point, which reduces the overshoot. The derivative acts on the measured value only, through a
 filter of the time constant Td / N.
 

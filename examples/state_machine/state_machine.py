@@ -2,18 +2,16 @@
 
     GREEN -> AMBER -> RED -> RED_AMBER -> GREEN ...
 
-The light is green for the cars until a pedestrian presses the button. It then runs through the
-other modes, each for the time that its parameter says, and back to green. There it stays for at
-least `green` seconds, whether the button is pressed or not. A button that is pressed at any time
-except red is remembered. Pedestrians may walk while the cars have red.
+The light is green for the cars until a pedestrian presses the button, but for at least `green`
+seconds. It then runs through the other modes, each for the time that its parameter says. A button
+that is pressed at any time except red is remembered. Pedestrians may walk while the cars have red.
 
 A mode is a member of an `IntEnum`. As a parameter it is a text, such as RED; as an output it is its
 number. A mode changes at the end of a communication step, so a step should be short compared with
-the times. The time by which a step has passed the change counts for the next mode, so that no error
-adds up.
+the times. By how much it ends late counts for the next mode, so that no error adds up.
 
-With the default values the button is held, and the light cycles. Look at `mode`, `walk` and
-`cycles`.
+With the default values the button is held, and the light repeats itself every 22 s. Look at `mode`,
+`walk` and `cycles`.
 """
 
 from __future__ import annotations
@@ -77,18 +75,23 @@ def begin(parameters: Parameters) -> tuple[State, Outputs]:
 def advance(
     parameters: Parameters, state: State, inputs: Inputs, h: float
 ) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds, in which at most one mode ends."""
-    mode, elapsed, cycles = state.mode, state.elapsed + h, state.cycles
+    """State and outputs after a step of h seconds, in which one mode may end."""
+    mode, elapsed = state.mode, state.elapsed + h
     requested = state.requested or (inputs.button and mode != Mode.RED)
+    after = state._replace(elapsed=elapsed, requested=requested)
     if mode == Mode.GREEN and requested and elapsed >= parameters.green - ROUNDING:
-        mode, elapsed = Mode.AMBER, max(elapsed - max(parameters.green, state.elapsed), 0.0)
+        # A request may come long after the least time of green.
+        began = max(parameters.green, state.elapsed)
+        after = after._replace(mode=Mode.AMBER, elapsed=elapsed - began)
     elif mode == Mode.AMBER and elapsed >= parameters.amber - ROUNDING:
-        mode, elapsed, requested = Mode.RED, elapsed - parameters.amber, False
+        over = elapsed - parameters.amber
+        after = after._replace(mode=Mode.RED, elapsed=over, requested=False)
     elif mode == Mode.RED and elapsed >= parameters.red - ROUNDING:
-        mode, elapsed = Mode.RED_AMBER, elapsed - parameters.red
+        after = after._replace(mode=Mode.RED_AMBER, elapsed=elapsed - parameters.red)
     elif mode == Mode.RED_AMBER and elapsed >= parameters.red_amber - ROUNDING:
-        mode, elapsed, cycles = Mode.GREEN, elapsed - parameters.red_amber, cycles + 1
-    return _seen(State(mode, elapsed, requested, cycles))
+        over = elapsed - parameters.red_amber
+        after = after._replace(mode=Mode.GREEN, elapsed=over, cycles=state.cycles + 1)
+    return _seen(after)
 
 
 def _seen(state: State) -> tuple[State, Outputs]:

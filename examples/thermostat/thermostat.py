@@ -12,8 +12,8 @@ solution: the room cools through the band in
 
     capacity / loss * log((upper - outdoor) / (lower - outdoor))
 
-With the default values it heats up from 15 degC in 32 minutes, and then switches about twice an
-hour. Use steps of about 10 s for some hours. Look at `temperature`, `heating` and `switched`.
+With the default values it heats up from 15 degC in 34 minutes, and then repeats itself every 18
+minutes. Use steps of about 10 s for some hours. Look at `temperature`, `heating` and `switched`.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ metres ahead of it. `offset` is how far it is to the left of the line, and dies 
 exp(-distance / lookahead) where it is small. This is known as line-of-sight guidance. A leg ends
 `radius` metres before its waypoint, and the last waypoint ends the drive.
 
-A shorter `lookahead` cuts corners more sharply, and begins to swing where the robot turns too
+A shorter `lookahead` leads back to the line sooner, and begins to swing where the robot turns too
 slowly for it. With the default values the robot drives around a square of 20 m. Plot `position.y`
 over `position.x`, and look at `offset` and `waypoint`.
 """
