@@ -10,7 +10,7 @@ G. L. Plett, Battery Management Systems, volume 1, chapter 2. The table is typic
 and not measured on any.
 
 The charge is counted exactly for a held current, and the pairs are solved exactly. A cell that is
-empty gives no current, and one that is full takes none: `i` is 0 then. The voltage depends on the
+empty gives no current, and a full one cannot be charged: `i` is 0 then. The voltage depends on the
 current directly, the charge does not, which its `feedthrough=()` says.
 
 With the default values 1.25 A empty it in two hours. Look at `voltage` and `charge`.

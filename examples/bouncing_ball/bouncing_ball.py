@@ -11,7 +11,7 @@ This is the model BouncingBall of the Reference FMUs of the Modelica Association
 names and values. With `h_max` = 0.001 s it gives their published result bit for bit.
 
 Look at `h` and `v`. Each bounce reaches about `e` * `e` of the height of the last one, and after
-2.5 s the ball rests. Try another `e` during the run.
+2.6 s the ball rests. Try another `e` during the run.
 """
 
 from __future__ import annotations

@@ -37,7 +37,7 @@ class Outputs(NamedTuple):
     """What is seen of it."""
 
     x: Annotated[float, Variable("1", "Value by the explicit Euler rule")]
-    exact: Annotated[float, Variable("1", "Value of the solution", feedthrough=("time",))]
+    exact: Annotated[float, Variable("1", "Value of the solution")]
 
 
 def begin(parameters: Parameters) -> tuple[State, Outputs]:

@@ -4,8 +4,8 @@
 
 Both hidden layers have five neurons. There are no biases, so the network is an odd function, as the
 sine is. The weights were found by least squares at 240 points from 0 to 2 pi, and then rounded to
-three places. From -2 pi to 2 pi the error is below 0.005. Outside, the network knows nothing: its
-output becomes constant.
+three places. From -2 pi to 2 pi the error is below 0.005. Outside, the network was never
+trained, and its output becomes constant.
 
 This follows PythonFMU's example `mldemo.py`, a component with the same names. That one loads a
 network with TensorFlow, which the host must have; here the weights are part of the text. To export

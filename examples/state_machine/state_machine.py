@@ -2,8 +2,8 @@
 
     GREEN -> AMBER -> RED -> RED_AMBER -> GREEN ...
 
-The light is green for the cars until a pedestrian presses the button, but for at least `green`
-seconds. It then runs through the other modes, each for the time that its parameter says. A button
+The light is green for the cars until a pedestrian presses the button, and for `green` seconds at
+least. It then runs through the other modes, each for the time that its parameter says. A button
 that is pressed at any time except red is remembered. Pedestrians may walk while the cars have red.
 
 A mode is a member of an `IntEnum`. As a parameter it is a text, such as RED; as an output it is its

@@ -135,7 +135,7 @@ def test_state_space_is_the_solution_of_any_system() -> None:
     x = held(np.array(A), np.eye(3), [2.0, 0.0, 0.0], [1.0, 2.0, 3.0], 0.1, 20)
     y = np.transpose([seen["y[1]"], seen["y[2]"], seen["y[3]"]])
     # Euler's rule: half a step of the second derivative, which is up to 5.
-    assert near(y, x + np.array([1.0, 2.0, 3.0]), atol=2e-3)
+    assert near(y, x + np.array([1.0, 2.0, 3.0]), atol=3e-4)
 
 
 # Components of PythonFMU's examples: their formulas, evaluated here.
@@ -267,7 +267,7 @@ def test_luenberger_observer_forgets_its_error_as_wanted() -> None:
     assert near(np.sort(np.linalg.eigvals(A - np.outer(L, C))), np.sort(wanted), rtol=1e-12)
     x = held(A - np.outer(L, C), np.column_stack([[0.0, 1.0], L]), [0, 0], [2.0, 0.1], 0.02, 100)
     # Runge-Kutta of fourth order: (omega h)^4 of what changes.
-    assert near(np.transpose([seen["p"], seen["v"]]), x, atol=1e-6)
+    assert near(np.transpose([seen["p"], seen["v"]]), x, atol=1e-8)
     assert seen["p"][-1] == pytest.approx(0.1, abs=1e-6)
 
 
@@ -429,7 +429,7 @@ def test_waypoint_guidance_is_the_solution_on_a_leg() -> None:
         return [cos(x[2]), sin(x[2]), min(max(2.0 * turn, -1.0), 1.0)]
 
     x = solution(rate, [0.0, 0.0, 0.0], seen["time"])
-    assert near([seen["position.x"], seen["position.y"]], x[:2], atol=3e-3)
+    assert near([seen["position.x"], seen["position.y"]], x[:2], atol=1e-3)
     with pytest.raises(Refusal, match="waypoints 1 and 2"):
         run(module, {"path[2,1]": 0.0}, stop_time=1.0, step=0.1)
 
@@ -474,7 +474,7 @@ def test_engine_map_is_interpolated_and_integrated() -> None:
     seen = run(module, stop_time=8.0, step=0.1, h_max=1e-3)
     speed = solution(lambda t, w: (table((0.4, w[0])) - 60.0) / 0.2, [80.0], seen["time"])[0]
     # Euler's rule: half a step times the second derivative, at most.
-    assert near(seen["speed"], speed, atol=0.2)
+    assert near(seen["speed"], speed, atol=0.05)
     assert table((0.4, seen["speed"][-1])) == pytest.approx(60.0, abs=0.1)
     stalled = run(module, {}, lambda t: {"load": 150.0}, stop_time=8.0, step=0.1)
     assert stalled["stalled"][-1] and stalled["speed"][-1] == 0.0
@@ -487,7 +487,7 @@ def test_dc_motor_is_the_exact_solution() -> None:
     B = np.array([[1 / L, 0.0], [0.0, -1 / J], [0.0, 0.0]])
     x = held(A, B, [0.0, 0.0, 0.0], [12.0, 0.2], 0.05, 60)
     # Runge-Kutta of fourth order with 17 ms, and a time constant of 80 ms: about (17/80)^4 / 120.
-    assert near(np.transpose([seen["i"], seen["speed"], seen["angle"]]), x, atol=2e-3)
+    assert near(np.transpose([seen["i"], seen["speed"], seen["angle"]]), x, atol=2e-4)
     free = run(load("dc_motor"), stop_time=10.0, step=0.1)
     assert free["speed"][-1] == pytest.approx(12.0 * k / (R * b + k * k), rel=1e-6)
 
@@ -532,7 +532,7 @@ def test_cart_pendulum_is_the_solution_and_keeps_its_energy() -> None:
     assert seen["energy"][0] == pytest.approx(0.2 * 9.81 * 0.5 * cos(0.1))
     # Without a force the centre of mass stays where it is.
     p, angle = np.array(seen["p"]), np.array(seen["angle"])
-    assert near(1.2 * p + 0.2 * 0.5 * np.sin(angle), 0.1 * sin(0.1), atol=1e-9)
+    assert near(1.2 * p + 0.2 * 0.5 * np.sin(angle), 0.1 * sin(0.1), atol=1e-8)
     pushed = run(module, {"c": 0.3}, lambda t: {"u": 1.5}, stop_time=3.0, step=0.02, h_max=0.005)
 
     def rate(t: float, x: Any) -> list[float]:
@@ -545,7 +545,7 @@ def test_cart_pendulum_is_the_solution_and_keeps_its_energy() -> None:
     x = solution(rate, [0.0, 0.1, 0.0, 0.0], pushed["time"])
     found = [pushed[port] for port in ("p", "angle", "v", "rate")]
     # Runge-Kutta of fourth order: h^4 times what its fast swings amplify.
-    assert near(found, x, atol=1e-5)
+    assert near(found, x, atol=3e-7)
 
 
 def test_thermostat_circles_with_the_period_of_the_solution() -> None:
