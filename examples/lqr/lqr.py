@@ -70,7 +70,7 @@ def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
     B = Matrix(((T * T / (2 * m),), (T / m,)))
     Q = Matrix(((parameters.q_p, 0.0), (0.0, parameters.q_v)))
 
-    def gain(P: Matrix) -> Matrix:
+    def gain(P: Annotated[Matrix, 2, 2]) -> Annotated[Matrix, 1, 2]:
         return (B.T @ P @ A) / (parameters.r + (B.T @ P @ B)[0, 0])
 
     P, K, change, rounds = Q, gain(Q), inf, 0
