@@ -61,7 +61,7 @@ class Outputs(NamedTuple):
 def begin(parameters: Parameters) -> tuple[State, Outputs]:
     """State and outputs at the start."""
     start = parameters.start
-    return State(Vector(start for _ in range(CELLS)), 0, 0.0, start), Outputs(start, start)
+    return State(Vector(start for _ in range(50)), 0, 0.0, start), Outputs(start, start)
 
 
 def advance(
