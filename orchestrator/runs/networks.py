@@ -32,7 +32,7 @@ _PASSES = frozenset(("Identity", "Flatten", "Dropout", "Cast", "Reshape", "Squee
 _WIDTH = 98
 
 
-class Layer(NamedTuple):
+class Dense(NamedTuple):
     """activation(W x + b)."""
 
     W: Any  #: array of neurons by inputs
@@ -43,7 +43,7 @@ class Layer(NamedTuple):
 class Network(NamedTuple):
     """Dense layers, one after the other."""
 
-    layers: Sequence[Layer]
+    layers: Sequence[Dense]
     inputs: str  #: what its file calls the inputs
     outputs: str
 
@@ -122,7 +122,7 @@ def _from_npz(path: Path) -> Network:
         if len(activations) != n:
             raise InputError(f"it has {n} layers and {len(activations)} activations")
         layers = [
-            Layer(file[f"W{i}"].astype(float), file[f"b{i}"].astype(float), activations[i - 1])
+            Dense(file[f"W{i}"].astype(float), file[f"b{i}"].astype(float), activations[i - 1])
             for i in range(1, n + 1)
         ]
     return Network(layers, "x", "y")
@@ -143,7 +143,7 @@ def _from_onnx(path: Path) -> Network:
         raise InputError(
             f"it has {len(inputs)} inputs and {len(graph.output)} outputs; one each is wanted"
         )
-    layers: list[Layer] = []
+    layers: list[Dense] = []
     value = inputs[0]
     for node in graph.node:
         attributes = {a.name: onnx.helper.get_attribute_value(a) for a in node.attribute}
@@ -161,7 +161,7 @@ def _from_onnx(path: Path) -> Network:
 
 
 def _append(
-    layers: list[Layer],
+    layers: list[Dense],
     operator: str,
     attributes: dict[str, Any],
     given: Sequence[Any],
@@ -172,10 +172,10 @@ def _append(
     if operator == "Gemm":
         W = attributes.get("alpha", 1.0) * (given[0] if attributes.get("transB") else given[0].T)
         b = attributes.get("beta", 1.0) * given[1] if len(given) > 1 else np.zeros(len(W))
-        layers.append(Layer(W.astype(float), np.ravel(b).astype(float), "none"))
+        layers.append(Dense(W.astype(float), np.ravel(b).astype(float), "none"))
     elif operator == "MatMul" and at_left:
         W = given[0].T.astype(float)
-        layers.append(Layer(W, np.zeros(len(W)), "none"))
+        layers.append(Dense(W, np.zeros(len(W)), "none"))
     elif operator == "Add" and layers and layers[-1].activation == "none":
         b = np.broadcast_to(np.ravel(given[0]), layers[-1].b.shape).astype(float)
         layers[-1] = layers[-1]._replace(b=layers[-1].b + b)
@@ -228,7 +228,7 @@ def _mathematics(used: set[str]) -> str:
     return ", ".join(sorted({"tanh": "tanh", "sigmoid": "exp"}[w] for w in used - {"relu"}))
 
 
-def _constants(i: int, layer: Layer) -> Iterator[str]:
+def _constants(i: int, layer: Dense) -> Iterator[str]:
     rows = ",\n".join(_lines(row) for row in layer.W)
     yield f"W{i} = Matrix(\n    (\n{textwrap.indent(rows, ' ' * 8)},\n    )\n)  # fmt: skip"
     yield f"b{i} = Vector(\n{textwrap.indent(_lines(layer.b), ' ' * 4)}\n)  # fmt: skip"
