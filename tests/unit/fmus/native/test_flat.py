@@ -245,7 +245,7 @@ calls = st.one_of(
     st.tuples(st.just("set_all"), st.just("Boolean"), some(("go", "counts"), st.booleans())),
     st.tuples(st.just("set_all"), st.just("Real"), some((*REALS, "gain", "K[2,1]"), reals)),
     st.tuples(
-        st.just("set_all"), st.just("Real"), st.fixed_dictionaries({r: reals for r in REALS})
+        st.just("set_all"), st.just("Real"), st.fixed_dictionaries(dict.fromkeys(REALS, reals))
     ),
     st.tuples(st.just("step"), st.sampled_from((0.02, 0.02, 0.01, 0.07, 0.0, -1.0, 1e9))),
     st.tuples(st.just("look")),
