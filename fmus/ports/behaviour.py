@@ -203,7 +203,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
-    noisy = [name for name in hints.get("measured", ()) if name in groups]
+    noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
     for name, found in hints.items():
         known = (*HOOKS[name], *noisy, "return")
         for argument in found.keys() - set(known):

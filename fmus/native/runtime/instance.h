@@ -6,6 +6,7 @@
  * noise.c      Python's random numbers
  * store.c      values of ports, and what may be done with them
  * run.c        modes and steps
+ * bytes.c      numbers and texts as bytes
  * state.c      the state as bytes, and what is checked before one is taken
  * guard.c      making and freeing instances, and what every call begins and ends with
  *
