@@ -105,10 +105,10 @@ def _glue(program: Program, said: Behaviour) -> str:
             "int credible", f"{_P}, const {_S}, {_I}, {_E}", [f"return {calls.get('credible', 1)};"]
         ),
         _defined("void restart", f"{_P}, {_S}, {_I}, {_E}", restart),
-        _defined("unsigned long seed", _P, seed),
+        _defined("unsigned long seed", f"{_P}, {_E}", seed),
         _defined(
             "void measure",
-            f"{_P}, const double draws[], {_O}",
+            f"{_P}, const double draws[], {_O}, {_E}",
             _measured(said, outputs, functions["measured"]) if said.noisy else [],
         ),
     ]
@@ -150,6 +150,9 @@ def _moved(
 ) -> list[str]:
     """What takes over the state and the outputs that a function gives."""
     assert isinstance(function.returns, Structure)
+    if said.is_stateless:
+        nothing = "memset(state, 0, sizeof *state);"
+        return [passages["outputs"].put("*outputs", "outputs", call), nothing]
     (state, _), *derived, (outputs, _) = function.returns.parts
     return [
         f"const {function.returns.name} result = {call};",

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 import os
-from datetime import datetime
 from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
 
 from fmus.kinds import NATIVE, PYTHON

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -27,7 +28,7 @@ FUNCTIONS = {
 def weights(seed: int = 1) -> dict[str, Any]:
     """Layers with float32 weights, as training leaves them."""
     random, found = np.random.default_rng(seed), {}
-    for i, (n, m) in enumerate(zip(SIZES[:-1], SIZES[1:], strict=True), start=1):
+    for i, (n, m) in enumerate(pairwise(SIZES), start=1):
         found[f"W{i}"] = random.normal(size=(m, n)).astype(np.float32)
         found[f"b{i}"] = random.normal(size=m).astype(np.float32)
     return found
