@@ -108,8 +108,8 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         dest="network",
         type=Path,
         metavar="FILE",
-        help="compute the neural network of an .onnx or .npz file, with dense layers and tanh, relu "
-        "or sigmoid, instead",
+        help="compute the neural network of an .onnx or .npz file instead; it has dense layers and "
+        "tanh, relu or sigmoid",
     )
     component.set_defaults(action=_component)
     controller = kinds.add_parser(
