@@ -23,9 +23,18 @@ from fmus.kinds import TARGETS, Platform, this_machine
 #: C compilers: the first one that there is, is taken.
 COMPILERS = ("cc", "gcc", "clang")
 
-#: How sources are compiled. Contracted or reordered operations would change numbers.
+#: Functions of the C library that compilers round better than it does where they know the argument.
+_ROUNDED = (
+    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "exp", "expm1",
+    "log", "log10", "log1p", "log2", "pow", "sin", "sinh", "tan", "tanh",
+)  # fmt: skip
+
+#: What would change numbers: contracted operations, and functions that the compiler computes.
+SAME_NUMBERS = ("-ffp-contract=off", *(f"-fno-builtin-{name}" for name in _ROUNDED))
+
+#: How sources are compiled.
 FLAGS = (
-    "-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared", "-s",
+    "-std=c99", "-O2", *SAME_NUMBERS, "-fPIC", "-fvisibility=hidden", "-shared", "-s",
 )  # fmt: skip
 
 #: Nothing here unwinds the stack, except the C library of Windows, half of a library there, which

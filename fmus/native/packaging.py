@@ -11,7 +11,8 @@ from fmus import documentation
 from fmus.compilers import Compiler, library
 from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
-from fmus.native.translator import tables, translated
+from fmus.native.tables import tables
+from fmus.native.translator import translated
 from fmus.ports import description, description_fmi3
 from fmus.ports.definition import Definition
 from fmus.ports.port import Port

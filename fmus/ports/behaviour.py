@@ -61,7 +61,8 @@ class Hooks(Protocol):
         a value was set.
 
         Returns:
-            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`.
+            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`; only outputs, if
+            there is no state.
 
         """
 
@@ -152,6 +153,7 @@ class Behaviour(NamedTuple):
         hooks: all by name; None for one that it does not have.
         state, derived, inputs, outputs, parameters: types that they take and return; derived is
             None without `derive`.
+        is_stateless: whether `begin` and `advance` give only outputs.
         noisy: the group of outputs that `measured` gives; empty: there is none.
         draws: how many numbers it takes.
         restarted: the text `RESTARTED`.
@@ -164,6 +166,7 @@ class Behaviour(NamedTuple):
     inputs: Any
     outputs: Any
     parameters: Any
+    is_stateless: bool
     noisy: str
     draws: int
     restarted: str
@@ -203,7 +206,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
-    noisy = [name for name in hints.get("measured", ()) if name in groups]
+    noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
     for name, found in hints.items():
         known = (*HOOKS[name], *noisy)
         for argument in found.keys() - {*known, "return"}:
@@ -213,8 +216,12 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         why = f"takes {len(noisy)} groups of outputs, not one"
         raise Misdeclared(f"{where}.measured {why}", "measured")
     derived = hints["derive"]["return"] if "derive" in hooks else None
-    returned = [tuple, types.get("state"), *([derived] if derived else []), said["Outputs"]]
+    outputs = said["Outputs"]
+    returned = [tuple, types.get("state"), *([derived] if derived else []), outputs]
+    is_stateless = "state" not in types and hints["begin"]["return"] is outputs
     for name in ("begin", "advance"):
+        if is_stateless and hints[name]["return"] is outputs:
+            continue
         parts = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
         returned[1] = returned[1] or (*parts[1:], Nothing)[0]
         if parts != returned:
@@ -222,11 +229,12 @@ def read_behaviour(module: ModuleType) -> Behaviour:
             raise Misdeclared(f"{where}.{name} does not return tuple[{words}]", name)
     return Behaviour(
         {name: hooks.get(name) for name in HOOKS},
-        returned[1],
+        Nothing if is_stateless else returned[1],
         derived,
         types.get("inputs", Nothing),
         said["Outputs"],
         types.get("parameters", Nothing),
+        is_stateless,
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),

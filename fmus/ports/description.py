@@ -205,8 +205,9 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
     units = units_of(ports)
-    root.insert(1, unit_definitions(units))
-    root.insert(2, _type_definitions(units))
+    if units:
+        root.insert(1, unit_definitions(units))
+        root.insert(2, _type_definitions(units))
     return root
 
 

@@ -48,8 +48,8 @@ def group_name(name: str) -> str:
 
 
 def member_of(name: str) -> str:
-    """The member that a structured name stands for, within its group."""
-    return name[len(group_name(name)) + 1 :].removesuffix("]")
+    """The member that a structured name stands for, within its group; a scalar is its own."""
+    return name[len(group_name(name)) + 1 :].removesuffix("]") or name
 
 
 def per_axis(unit: str) -> Members:

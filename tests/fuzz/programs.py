@@ -12,6 +12,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -60,16 +61,58 @@ FLOAT, INT, BOOL, V3, V2, M33, M23, RECORD = (
     "Annotated[Matrix, 3, 3]", "Annotated[Matrix, 2, 3]", "Record",
 )  # fmt: skip
 TYPES = (FLOAT, INT, BOOL, V3, V2, M33, M23, RECORD)
-_SIZES = {V3: 3, V2: 2}
 
-#: Functions of `math` of one and of two numbers.
-_OF_ONE = (
-    "sin", "cos", "tan", "atan", "tanh", "exp", "expm1", "sqrt", "log", "log1p", "log2", "log10",
-    "asin", "acos", "sinh", "cosh", "asinh", "acosh", "atanh", "fabs", "degrees", "radians", "abs",
-)  # fmt: skip
-_OF_TWO = ("atan2", "copysign", "fmod", "pow", "min", "max")
+#: The letters that stand for an expression of a type, and for a variable of one.
+LETTERS = dict(zip("FIBVWMNR", TYPES, strict=True))
+NAMES = {"$v": V3, "$r": RECORD}
 
-_NUMBERS = ("0.0", "-0.0", "1.0", "0.5", "2.0", "-3.25", "1e-9", "1e300", "inf", "pi", "1e-310")
+#: What an expression of a type can be. The first is one that needs no other.
+GRAMMAR = {
+    FLOAT: "0.0 | -0.0 | 1.0 | 0.5 | 2.0 | -3.25 | 1e-9 | 1e300 | inf | pi | 1e-310",
+    INT: "0 | 1 | 2 | 7 | -5",
+    BOOL: "True | False",
+    V3: "XS[1:4]",
+    V2: "YS[:2]",
+    M33: "A",
+    M23: "Matrix((XS[:3], YS[1:4]))",
+    RECORD: "Record(1.0, XS[:3])",
+}
+DEEPER = {
+    FLOAT: """
+        (F + F) | (F - F) | F * F | (F / F) | -F | (F % F) | (F // F) | (F if B else F) | (F + 2)
+        | (3 - F) | (I * F) | (I / I) | float(I) | V[0] | V[-1] | V[I % 4] | (V @ XS[1:4]) | V.sum()
+        | max(V) | min(F, F, 1.0) | max(F, F) | M[I % 3, 1] | N[1, -1] | interpolate(F, XS, YS)
+        | atan2(F, F) | copysign(F, F) | fmod(F, F) | pow(F, F) | abs(F) | fabs(F) | sin(F) | cos(F)
+        | tan(F) | atan(F) | tanh(F) | exp(F) | expm1(F) | sqrt(F) | log(F) | log1p(F) | log2(F)
+        | log10(F) | asin(F) | acos(F) | sinh(F) | cosh(F) | asinh(F) | acosh(F) | atanh(F)
+        | degrees(F) | radians(F) | R.x | 0.5 | inf
+    """,
+    INT: """
+        (I + I) | (I - I) | I * I | (I // I) | (I % I) | abs(I) | min(I, I) | max(I, I, 2) | -I | 5
+        | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
+        | int(B)
+        | Mode.HIGH | R.k
+    """,
+    BOOL: """
+        (F < F) | (F <= I) | (I > F) | (I >= I) | (F == F) | (I != I) | (B and B) | (B or B)
+        | (not B) | isnan(F) | isfinite(F) | bool(F) | bool(I) | (R.mode == Mode.LOW) | R.on
+    """,
+    V3: """
+        (V + V) | (V - V) | (F * V) | (V * F) | (V / F) | (-V) | (V * 2) | (A @ V) | (M @ V)
+        | V.replaced(I % 4, F) | Vector((F, F, I)) | (N.T @ W) | solve(A, V) | M[I % 3] | R.v
+        | Vector(each * F for each in V) | Vector(F + each for each in range(3))
+        | Vector(one - other for one, other in zip(V, XS))
+    """,
+    V2: "Vector((F, F)) | $v[1:] | (N @ V) | (W + YS[3:]) | Vector(a + k for k, a in enumerate(W))",
+    M33: """
+        (M @ M) | (M + A) | (M - A.T) | M.T | (-M) | (F * M) | (M / F) | (N.T @ N)
+        | M.replaced(I % 3, V) | Matrix((p + q * F for q in range(3)) for p in range(3))
+    """,
+    M23: "Matrix((V, V)) | (N @ A) | Matrix(((1.0, F, 0.0), (2.0, 0.5, I)))",
+    RECORD: """
+        Record(F, V, on=B) | Record(v=V, x=F, k=I) | $r._replace(x=F, mode=Mode.HIGH)
+    """,
+}
 
 Variables = dict[str, str]
 
@@ -84,9 +127,7 @@ class Program:
 
     def text(self) -> str:
         """The function."""
-        arguments: Variables = {"x": FLOAT, "y": FLOAT, "k": INT, "on": BOOL, "v": V3}
-        if self._random.random() < 0.3:
-            arguments["r"] = RECORD
+        arguments: Variables = {"x": FLOAT, "y": FLOAT, "k": INT, "on": BOOL, "v": V3, "r": RECORD}
         variables = dict(arguments)
         self._block(variables, "    ", self._random.randint(3, 8), depth=0)
         results = list(variables)
@@ -214,145 +255,29 @@ class Program:
 
     def _local(self, known: Variables, indent: str, depth: int) -> None:
         name = self._new(BOOL)
-        self._add(indent, f"def {name}_f(p: float, n: int) -> float:")
-        own: Variables = {"p": FLOAT, "n": INT}
+        own: Variables = {"p": FLOAT, "n": INT, "v": V3, "r": RECORD}
+        hints = ", ".join(f"{argument}: {hint}" for argument, hint in own.items())
+        self._add(indent, f"def {name}_f({hints}) -> float:")
         self._add(indent, f"    q = {self._expression(FLOAT, own, 2)}")
         self._add(indent, f"    return {self._expression(FLOAT, {**own, 'q': FLOAT}, 2)}")
-        given = self._expression(FLOAT, known, 1), self._expression(INT, known, 1)
-        self._add(indent, f"{name} = {name}_f({', '.join(given)})")
+        given = ", ".join(self._expression(hint, known, 1) for hint in own.values())
+        self._add(indent, f"{name} = {name}_f({given})")
         known[name] = FLOAT
 
     # Expressions
 
     def _expression(self, hint: str, known: Variables, depth: int) -> str:
         names = [name for name, h in known.items() if h == hint]
-        if depth <= 0 and names:
+        if names and (depth <= 0 or self._random.random() < 0.25):
             return self._random.choice(names)
-        makers = {
-            FLOAT: self._float, INT: self._int, BOOL: self._bool, V3: self._v, V2: self._v2,
-            M33: self._m33, M23: self._m23, RECORD: self._record,
-        }  # fmt: skip
-        if names and self._random.random() < 0.25:
-            return self._random.choice(names)
-        return makers[hint](known, depth - 1)
+        choices = (DEEPER if depth > 0 else GRAMMAR)[hint].split("|")
+        parts = re.split(r"(\$\w|\b[A-Z]\b)", self._random.choice(choices).strip())
+        return "".join(self._part(part, known, depth - 1) for part in parts)
 
-    def _float(self, known: Variables, depth: int) -> str:
-        if depth < 0:
-            return self._random.choice(_NUMBERS)
-        of = self._expression
-        a, b = of(FLOAT, known, depth), of(FLOAT, known, depth)
-        records = [name for name, hint in known.items() if hint == RECORD]
-        options = [
-            f"({a} + {b})", f"({a} - {b})", f"{a} * {b}", f"({a} / {b})", f"-{a}", f"({a} % {b})",
-            f"({a} // {b})", f"{self._random.choice(_OF_ONE)}({a})",
-            f"{self._random.choice(_OF_TWO)}({a}, {b})", self._random.choice(_NUMBERS),
-            f"({a} if {of(BOOL, known, depth)} else {b})", f"{of(V3, known, depth)}[{self._place()}]",
-            f"{of(V3, known, depth)}[{of(INT, known, depth)} % 4]", f"({of(V3, known, depth)} @ XS[1:4])",
-            f"{of(V3, known, depth)}.sum()", f"({of(INT, known, depth)} * {a})", f"float({of(INT, known, depth)})",
-            f"interpolate({a}, XS, YS)", f"max({of(V3, known, depth)})", f"({of(INT, known, depth)} / {self._int(known, depth)})",
-            f"{of(M33, known, depth)}[{self._place()}, 1]", f"{of(M23, known, depth)}[1, {self._place()}]",
-            f"({a} + 2)", f"(3 - {a})",
-        ]  # fmt: skip
-        options += [f"{name}.x" for name in records]
-        return self._random.choice(options)
-
-    def _place(self) -> str:
-        return self._random.choice(("0", "1", "-1"))
-
-    def _int(self, known: Variables, depth: int) -> str:
-        if depth < 0:
-            return self._random.choice(("0", "1", "2", "7", "-5"))
-        of = self._expression
-        a, b = of(INT, known, depth), of(INT, known, depth)
-        x = of(FLOAT, known, depth)
-        options = [
-            f"({a} + {b})", f"({a} - {b})", f"{a} * {b}", f"({a} // {b})", f"({a} % {b})", f"abs({a})",
-            f"min({a}, {b})", f"max({a}, {b}, 2)", f"({a} if {of(BOOL, known, depth)} else {b})",
-            f"int({x})", f"round({x})", f"floor({x})", f"ceil({x})", f"PRIMES[{a} % 4]",
-            f"len({self._vector(known)})", f"int({of(BOOL, known, depth)})", "Mode.HIGH", f"-{a}",
-            "5", "1",
-        ]  # fmt: skip
-        options += [f"{name}.k" for name, hint in known.items() if hint == RECORD]
-        return self._random.choice(options)
-
-    def _bool(self, known: Variables, depth: int) -> str:
-        if depth < 0:
-            return self._random.choice(("True", "False"))
-        of = self._expression
-        hint = self._random.choice((FLOAT, INT))
-        a, b = of(hint, known, depth), of(hint, known, depth)
-        options = [
-            *(f"({a} {sign} {b})" for sign in ("<", "<=", ">", ">=", "==", "!=")),
-            f"({of(BOOL, known, depth)} and {of(BOOL, known, depth)})", f"isnan({of(FLOAT, known, depth)})",
-            f"({of(BOOL, known, depth)} or {of(BOOL, known, depth)})", f"(not {of(BOOL, known, depth)})",
-            f"isfinite({of(FLOAT, known, depth)})", f"({of(FLOAT, known, depth)} > {of(INT, known, depth)})",
-            f"bool({a})",
-        ]  # fmt: skip
-        options += [f"({name}.mode == Mode.LOW)" for name, h in known.items() if h == RECORD]
-        return self._random.choice(options)
-
-    def _v(self, known: Variables, depth: int) -> str:
-        of = self._expression
-        if depth < 0:
-            return "XS[1:4]"
-        a, b = of(V3, known, depth), of(V3, known, depth)
-        x, k = of(FLOAT, known, depth), of(INT, known, depth)
-        options = [
-            f"({a} + {b})", f"({a} - {b})", f"({x} * {a})", f"({a} * {x})", f"({a} / {x})", f"(-{a})",
-            f"(A @ {a})", f"({of(M33, known, depth)} @ {a})", f"{a}.replaced({k} % 4, {x})",
-            f"Vector(({x}, {of(FLOAT, known, depth)}, {k}))", f"({of(M23, known, depth)}.T @ {of(V2, known, depth)})",
-            f"Vector(each * {x} for each in {self._of_three(known)})", f"solve(A, {a})",
-            f"Vector({x} + each for each in range(3))", f"{of(M33, known, depth)}[{k} % 3]",
-            f"Vector(one - other for one, other in zip({self._of_three(known)}, XS))", f"({a} * 2)",
-        ]  # fmt: skip
-        options += [f"{name}.v" for name, hint in known.items() if hint == RECORD]
-        return self._random.choice(options)
-
-    def _of_three(self, known: Variables) -> str:
-        return self._random.choice([n for n, hint in known.items() if hint == V3] or ["XS[1:4]"])
-
-    def _v2(self, known: Variables, depth: int) -> str:
-        of = self._expression
-        if depth < 0:
-            return "YS[:2]"
-        options = [
-            f"Vector(({of(FLOAT, known, depth)}, {of(FLOAT, known, depth)}))", f"{self._of_three(known)}[1:]",
-            f"({of(M23, known, depth)} @ {of(V3, known, depth)})", f"({of(V2, known, depth)} + YS[3:])",
-        ]  # fmt: skip
-        return self._random.choice(options)
-
-    def _m33(self, known: Variables, depth: int) -> str:
-        of = self._expression
-        if depth < 0:
-            return "A"
-        a = of(M33, known, depth)
-        options = [
-            "A", f"({a} @ {of(M33, known, depth)})", f"({a} + A)", f"({a} - A.T)", f"{a}.T", f"(-{a})",
-            f"({of(FLOAT, known, depth)} * {a})", f"({a} / {of(FLOAT, known, depth)})",
-            f"({of(M23, known, depth)}.T @ {of(M23, known, depth)})",
-            f"{a}.replaced({of(INT, known, depth)} % 3, {of(V3, known, depth)})",
-            f"Matrix((p + q * {of(FLOAT, known, depth)} for q in range(3)) for p in range(3))",
-        ]  # fmt: skip
-        return self._random.choice(options)
-
-    def _m23(self, known: Variables, depth: int) -> str:
-        of = self._expression
-        if depth < 0:
-            return "Matrix((XS[:3], YS[1:4]))"
-        options = [
-            f"Matrix(({of(V3, known, depth)}, {of(V3, known, depth)}))", f"({of(M23, known, depth)} @ A)",
-            f"Matrix(((1.0, {of(FLOAT, known, depth)}, 0.0), (2.0, 0.5, {of(INT, known, depth)})))",
-        ]  # fmt: skip
-        return self._random.choice(options)
-
-    def _record(self, known: Variables, depth: int) -> str:
-        of = self._expression
-        names = [name for name, hint in known.items() if hint == RECORD]
-        x = of(FLOAT, known, depth)
-        options = [f"Record({x}, {of(V3, known, depth)}, on={of(BOOL, known, depth)})",
-                   f"Record(v={of(V3, known, depth)}, x={x}, k={of(INT, known, depth)})"]  # fmt: skip
-        options += [f"{name}._replace(x={x}, mode=Mode.HIGH)" for name in names]
-        return self._random.choice(options)
+    def _part(self, part: str, known: Variables, depth: int) -> str:
+        if part in NAMES:
+            return self._random.choice([n for n, hint in known.items() if hint == NAMES[part]])
+        return self._expression(LETTERS[part], known, depth) if part in LETTERS else part
 
 
 class Finding(NamedTuple):
@@ -426,9 +351,8 @@ def main() -> int:
     for start in range(0, len(seeds), BATCH):
         for finding in tried(seeds[start : start + BATCH], compiler):
             wrong += 1
-            print(
-                f"seed {finding.seed}: {[*finding.given]}\n  Python {finding.python}\n  C {finding.c}"
-            )
+            print(f"seed {finding.seed}: {[*finding.given]}")
+            print(f"  Python {finding.python}\n  C {finding.c}", flush=True)
     print(f"{len(seeds)} programs, {wrong} of them differ")
     return 1 if wrong else 0
 

@@ -15,6 +15,7 @@ from types import FunctionType, ModuleType
 from typing import Any, get_type_hints
 
 from auv_fmu.arrays import Matrix, Vector
+from fmus.compilers import SAME_NUMBERS
 from fmus.native.functions import function_in_c
 from fmus.native.language import CONSTANTS, MATHEMATICS
 from fmus.native.program import RUNTIME, Function, Program
@@ -22,7 +23,7 @@ from fmus.native.shapes import DOUBLE, Shape, Structure, hints_of, shape_of
 from fmus.ports.port import Refusal
 
 #: As FMUs are compiled.
-FLAGS = ("-std=c99", "-ffp-contract=off", "-fPIC", "-shared")
+FLAGS = ("-std=c99", *SAME_NUMBERS, "-fPIC", "-shared")
 
 #: What a test module begins with.
 HEAD = f"""\

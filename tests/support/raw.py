@@ -335,7 +335,7 @@ class Host:
     def _read(self, arrays: _Arrays) -> list[Any]:
         """Values of variables; None each, where there are no outputs since there is no start."""
         status = self.call(f"fmi2Get{arrays.type}", arrays.references, arrays.n, arrays.values)
-        if status == Status.Error and arrays.type == "Real":
+        if status == Status.Error:
             return [None] * len(arrays.names)
         assert status == Status.OK, f"values cannot be read: {status.name}"
         return list(arrays.values)

@@ -16,5 +16,6 @@
 #include "noise.c"
 #include "store.c"
 #include "run.c"
+#include "bytes.c"
 #include "state.c"
 #include "guard.c"

@@ -80,6 +80,9 @@ static void reset(call *this);
 
 /* Values. What cannot be got is given as 0 or "". Integers and Booleans can be got as Reals. */
 static void get_reals(call *this, const uint32_t references[], size_t n, double values[]);
+
+/* Before Integers or Booleans are got: outputs are made what they are. */
+static void prepare_to_get(call *this, const uint32_t references[], size_t n);
 static int32_t get_integer(call *this, uint32_t reference);
 static int get_boolean(call *this, uint32_t reference);
 static string get_string(call *this, uint32_t reference);

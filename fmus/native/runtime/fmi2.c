@@ -113,6 +113,11 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
 #define GET(name, type, action)                                                                  \
     ANSWER(name, ALWAYS, wrong_values(n, r, v),                                                  \
            (void *c, const uint32_t r[], size_t n, type v[]), action)
+#define GET_EACH(name, type, get)                                                                \
+    GET(name, type, {                                                                            \
+        prepare_to_get(&this, r, n);                                                             \
+        FOR_EACH(v[i] = get(&this, r[i]));                                                       \
+    })
 #define SET(name, type, wrong, action)                                                           \
     ANSWER(name, NOT_AFTER_ERROR, wrong,                                                         \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
@@ -124,8 +129,8 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
     })
 
 GET(fmi2GetReal, double, get_reals(&this, r, n, v))
-GET(fmi2GetInteger, int, FOR_EACH(v[i] = get_integer(&this, r[i])))
-GET(fmi2GetBoolean, int, FOR_EACH(v[i] = get_boolean(&this, r[i])))
+GET_EACH(fmi2GetInteger, int, get_integer)
+GET_EACH(fmi2GetBoolean, int, get_boolean)
 GET(fmi2GetString, string, FOR_EACH(v[i] = get_string(&this, r[i])))
 SET(fmi2SetReal, double, wrong_values(n, r, v), set_reals(&this, r, n, v))
 SET_EACH(fmi2SetInteger, int, INTEGER, wrong_values(n, r, v), v[i], NULL)

@@ -155,6 +155,7 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
         call this = begin(handle, #name, ALWAYS);                                                \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
+            prepare_to_get(&this, r, n);                                                         \
             for (size_t i = 0; i < n; i++) v[i] = get(&this, r[i]);                              \
         }                                                                                        \
         return end(&this);                                                                       \

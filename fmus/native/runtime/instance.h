@@ -6,6 +6,7 @@
  * noise.c      Python's random numbers
  * store.c      values of ports, and what may be done with them
  * run.c        modes and steps
+ * bytes.c      numbers and texts as bytes
  * state.c      the state as bytes, and what is checked before one is taken
  * guard.c      making and freeing instances, and what every call begins and ends with
  *
@@ -46,11 +47,20 @@ typedef struct {
     fmi_type type;
     causality causality;
     variability variability;
-    size_t place; /* among the inputs or outputs, or of a parameter in its structure */
+    size_t place; /* of the value among inputs or outputs, or of a parameter in its structure */
     double start, minimum, maximum; /* as numbers that stand for them */
     const choice *choices;
     size_t n_choices;
 } port;
+
+/* Numbers of the state that are alike, one after the other. */
+typedef struct {
+    fmi_type type;
+    size_t n;
+    string name;           /* of an enumeration; NULL: they are of none */
+    const choice *members; /* of it */
+    size_t n_members;
+} numbers;
 
 /* An array of n elements, where C has none without elements. */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
@@ -59,6 +69,8 @@ typedef struct {
     model_parameters model;
     double h_max; /* largest internal step [s] */
 } parameter_values;
+
+/* All numbers lie side by side as doubles, in which integers are exact. */
 
 typedef union {
     model_inputs groups;

@@ -15,6 +15,8 @@ static run new_run(void) {
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER) {
             put_parameter(&it.parameters, &ports[i], ports[i].start);
+        } else if (ports[i].causality == INPUT) {
+            it.inputs.values[ports[i].place] = ports[i].start;
         }
     }
     return it;
@@ -52,14 +54,16 @@ static int accept(instance *it, const Error *error, message *why) {
     if (!bounded(&next->state)) {
         return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
     }
-    for (int i = 0; i < MODEL_OUTPUTS; i++) {
+    for (int i = 0; i < REAL_OUTPUTS; i++) {
         if (!isfinite(next->outputs.values[i])) {
-            return in_range(port_at(output_references[i]), next->outputs.values[i], why);
+            return is_finite(port_at(output_references[i]), next->outputs.values[i], why);
         }
     }
     if (MODEL_DRAWS > 0) {
+        Error noisy = {0};
         for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&run->noise);
-        model_measure(&it->meant.model, draws, &next->outputs.groups);
+        model_measure(&it->meant.model, draws, &next->outputs.groups, &noisy);
+        if (noisy.raised) return compose(why, "%s", noisy.why);
         if (!all_finite(next->outputs.values, MODEL_OUTPUTS)) {
             return compose(why, "a sampled output is not finite");
         }
@@ -77,7 +81,9 @@ static int start(instance *it, message *why) {
     moment *next = &run->moments[!run->now];
     Error error = {0};
     if (!adopt(it, &run->parameters, why)) return 0;
-    if (MODEL_DRAWS > 0) seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model));
+    if (MODEL_DRAWS > 0) {
+        seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model, &error));
+    }
     model_begin(&it->meant.model, &run->inputs.groups, run->start_time, &next->state.groups,
                 &next->outputs.groups, &error);
     return accept(it, &error, why);

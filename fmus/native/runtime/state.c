@@ -1,16 +1,13 @@
 /* The state of an FMU: complete, exact, as bytes, and checked before it is taken.
  *
- * It is held in memory as the bytes that it is serialised to. All numbers are little-endian; Reals
- * are IEEE 754 doubles, all others have four bytes:
+ * It is held in memory as the bytes that it is serialised to:
  *
  *     MAGIC, identity, mode, start time, time,
- *     parameters and inputs in the order of their ports, outputs,
+ *     parameters in the order of their ports, inputs and outputs, of both Reals before others,
  *     whether there is a state, and if so: the numbers of the state, and of the noise the words of
  *     the generator, the place of the next, whether there is a next number, and it;
  *     fault;
  *     the CRC-32 of all that.
- *
- * A text is its length and its bytes.
  */
 #include <math.h>
 #include <stdlib.h>
@@ -37,39 +34,6 @@ typedef struct {
 
 /* Writing */
 
-/* Where bytes are written to; NULL: they are only counted. */
-typedef struct {
-    unsigned char *bytes;
-    size_t size;
-} writer;
-
-static void put_bytes(writer *to, const void *bytes, size_t n) {
-    if (to->bytes != NULL) memcpy(to->bytes + to->size, bytes, n);
-    to->size += n;
-}
-
-static void put_word(writer *to, uint32_t word) {
-    const unsigned char bytes[] = {(unsigned char)word, (unsigned char)(word >> 8),
-                                   (unsigned char)(word >> 16), (unsigned char)(word >> 24)};
-    put_bytes(to, bytes, sizeof bytes);
-}
-
-static void put_real(writer *to, double real) {
-    uint64_t bits;
-    memcpy(&bits, &real, sizeof bits);
-    put_word(to, (uint32_t)bits);
-    put_word(to, (uint32_t)(bits >> 32));
-}
-
-static void put_reals(writer *to, const double reals[], size_t n) {
-    for (size_t i = 0; i < n; i++) put_real(to, reals[i]);
-}
-
-static void put_text(writer *to, string text) {
-    put_word(to, (uint32_t)strlen(text));
-    put_bytes(to, text, strlen(text));
-}
-
 static void put_noise(writer *to, const generator *noise) {
     for (int i = 0; i < GENERATOR_WORDS; i++) put_word(to, noise->words[i]);
     put_word(to, noise->place);
@@ -87,36 +51,16 @@ static void put_run(writer *to, const run *it) {
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality != PARAMETER) continue;
         double number = parameter(&it->parameters, &ports[i]);
-        if (ports[i].type == REAL) {
-            put_real(to, number);
-        } else {
-            put_word(to, (uint32_t)(int32_t)number);
-        }
+        put_numbers(to, ports[i].type, &number, 1);
     }
-    put_reals(to, it->inputs.values, MODEL_INPUTS);
-    put_reals(to, now->outputs.values, MODEL_OUTPUTS);
+    put_values(to, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
+    put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     put_word(to, (uint32_t)it->begun);
     if (it->begun) {
-        put_reals(to, now->state.values, MODEL_STATE);
+        put_state(to, now->state.values);
         if (MODEL_DRAWS > 0) put_noise(to, &it->noise);
     }
     put_word(to, (uint32_t)it->fault);
-}
-
-static uint32_t crc32(const unsigned char *bytes, size_t n) {
-    /* Of the half bytes 0 to 15. */
-    static const uint32_t sums[] = {
-        0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
-        0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
-        0x9b64c2b0, 0x86d3d2d4, 0xa00ae278, 0xbdbdf21c,
-    };
-    uint32_t sum = 0xffffffff;
-    for (size_t i = 0; i < n; i++) {
-        sum ^= bytes[i];
-        sum = sum >> 4 ^ sums[sum & 15];
-        sum = sum >> 4 ^ sums[sum & 15];
-    }
-    return ~sum;
 }
 
 static size_t content_size(const saved *state) {
@@ -129,87 +73,61 @@ static void seal(saved *state) {
     state->sealed = 1;
 }
 
-/* Reading */
-
-typedef struct {
-    const unsigned char *bytes;
-    size_t left;
-    int short_of; /* more was wanted than there is */
-} reader;
-
-/* The next bytes; NULL if there are not as many. */
-static const unsigned char *take_bytes(reader *from, size_t n) {
-    const unsigned char *bytes = from->bytes;
-    from->short_of |= n > from->left;
-    if (from->short_of) return NULL;
-    from->bytes += n;
-    from->left -= n;
-    return bytes;
-}
-
-static uint32_t take_word(reader *from) {
-    const unsigned char *b = take_bytes(from, 4);
-    if (b == NULL) return 0;
-    return b[0] | (uint32_t)b[1] << 8 | (uint32_t)b[2] << 16 | (uint32_t)b[3] << 24;
-}
-
 static int has_its_checksum(const saved *state) {
     size_t size = content_size(state);
     reader from = {.bytes = state->bytes + size, .left = CHECKSUM_SIZE};
     return take_word(&from) == crc32(state->bytes, size);
 }
 
-static double take_real(reader *from) {
-    uint64_t lower = take_word(from), bits = lower | (uint64_t)take_word(from) << 32;
-    double real;
-    memcpy(&real, &bits, sizeof real);
-    return real;
-}
+/* Reading */
 
-static void take_reals(reader *from, double reals[], size_t n) {
-    for (size_t i = 0; i < n; i++) reals[i] = take_real(from);
-}
+static int is_truth(double number) { return number == 0.0 || number == 1.0; }
 
-/* A text that messages have room for, without a zero in it. */
-static int take_text(reader *from, char text[MOST_TEXT + 1]) {
-    uint32_t length = take_word(from);
-    const unsigned char *bytes = length <= MOST_TEXT ? take_bytes(from, length) : NULL;
-    if (bytes == NULL) return 0;
-    memcpy(text, bytes, length);
-    text[length] = '\0';
-    return strlen(text) == length && is_utf8(text);
-}
-
-/* Whether the next is a text. */
-static int take_this(reader *from, string text) {
-    char found[MOST_TEXT + 1];
-    return take_text(from, found) && strcmp(found, text) == 0;
-}
-
-/* A saved truth value; -1 if it is neither. */
-static int take_truth(reader *from) {
-    uint32_t word = take_word(from);
-    return word <= 1 ? (int)word : -1;
+/* Whether a number can be a port's; an output is in no range, as no step looks at one. */
+static int good_value(const port *port, double number, message *why) {
+    if (port->type == BOOLEAN && !is_truth(number)) {
+        return compose(why, "%s: must be a Boolean", port->name);
+    }
+    if (port->type == STRING) {
+        return text_of(port, number) != NULL ||
+               compose(why, "%s: is not one of the choices", port->name);
+    }
+    return port->causality == OUTPUT ? is_finite(port, number, why) : in_range(port, number, why);
 }
 
 static int good_values(const double values[], size_t n, const uint32_t references[],
                        message *why) {
     for (size_t i = 0; i < n; i++) {
-        if (!in_range(port_at(references[i]), values[i], why)) return 0;
+        if (!good_value(port_at(references[i]), values[i], why)) return 0;
     }
     return 1;
 }
 
 static int take_parameter(reader *from, parameter_values *values, const port *port, message *why) {
-    double number = port->type == REAL ? take_real(from) : (int32_t)take_word(from);
-    if (port->type == BOOLEAN && number != 0.0 && number != 1.0) {
-        return compose(why, "%s: must be a Boolean", port->name);
-    }
-    if (port->type == STRING && text_of(port, number) == NULL) {
-        return compose(why, "%s: is not one of the choices", port->name);
-    }
-    if (port->type != STRING && !in_range(port, number, why)) return 0;
+    double number;
+    take_numbers(from, port->type, &number, 1);
+    if (!good_value(port, number, why)) return 0;
     put_parameter(values, port, number);
+    return 1;
+}
+
+/* Whether a number can be one of the state. */
+static int good_number(const numbers *of, double number, message *why) {
+    if (of->type == REAL) return isfinite(number) || compose(why, "a value is not finite");
+    if (of->type == BOOLEAN && !is_truth(number)) {
+        return compose(why, "%f is not of type bool", number);
+    }
+    return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
+           compose(why, "%f is not of type %s", number, of->name);
+}
+
+static int take_state(reader *from, double values[], message *why) {
+    for (size_t i = 0; i < N_STATE_NUMBERS; values += state_numbers[i++].n) {
+        take_numbers(from, state_numbers[i].type, values, state_numbers[i].n);
+        for (size_t k = 0; k < state_numbers[i].n; k++) {
+            if (!good_number(&state_numbers[i], values[k], why)) return 0;
+        }
+    }
     return 1;
 }
 
@@ -251,8 +169,8 @@ static int take_run(reader *from, run *it, message *why) {
             return 0;
         }
     }
-    take_reals(from, it->inputs.values, MODEL_INPUTS);
-    take_reals(from, now->outputs.values, MODEL_OUTPUTS);
+    take_values(from, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
+    take_values(from, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     if (!good_values(it->inputs.values, MODEL_INPUTS, input_references, why) ||
         !good_values(now->outputs.values, MODEL_OUTPUTS, output_references, why)) {
         return 0;
@@ -266,10 +184,7 @@ static int take_run(reader *from, run *it, message *why) {
         return compose(why, "it has steps, or outputs, without a state");
     }
     if (it->begun) {
-        take_reals(from, now->state.values, MODEL_STATE);
-        if (!all_finite(now->state.values, MODEL_STATE)) {
-            return compose(why, "a value is not finite");
-        }
+        if (!take_state(from, now->state.values, why)) return 0;
         if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, why)) return 0;
     }
     it->fault = take_truth(from);
@@ -278,10 +193,12 @@ static int take_run(reader *from, run *it, message *why) {
            compose(why, "it has missing or unknown parts");
 }
 
-static int nearly_equal(const double one[], const double other[], size_t n) {
-    for (size_t i = 0; i < n; i++) {
+/* Whether two lists of outputs are the same, but for the rounding of Reals. */
+static int nearly_equal(const double one[], const double other[]) {
+    for (int i = 0; i < MODEL_OUTPUTS; i++) {
         double larger = fmax(fabs(one[i]), fabs(other[i]));
-        if (!(fabs(one[i] - other[i]) <= NEAR * fmax(larger, 1.0))) return 0;
+        double most = i < REAL_OUTPUTS ? NEAR * fmax(larger, 1.0) : 0.0;
+        if (!(fabs(one[i] - other[i]) <= most)) return 0;
     }
     return 1;
 }
@@ -298,7 +215,7 @@ static int can_be_reached(run *it, message *why) {
     model_derive(parameters, &now->state.groups, &error);
     model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
     if (error.raised) return compose(why, "%s", error.why);
-    if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values, MODEL_OUTPUTS)) {
+    if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values)) {
         return compose(why, "its outputs do not match its state");
     }
     return 1;

@@ -1,8 +1,8 @@
 /* Values of ports, and what may be done with them.
  *
  * A port's value reference tells its place in the table. All Real inputs and all Real outputs lie
- * side by side, in their order, so that a host that passes them all in one call costs one
- * comparison.
+ * side by side, in their order and before the others, so that a host that passes them all in one
+ * call costs one comparison.
  */
 #include <math.h>
 #include <string.h>
@@ -32,12 +32,17 @@ static const port *port_of(uint32_t reference, fmi_type type) {
     return port != NULL && port->type == type ? port : NULL;
 }
 
-/* The text that a number stands for; NULL: none. */
-static string text_of(const port *port, double number) {
-    for (size_t i = 0; i < port->n_choices; i++) {
-        if (port->choices[i].number == number) return port->choices[i].text;
+/* The text of a number among n; NULL: it is none of them. */
+static string text_among(const choice choices[], size_t n, double number) {
+    for (size_t i = 0; i < n; i++) {
+        if (choices[i].number == number) return choices[i].text;
     }
     return NULL;
+}
+
+/* The text that a number stands for; NULL: none. */
+static string text_of(const port *port, double number) {
+    return text_among(port->choices, port->n_choices, number);
 }
 
 static int has_choice(const port *port, string text, double *number, message *why) {
@@ -53,11 +58,14 @@ static int has_choice(const port *port, string text, double *number, message *wh
     return 0;
 }
 
+static int is_finite(const port *port, double number, message *why) {
+    return isfinite(number) || compose(why, "%s = %r: must be finite", port->name, number);
+}
+
 /* Whether a port that takes numbers can take one. */
 static int in_range(const port *port, double number, message *why) {
-    if (!isfinite(number)) {
-        compose(why, "%s = %r: must be finite", port->name, number);
-    } else if (number < port->minimum) {
+    if (!is_finite(port, number, why)) return 0;
+    if (number < port->minimum) {
         compose(why, "%s = %g: must be at least %g", port->name, number, port->minimum);
     } else if (number > port->maximum) {
         compose(why, "%s = %g: must be at most %g", port->name, number, port->maximum);
@@ -100,6 +108,9 @@ static void get_unknown(call *this, string type, const uint32_t references[], si
     }
 }
 
+/* The output that no group has. */
+static int is_fault(const port *port) { return port == &ports[N_PORTS - 1]; }
+
 /* The value of a port as a number; 0.0, if no port of the type has the reference. */
 static double number_of(call *this, uint32_t reference, fmi_type type) {
     const run *run = &this->instance->run;
@@ -110,7 +121,7 @@ static double number_of(call *this, uint32_t reference, fmi_type type) {
     }
     if (port->causality == PARAMETER) return parameter(&run->parameters, port);
     if (port->causality == INPUT) return run->inputs.values[port->place];
-    if (port->type == BOOLEAN) return run->fault;
+    if (is_fault(port)) return run->fault;
     return run->moments[run->now].outputs.values[port->place];
 }
 
@@ -121,17 +132,22 @@ static int are_all(const uint32_t references[], const uint32_t all[], size_t n) 
 
 static int has_output(const uint32_t references[], size_t n) {
     for (size_t i = 0; i < n; i++) {
-        const port *port = port_of(references[i], REAL);
-        if (port != NULL && port->causality == OUTPUT) return 1;
+        const port *port = port_at(references[i]);
+        if (port != NULL && port->causality == OUTPUT && !is_fault(port)) return 1;
     }
     return 0;
 }
 
-static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
+static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     instance *it = this->instance;
     message why;
     if (it->stale && has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
-    if (n == MODEL_OUTPUTS && are_all(references, output_references, n)) {
+}
+
+static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
+    instance *it = this->instance;
+    prepare_to_get(this, references, n);
+    if (n == REAL_OUTPUTS && are_all(references, output_references, n)) {
         memcpy(values, it->run.moments[it->run.now].outputs.values, n * sizeof *values);
         return;
     }
@@ -259,8 +275,8 @@ static int all_finite(const double values[], size_t n) {
 
 static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
     run *run = &this->instance->run;
-    if (n == MODEL_INPUTS && run->mode == STEPPING && are_all(references, input_references, n) &&
-        all_finite(values, n)) {
+    if (n == REAL_INPUTS && !INPUTS_HAVE_RANGES && run->mode == STEPPING &&
+        are_all(references, input_references, n) && all_finite(values, n)) {
         memcpy(run->inputs.values, values, n * sizeof *values);
         return;
     }

@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from fmus.discovery import components, ports_of, source_of
 from fmus.native.shapes import strip_sphinx_marks
-from fmus.native.translator import tables, translated
+from fmus.native.tables import tables
+from fmus.native.translator import translated
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.callbacks import describe_error
 from support.equations import (

@@ -1,0 +1,156 @@
+"""The ports of a component in C, as tables, and what the numbers of its state are."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from enum import IntEnum
+from itertools import groupby
+from typing import Any
+
+from auv_fmu import euler
+from fmus.native.shapes import Shape, Structure, shape_of
+from fmus.ports.definition import Definition
+from fmus.ports.groups import hints_of, is_class, reals_first, scalars_of
+from fmus.ports.port import FAULT, H_MAX, Port, Value
+
+_HEAD = f"""\
+/* The ports: a value reference is a place in the first table.
+ *
+ * Made from the declaration of the ports. The columns are name, type, causality, variability,
+ * place of the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers,
+ * Reals before all others.
+ */
+#include <float.h>
+#include <stddef.h>
+
+/* From auv_fmu/euler.py. */
+static const double ROUNDING = {euler.ROUNDING!r};
+static const double LARGEST_STATE = {euler.LARGEST_STATE!r};
+static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
+
+#define PARAMETER_AT(member) offsetof(parameter_values, member)
+"""
+
+#: What numbers of the state are called in C, by their types in Python.
+_TYPES = {float: "REAL", int: "INTEGER", bool: "BOOLEAN"}
+
+
+def tables(definition: Definition) -> str:
+    """The file ports.h of a component."""
+    ports = (*definition.ports, FAULT)
+    places = {FAULT.name: "0", H_MAX.name: "PARAMETER_AT(h_max)"}
+    parameters = shape_of(definition.behaviour.parameters)
+    for name, path in definition.parameters.paths.items():
+        places[name] = f"PARAMETER_AT(model{_member(parameters, path)})"
+    values = {
+        causality: reals_first([port for port in definition.ports if port.causality == causality])
+        for causality in ("input", "output")
+    }
+    for found in values.values():
+        places |= {port.name: str(place) for place, port in enumerate(found)}
+    names = _names_of_choices(ports)
+    rows = "".join(f"    {{{_row(port, places, names)}}},\n" for port in ports)
+    return "\n".join(
+        (
+            _HEAD,
+            *(_choices(names[port.name], port.choices) for port in ports if port.choices),
+            f"static const port ports[] = {{\n{rows}}};\n",
+            f"enum {{ N_PORTS = {len(ports)} }};\n",
+            *(_references(causality, found, ports) for causality, found in values.items()),
+            *_counts(values),
+            *_state(definition.behaviour.state),
+        )
+    )
+
+
+def _member(shape: Shape, path: Sequence[str | int]) -> str:
+    """Where a number lies in a structure; a tuple of Python is one with an array `v`."""
+    text = ""
+    for step in path:
+        assert isinstance(shape, Structure)
+        place = [*hints_of(shape.made)].index(step) if isinstance(step, str) else step
+        suffix, shape = shape.parts[place]
+        text += suffix
+    return text
+
+
+def _row(port: Port, places: Mapping[str, str], names: Mapping[str, str]) -> str:
+    return ", ".join(
+        (
+            f'"{port.name}"',
+            port.type.upper(),
+            port.causality.upper(),
+            port.variability.upper(),
+            places[port.name],
+            _number(port, port.start or 0.0),
+            "-DBL_MAX" if port.minimum is None else _number(port, port.minimum),
+            "DBL_MAX" if port.maximum is None else _number(port, port.maximum),
+            names[port.name] if port.choices else "NULL",
+            str(len(port.choices)),
+        )
+    )
+
+
+def _number(port: Port, value: Value) -> str:
+    """The number that stands for a value."""
+    meant = port.meaning(value)
+    assert isinstance(meant, (float, int))
+    return repr(float(meant))
+
+
+def _names_of_choices(ports: Sequence[Port]) -> dict[str, str]:
+    """The name of the table of each port's choices, by the port's; `a.b` is not `a_b`."""
+    names: dict[str, str] = {}
+    for port in filter(lambda port: port.choices, ports):
+        name = f"choices_of_{re.sub('[^A-Za-z0-9]', '_', port.name)}"
+        while name in names.values():
+            name += "_"
+        names[port.name] = name
+    return names
+
+
+def _choices(name: str, choices: Mapping[str, Any]) -> str:
+    rows = ", ".join(f'{{"{text}", {number:d}}}' for text, number in choices.items())
+    return f"static const choice {name}[] = {{{rows}}};\n"
+
+
+def _references(causality: str, values: Sequence[Port], ports: Sequence[Port]) -> str:
+    """The value references of a causality, in the order of their values; C has no empty arrays."""
+    places = {port.name: place for place, port in enumerate(ports)}
+    found = [places[port.name] for port in values] or [0]
+    numbers = ", ".join(f"FIRST_REFERENCE + {place}" for place in found)
+    return f"static const uint32_t {causality}_references[] = {{{numbers}}};\n"
+
+
+def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
+    """How many Reals come before all others, and whether those that are set have a range."""
+    reals = {
+        causality: [port for port in found if port.type == "Real"]
+        for causality, found in values.items()
+    }
+    ranged = any((port.minimum, port.maximum) != (None, None) for port in reals["input"])
+    yield (
+        f"enum {{ REAL_INPUTS = {len(reals['input'])}, REAL_OUTPUTS = {len(reals['output'])}, "
+        f"INPUTS_HAVE_RANGES = {int(ranged)} }};\n"
+    )
+
+
+def _state(hint: object) -> Iterator[str]:
+    """What the numbers of a state are, one after the other."""
+    runs = [(scalar, len([*found])) for scalar, found in groupby(scalars_of(hint))]
+    rows: list[str] = []
+    enumerations: dict[Any, str] = {}
+    for scalar, n in runs:
+        if is_class(scalar, IntEnum):
+            members = enumerations.setdefault(scalar, f"members_{len(enumerations)}")
+            known = f'"{scalar.__name__}", {members}, {len(scalar)}'
+            rows.append(f"{{INTEGER, {n}, {known}}}")
+        else:
+            rows.append(f"{{{_TYPES[scalar]}, {n}, NULL, NULL, 0}}")
+    for scalar, members in enumerations.items():
+        yield _choices(members, {member.name: member for member in scalar})
+    # C has no empty arrays.
+    rows = rows or ["{REAL, 0, NULL, NULL, 0}"]
+    yield f"static const numbers state_numbers[] = {{{', '.join(rows)}}};\n"
+    yield f"enum {{ N_STATE_NUMBERS = {len(rows)} }};\n"

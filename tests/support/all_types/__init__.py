@@ -1,0 +1,1 @@
+"""A component with ports, parameters and state of all types."""

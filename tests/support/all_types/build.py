@@ -1,0 +1,72 @@
+"""AllTypes as FMUs, without the pages that FMUs of the bundle have."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import fmpy
+
+from fmus.discovery import write_archive
+from fmus.native.packaging import MAIN, sources
+from fmus.ports.definition import Definition, define
+from fmus.ports.description import fmi2_description
+from fmus.ports.description_fmi3 import fmi3_description
+from fmus.python.packaging import fmu_entries, seal
+from support.all_types import behaviour, ports
+from support.hosts import MEMORY
+
+NAME = "AllTypes"
+
+_GUID = "{all types}"
+
+_SCRIPT = """\
+from all_types import behaviour, ports
+from fmus.python.loading import settle
+from fmus.python.slave import slave_of
+
+AllTypes = slave_of("AllTypes", ports, behaviour)
+settle(AllTypes, globals(), locals())
+"""
+
+_FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract=off", "-fPIC",
+          "-shared", "-fvisibility=hidden", "-g")  # fmt: skip
+
+_DESCRIBE = {"2": fmi2_description, "3": fmi3_description}
+
+
+def definition() -> Definition:
+    """What it is."""
+    return define(NAME, ports, behaviour)
+
+
+def native(folder: Path, fmi: str = "2", sanitizers: str = "", compiler: str = "cc") -> Path:
+    """Its FMU in C for this machine, unpacked into a folder, and beside it as a file."""
+    platform = "linux64" if fmi == "2" else fmpy.platform_tuple
+    library = folder / f"binaries/{platform}/{NAME}.so"
+    library.parent.mkdir(parents=True)
+    (folder / "sources").mkdir()
+    identity = f'#define MODEL_NAME "{NAME}"\n#define MODEL_GUID "{_GUID}"\n'
+    for name, text in {**sources(definition(), fmi), "identity.h": identity}.items():
+        (folder / "sources" / name).write_text(text, encoding="utf-8")
+    (folder / "modelDescription.xml").write_bytes(_DESCRIBE[fmi](definition(), _GUID))
+    watched = ["-O1", f"-fsanitize={sanitizers}", "-fno-sanitize-recover"]
+    options = watched if sanitizers else ["-O2"]
+    command = [compiler, *_FLAGS, *options, "-o", library, MAIN[fmi], "-lm"]
+    subprocess.run(command, cwd=folder / "sources", check=True)
+    files = [path for path in folder.rglob("*") if path.is_file()]
+    entries = {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+    write_archive(folder.with_suffix(".fmu"), entries)
+    return folder
+
+
+def sanitized(folder: Path) -> Path:
+    """The same with sanitizers of memory and arithmetic."""
+    return native(folder, sanitizers=MEMORY, compiler="gcc")
+
+
+def python(folder: Path) -> Path:
+    """Its FMU in Python, unpacked into a folder, and beside it as a file."""
+    support = Path(__file__).parents[1]
+    seal(fmu_entries(f"{NAME}_fmu", _SCRIPT, "native", support), folder.with_suffix(".fmu"))
+    return Path(fmpy.extract(folder.with_suffix(".fmu"), folder))
