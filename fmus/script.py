@@ -122,7 +122,8 @@ def told(error: BaseException, path: Path) -> str:
     if isinstance(error, Misdeclared):
         place += _line_of(error.place, path)
     elif isinstance(error, SyntaxError):
-        place, said = f"{shown(error.filename or '', path)}:{error.lineno}", error.msg
+        place = f"{shown(error.filename or '', path)}:{error.lineno}"
+        said = f"SyntaxError: {error.msg}"
     elif frames and not _is_our_own(error):
         place, said = frames[-1], f"{type(error).__name__}: {text}"
     elif text.startswith((f"{path}:", f"{root}{os.sep}")):

@@ -108,7 +108,7 @@ MISTAKES = {
         "own_lag.py:8: ModuleNotFoundError: No module named 'maths'",
     ),
     "module": (("__version__ =", "__version__ = 1 / 0 #"), "own_lag.py:14: ZeroDivisionError: div"),
-    "syntax": (("x = state.x", "x = = state.x"), "own_lag.py:57: invalid syntax"),
+    "syntax": (("x = state.x", "x = = state.x"), "own_lag.py:57: SyntaxError: invalid syntax"),
 }
 
 
