@@ -105,10 +105,10 @@ def _glue(program: Program, said: Behaviour) -> str:
             "int credible", f"{_P}, const {_S}, {_I}, {_E}", [f"return {calls.get('credible', 1)};"]
         ),
         _defined("void restart", f"{_P}, {_S}, {_I}, {_E}", restart),
-        _defined("unsigned long seed", _P, seed),
+        _defined("unsigned long seed", f"{_P}, {_E}", seed),
         _defined(
             "void measure",
-            f"{_P}, const double draws[], {_O}",
+            f"{_P}, const double draws[], {_O}, {_E}",
             _measured(said, outputs, functions["measured"]) if said.noisy else [],
         ),
     ]

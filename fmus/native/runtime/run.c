@@ -50,6 +50,7 @@ static int accept(instance *it, const Error *error, message *why) {
     run *run = &it->run;
     moment *next = &run->moments[!run->now];
     double draws[AT_LEAST_ONE(MODEL_DRAWS)];
+    Error unmeasured;
     if (error->raised) return compose(why, "%s", error->why);
     if (!bounded(&next->state)) {
         return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
@@ -61,7 +62,9 @@ static int accept(instance *it, const Error *error, message *why) {
     }
     if (MODEL_DRAWS > 0) {
         for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&run->noise);
-        model_measure(&it->meant.model, draws, &next->outputs.groups);
+        unmeasured.raised = 0;
+        model_measure(&it->meant.model, draws, &next->outputs.groups, &unmeasured);
+        if (unmeasured.raised) return compose(why, "%s", unmeasured.why);
         if (!all_finite(next->outputs.values, MODEL_OUTPUTS)) {
             return compose(why, "a sampled output is not finite");
         }
@@ -79,7 +82,9 @@ static int start(instance *it, message *why) {
     moment *next = &run->moments[!run->now];
     Error error = {0};
     if (!adopt(it, &run->parameters, why)) return 0;
-    if (MODEL_DRAWS > 0) seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model));
+    if (MODEL_DRAWS > 0) {
+        seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model, &error));
+    }
     model_begin(&it->meant.model, &run->inputs.groups, run->start_time, &next->state.groups,
                 &next->outputs.groups, &error);
     return accept(it, &error, why);
