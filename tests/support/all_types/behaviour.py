@@ -20,7 +20,7 @@ class Mode(IntEnum):
 class Limits(NamedTuple):
     """A set in the set of parameters."""
 
-    default: float = 4.0
+    default: float = 2.0
     most: int = 2_147_483_647
     kind: Mode = Mode.OFF
 
@@ -181,6 +181,8 @@ def advance(
 
 def seed(parameters: Parameters) -> int:
     """Of the noise."""
+    if parameters.step == 13:
+        raise Refusal("step = 13: no seed")
     return parameters.step
 
 
@@ -188,7 +190,7 @@ def measured(
     parameters: Parameters, noisy: Annotated[Vector, 2], n: Annotated[Vector, 2]
 ) -> Annotated[Vector, 2]:
     """The first two numbers of the line, with noise."""
-    return noisy + parameters.gain * n
+    return noisy + parameters.gain * n / parameters.limits.default
 
 
 def expected(state: State, outputs: Outputs) -> Outputs:
