@@ -1,7 +1,7 @@
-"""Build the FMU of every component folder: `python -m fmus.build --out DIR`.
+"""Build the FMU of every component, or of a user's own: `python -m fmus.build [SCRIPT] --out DIR`.
 
-Runs in a separate process, because PythonFMU imports what it builds. Writes a file only if
-the sources have changed since it was written.
+Runs in a separate process, because PythonFMU imports what it builds. Writes a file of the bundle
+only if the sources have changed since it was written, and a user's always.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from fmus.compilers import compiler_for
 from fmus.discovery import components, fingerprint, source_of
 from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
+from fmus.python.own import build_script
 from fmus.python.packaging import LOADERS, PythonKind, best_loader
+from fmus.script import is_component, script_in, source_of_script, told
 
 #: The file that says what a folder of FMUs was built from, and what was built.
 MANIFEST = "build.json"
@@ -87,11 +89,35 @@ def main() -> int:
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     parser.add_argument("--fmi", choices=FMI_VERSIONS, default=FMI_VERSIONS[0])
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
+    parser.add_argument("script", nargs="?", type=Path, help="a component; default: all")
     options = parser.parse_args()
     try:
+        if options.script is not None:
+            return _build_own(options)
         build(options.out, _kind(options))
     except (OSError, ValueError) as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+def _build_own(options: argparse.Namespace) -> int:
+    """Build the FMU of the user's component, or say in a line where it has a mistake."""
+    path = options.script
+    try:
+        path = script_in(path)
+        if is_component(path):
+            kind, source = _kind(options), source_of_script(path)
+            kind.write(source, options.out / f"{source.name}.fmu")
+        elif options.kind == PYTHON:
+            build_script(path, options.out, options.loader)
+        else:
+            raise ValueError(
+                f"{path}: a slave of PythonFMU runs only in Python; use --kind {PYTHON}, or write "
+                "it as a component (auv-fmu new component)"
+            )
+    except Exception as error:
+        print(told(error, path), file=sys.stderr)
         return 2
     return 0
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.metadata import distribution
 from importlib.util import find_spec
+from inspect import cleandoc
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -36,12 +37,15 @@ def package_folder(package: str) -> Path:
     return Path(folder)
 
 
+def name_of(module: str) -> str:
+    """The name of a component, from that of its module or folder: `water_tank`, `WaterTank`."""
+    return "".join(word[:1].upper() + word[1:] for word in module.split("_"))
+
+
 def components() -> dict[str, str]:
     """The name of every component, and the package that its folder is."""
     return {
-        "".join(word.capitalize() for word in ports.parent.name.split("_")): (
-            f"fmus.{ports.parent.name}"
-        )
+        name_of(ports.parent.name): f"fmus.{ports.parent.name}"
         for ports in sorted(package_folder("fmus").glob("*/ports.py"))
     }
 
@@ -53,12 +57,14 @@ class Source(NamedTuple):
         name: of the component.
         modules: that define it.
         folder: that its page and its reference results lie in.
+        root: that its modules are imported from; None: they are installed.
 
     """
 
     name: str
     modules: tuple[str, ...]
     folder: Path
+    root: Path | None = None
 
     @property
     def definition(self) -> Definition:
@@ -72,8 +78,11 @@ class Source(NamedTuple):
 
     @property
     def page(self) -> str:
-        """What its author says of it, in Markdown."""
-        return (self.folder / "page.md").read_text(encoding="utf-8").strip()
+        """What its author says of it, in Markdown: the docstring, if one module says it all."""
+        if len(self.modules) > 1:
+            return (self.folder / "page.md").read_text(encoding="utf-8").strip()
+        said = cleandoc(import_module(*self.modules).__doc__ or "")
+        return f"# {self.name}\n\n{said}".strip()
 
 
 def source_of(name: str) -> Source:

@@ -29,10 +29,11 @@ BY_SUBJECT = ("src/auv_fmu", *(page.parent.as_posix() for page in COMPONENTS))
 
 #: Why others have another size.
 REASONS = {
+    "fmus/native/variables.py": "reads a program's text, and needs nothing of the translation",
     "fmus/ports/controllers.py": "in the FMUs of controllers only",
     "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
-    "fmus/python/own.py": "a program of its own: python -m fmus.python.own",
+    "fmus/python/own.py": "slaves of PythonFMU only, which no component needs",
     "orchestrator/commands/listing.py": "imports nothing that takes longer than the command",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/exchange/hosts/drivers.py": "a function for each tool, and nothing of ours",

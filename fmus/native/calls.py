@@ -17,11 +17,11 @@ from fmus.native.expressions import (
     UNARY,
     WHOLE,
     Code,
-    Expressions,
     is_dotted_name,
 )
 from fmus.native.layout import laid_out
 from fmus.native.loops import loop_over
+from fmus.native.operators import Operators
 from fmus.native.program import Function, number_in_c
 from fmus.native.shapes import (
     BOOLEAN,
@@ -69,7 +69,7 @@ _OF_ONE = (abs, bool, float, len, *_TESTS, *_TO_INTEGER, *_FACTORS)
 _TWO = frozenset((math.atan2, math.copysign, math.fmod, math.pow))
 
 
-class Calls(Expressions):
+class Calls(Operators):
     """Translates calls, and the other expressions of a function."""
 
     def _call(self, node: ast.Call, wanted: Shape | None) -> Code:

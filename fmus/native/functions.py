@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import ast
 import inspect
-import io
 import re
-import textwrap
-import tokenize
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from types import FunctionType
@@ -18,7 +15,7 @@ from typing import Any
 from fmus.native.calls import Calls
 from fmus.native.expressions import WHOLE, Code, is_dotted_name
 from fmus.native.language import foreign
-from fmus.native.layout import INDENT, LINE_WIDTH, laid_out
+from fmus.native.layout import INDENT, annotated, comment_of, comments_of, laid_out
 from fmus.native.loops import loop_over
 from fmus.native.program import Function, Program, Untranslatable
 from fmus.native.shapes import (
@@ -29,24 +26,12 @@ from fmus.native.shapes import (
     has_no_size,
     in_c,
     shape_of,
-    strip_sphinx_marks,
 )
+from fmus.native.variables import always_stored, both, loaded_names, names_in, stored_names
 from fmus.ports.port import Refusal
 
 #: How values in the text of a refusal may be written: as C writes them, too.
 _FORMAT = re.compile(r"[+ ]?0?\d*(?:\.\d+)?[efgEG]")
-
-
-@cache
-def _comments(path: str) -> dict[int, str]:
-    """The comments of a file after code, by line."""
-    text = Path(path).read_text(encoding="utf-8")
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    return {
-        token.start[0]: token.string.lstrip("#: ")
-        for token in tokens
-        if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
-    }
 
 
 @cache
@@ -75,7 +60,7 @@ def function_in_c(program: Program, function: FunctionType, made: Function) -> N
         for node in _checked(path).body
         if isinstance(node, ast.FunctionDef) and node.name == function.__name__
     ]
-    names = {*made.arguments, *_stored_names(tree)}
+    names = {*made.arguments, *stored_names(tree)}
     nothing = function.__annotations__.get("return") in (None, "None")
     _Translation(tree, Calls(program, path, function.__globals__, made, names), nothing).write()
 
@@ -86,7 +71,7 @@ class _Translation:
     def __init__(self, tree: ast.FunctionDef, in_c: Calls, returns_nothing: bool) -> None:
         self._tree, self._in_c, self._made = tree, in_c, in_c.made
         self._returns_nothing = returns_nothing
-        self._assigned = Counter(_stored_names(tree))
+        self._assigned = Counter(stored_names(tree))
         #: Names that are declared, block by block.
         self._scopes = [set(self._made.arguments)]
         #: Names that are given a value in a block and used after it, with their shapes.
@@ -103,7 +88,7 @@ class _Translation:
             arguments.append("Error *error")
         returned = "void" if made.returns is None else made.returns.name
         head = f"static {returned} {made.name}({', '.join(arguments) or 'void'}) {{"
-        lines = [*_comment(ast.get_docstring(self._tree)), *laid_out(head, ""), *body, "}"]
+        lines = [*comment_of(ast.get_docstring(self._tree)), *laid_out(head, ""), *body, "}"]
         made.text = "\n".join(lines)
 
     # Blocks
@@ -113,10 +98,10 @@ class _Translation:
             self._scopes.append(set())
         for statement in statements:
             lines = [line for text in self._statement(statement, indent) for line in text]
-            about = _comments(self._in_c.path).get(statement.end_lineno or 0)
+            about = comments_of(self._in_c.path).get(statement.end_lineno or 0)
             simple = not isinstance(statement, (ast.If, ast.While, ast.For, ast.FunctionDef))
             if about and lines and simple:
-                lines = _annotated(lines, f"/* {about} */", indent)
+                lines = annotated(lines, f"/* {about} */", indent)
             yield from lines
         if new:
             self._scopes.pop()
@@ -150,11 +135,11 @@ class _Translation:
 
     def _hoisting(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
         """A statement with blocks, after the declarations of what is used after it."""
-        inside = set(_stored_names(node))
+        inside = set(stored_names(node))
         declared = set().union(*self._scopes)
-        outside = Counter(_loaded_names(self._tree)) - Counter(_loaded_names(node))
+        outside = Counter(loaded_names(self._tree)) - Counter(loaded_names(node))
         wanted = {name for name in inside - declared if outside[name] > 0}
-        always = _always_stored(node)
+        always = always_stored(node)
         mine = sorted(wanted & always) if always is not None else []
         self._hoisted |= dict.fromkeys(mine)
         self._scopes[-1] |= set(mine)
@@ -176,14 +161,14 @@ class _Translation:
             if node.orelse:
                 yield [f"{indent}}} else {{"]
                 yield list(self._block(node.orelse, inner))
-            self._in_c.assigned = _both(after_body, self._in_c.assigned)
+            self._in_c.assigned = both(after_body, self._in_c.assigned)
             yield [f"{indent}}}"]
             return
         if isinstance(node, ast.While):
             yield laid_out(f"while ({self._in_c.condition(node.test).text}) {{", indent)
             before, bound = self._in_c.assigned, []
         else:
-            changed = set(_stored_names(*node.body))
+            changed = set(stored_names(*node.body))
             loop = loop_over(self._in_c, node.target, node.iter, changed)
             for name, _ in loop.bound:
                 if any(name in scope for scope in self._scopes):
@@ -197,7 +182,7 @@ class _Translation:
                 self._scopes[-1].add(name)
                 self._in_c.local[name] = code.shape
                 self._note(name)
-            elif name in set(_loaded_names(*node.body)):
+            elif name in set(loaded_names(*node.body)):
                 yield laid_out(self._stored(node, [(name, code)]), inner)
         yield list(self._block(node.body, inner))
         self._scopes.pop()
@@ -221,7 +206,7 @@ class _Translation:
         nothing = isinstance(node.returns, ast.Constant) and node.returns.value is None
         made.returns = None if nothing else self._shape(node.returns)
         inner.local = dict(made.arguments)
-        inner.names = {*made.arguments, *_stored_names(node)}
+        inner.names = {*made.arguments, *stored_names(node)}
         if inner.assigned is not None:
             inner.assigned = set(made.arguments)
         inner.functions = dict(self._in_c.functions)
@@ -264,7 +249,7 @@ class _Translation:
                 yield from self._taken_apart_in(target, value)
                 return
             pairs = list(zip(target.elts, value.elts))
-            if _names(target) & _names(value):
+            if names_in(target) & names_in(value):
                 yield from self._at_once(target, pairs)
             elif all(isinstance(one, ast.Name) for one, _ in pairs):
                 codes = [(ast.unparse(one), self._in_c.code(other)) for one, other in pairs]
@@ -388,62 +373,8 @@ class _Translation:
         raise self._in_c.fail(part.value, f"{{{name}}} in a text: write {{{name}:g}}")
 
 
-def _stored_names(*nodes: ast.AST) -> list[str]:
-    """Names that are given a value, but not in functions and expressions of their own."""
-    found: list[str] = []
-    for node in nodes:
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.FunctionDef):
-                found.append(child.name)
-            elif isinstance(child, ast.Name) and isinstance(child.ctx, ast.Store):
-                found.append(child.id)
-            elif not isinstance(child, (ast.GeneratorExp, ast.arguments)):
-                found += _stored_names(child)
-    return found + [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
-
-
-def _loaded_names(*nodes: ast.AST) -> list[str]:
-    """Names that are used."""
-    parts = [part for node in nodes for part in ast.walk(node)]
-    names = [n.id for n in parts if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
-    return names + [n.target.id for n in parts if isinstance(n, ast.AugAssign)
-                    and isinstance(n.target, ast.Name)]  # fmt: skip
-
-
-def _always_stored(node: ast.stmt) -> set[str] | None:
-    """Names that a statement gives a value on every way through it; None: none leads through."""
-    if isinstance(node, (ast.Return, ast.Raise, ast.Break, ast.Continue)):
-        return None
-    if isinstance(node, ast.If):
-        return _both(_all_stored(node.body), _all_stored(node.orelse))
-    if isinstance(node, (ast.While, ast.For)):
-        return set()
-    return set(_stored_names(node))
-
-
-def _all_stored(statements: Iterable[ast.stmt]) -> set[str] | None:
-    found: set[str] = set()
-    for statement in statements:
-        stored = _always_stored(statement)
-        if stored is None:
-            return None
-        found |= stored
-    return found
-
-
-def _both(one: set[str] | None, other: set[str] | None) -> set[str] | None:
-    """What is in both; None stands for everything."""
-    if one is None or other is None:
-        return one if other is None else other
-    return one & other
-
-
 def _zero(shape: Shape) -> str:
     return f"({shape.name}){{0}}" if isinstance(shape, Structure) else "0"
-
-
-def _names(node: ast.expr) -> set[str]:
-    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
 
 
 def _has_star(node: ast.Tuple) -> bool:
@@ -465,19 +396,3 @@ def _alike(values: list[tuple[str, Code]]) -> Iterator[list[tuple[str, Code]]]:
         group.append(value)
     if group:
         yield group
-
-
-def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
-    """Lines with a comment at the end, or before them."""
-    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= LINE_WIDTH:
-        return [f"{lines[0]} {comment}"]
-    return [f"{indent}{comment}", *lines]
-
-
-def _comment(docstring: str | None) -> list[str]:
-    if not docstring:
-        return []
-    lines = strip_sphinx_marks(textwrap.dedent(docstring)).rstrip().splitlines()
-    if len(lines) == 1:
-        return [f"/* {lines[0]} */"]
-    return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]

@@ -1,9 +1,15 @@
-"""How statements of C are laid out as lines."""
+"""How statements and comments of C are laid out as lines."""
 
 from __future__ import annotations
 
+import io
 import re
 import textwrap
+import tokenize
+from functools import cache
+from pathlib import Path
+
+from fmus.native.shapes import strip_sphinx_marks
 
 LINE_WIDTH = 98
 INDENT = "    "
@@ -84,3 +90,31 @@ def _split(text: str) -> list[str]:
             items.append(text[start:i].strip())
             start = i + 1
     return [*items, text[start:].strip()]
+
+
+@cache
+def comments_of(path: str) -> dict[int, str]:
+    """The comments of a file after code, by line."""
+    text = Path(path).read_text(encoding="utf-8")
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    return {
+        token.start[0]: token.string.lstrip("#: ")
+        for token in tokens
+        if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
+    }
+
+
+def annotated(lines: list[str], comment: str, indent: str) -> list[str]:
+    """Lines with a comment at the end, or before them."""
+    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= LINE_WIDTH:
+        return [f"{lines[0]} {comment}"]
+    return [f"{indent}{comment}", *lines]
+
+
+def comment_of(docstring: str | None) -> list[str]:
+    if not docstring:
+        return []
+    lines = strip_sphinx_marks(textwrap.dedent(docstring)).rstrip().splitlines()
+    if len(lines) == 1:
+        return [f"/* {lines[0]} */"]
+    return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]

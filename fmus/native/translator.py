@@ -150,6 +150,9 @@ def _moved(
 ) -> list[str]:
     """What takes over the state and the outputs that a function gives."""
     assert isinstance(function.returns, Structure)
+    if said.is_stateless:
+        nothing = "memset(state, 0, sizeof *state);"
+        return [passages["outputs"].put("*outputs", "outputs", call), nothing]
     (state, _), *derived, (outputs, _) = function.returns.parts
     return [
         f"const {function.returns.name} result = {call};",

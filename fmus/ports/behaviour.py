@@ -11,9 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from inspect import signature
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple, Protocol, get_type_hints
+from typing import Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 from fmus.ports.groups import Nothing, count_values, hints_of
+from fmus.ports.port import Misdeclared
 
 
 class Hooks(Protocol):
@@ -60,7 +61,8 @@ class Hooks(Protocol):
         a value was set.
 
         Returns:
-            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`.
+            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`; only outputs, if
+            there is no state.
 
         """
 
@@ -151,6 +153,7 @@ class Behaviour(NamedTuple):
         hooks: all by name; None for one that it does not have.
         state, derived, inputs, outputs, parameters: types that they take and return; derived is
             None without `derive`.
+        is_stateless: whether `begin` and `advance` give only outputs.
         noisy: the group of outputs that `measured` gives; empty: there is none.
         draws: how many numbers it takes.
         restarted: the text `RESTARTED`.
@@ -163,6 +166,7 @@ class Behaviour(NamedTuple):
     inputs: Any
     outputs: Any
     parameters: Any
+    is_stateless: bool
     noisy: str
     draws: int
     restarted: str
@@ -181,43 +185,75 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         module: `behaviour` in the folder of the component.
 
     Raises:
-        TypeError: it is not a behaviour.
+        Misdeclared: it is not a behaviour.
 
     """
     where, said = module.__name__, vars(module)
     hooks = {name: said[name] for name in HOOKS if isinstance(said.get(name), FunctionType)}
     for name in ("begin", "advance", "Outputs"):
         if name not in said:
-            raise TypeError(f"{where} has no {name}")
+            raise Misdeclared(f"{where} has no {name}")
     for together in _TOGETHER:
         there = [name for name in together if name in said]
         missing = [name for name in together if name not in said]
         if there and missing:
-            raise TypeError(f"{where} has {there[0]}, but no {missing[0]}")
+            raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
     for name, value in said.items():
         own = isinstance(value, FunctionType) and value.__module__ == where
         if own and name not in HOOKS and not name.startswith("_"):
-            raise TypeError(f"{where}.{name} is not one of the hooks {', '.join(HOOKS)}")
-    hints = {name: hints_of(hook) for name, hook in hooks.items()}
+            others = f"{', '.join(HOOKS)}; names of other functions begin with _"
+            raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
+    hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
-    for name, found in hints.items():
+    for name, taken in hints.items():
         known = (*HOOKS[name], *noisy, "return")
-        for argument in found.keys() - set(known):
-            raise TypeError(
-                f"{where}.{name} takes {argument}, which is not one of {', '.join(known)}"
-            )
+        for argument in taken.keys() - set(known):
+            why = f"{argument}, which is not one of {', '.join(known)}"
+            raise Misdeclared(f"{where}.{name} takes {why}", name)
     if "measured" in hooks and len(noisy) != 1:
-        raise TypeError(f"{where}.measured takes {len(noisy)} groups of outputs, not one")
+        why = f"takes {len(noisy)} groups of outputs, not one"
+        raise Misdeclared(f"{where}.measured {why}", "measured")
+    derived = hints["derive"]["return"] if "derive" in hooks else None
+    outputs = said["Outputs"]
+    returned = [tuple, types.get("state"), *([derived] if derived else []), outputs]
+    is_stateless = "state" not in types and hints["begin"]["return"] is outputs
+    for name in ("begin", "advance"):
+        if is_stateless and hints[name]["return"] is outputs:
+            continue
+        found: list[Any] = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
+        returned[1] = returned[1] or (*found[1:], Nothing)[0]
+        if found != returned:
+            words = ", ".join(map(_word, returned[1:]))
+            raise Misdeclared(f"{where}.{name} does not return tuple[{words}]", name)
     return Behaviour(
         {name: hooks.get(name) for name in HOOKS},
-        types["state"],
-        hints["derive"]["return"] if "derive" in hooks else None,
+        Nothing if is_stateless else returned[1],
+        derived,
         types.get("inputs", Nothing),
         said["Outputs"],
-        types["parameters"],
+        types.get("parameters", Nothing),
+        is_stateless,
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),
     )
+
+
+def _types(where: str, hook: FunctionType) -> dict[str, Any]:
+    """The types of a hook's arguments and of what it returns."""
+    try:
+        hints = hints_of(hook)
+    except NameError as error:
+        why = f"has a type that is not known: {error}"
+        raise Misdeclared(f"{where} {why}", hook.__name__) from None
+    for name in (*signature(hook).parameters, "return"):
+        if name not in hints:
+            why = f"takes {name} of no type" if name != "return" else "does not say what it returns"
+            raise Misdeclared(f"{where} {why}", hook.__name__)
+    return hints
+
+
+def _word(kind: Any) -> str:
+    return str(getattr(kind, "__name__", kind))

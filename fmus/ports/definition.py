@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from fmus.ports.behaviour import Behaviour, read_behaviour
-from fmus.ports.groups import ParameterSet
-from fmus.ports.port import Port
+from fmus.ports.groups import Field, Nothing, ParameterSet
+from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port
+from fmus.ports.variable import declared, ports_in
 
 
 class Origin(NamedTuple):
@@ -64,12 +65,14 @@ def define(name: str, *modules: ModuleType) -> Definition:
 
     Args:
         name: of the component.
-        modules: `ports` and `behaviour` of its folder.
+        modules: `ports` and `behaviour` of its folder, or the one module that says it all.
 
     Raises:
-        TypeError: they do not go together.
+        TypeError: they do not go together; in one module it is a Misdeclared.
 
     """
+    if len(modules) == 1:
+        return _of_one_module(name, modules[0])
     ports, behaviour = modules
     return Definition(
         name,
@@ -80,3 +83,77 @@ def define(name: str, *modules: ModuleType) -> Definition:
         getattr(ports, "GROUP_OF", {}),
         read_behaviour(behaviour),
     )
+
+
+#: Names of the classes whose fields are ports, with the causality of these.
+_CLASSES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter"}
+
+
+def _of_one_module(name: str, module: ModuleType) -> Definition:
+    said = read_behaviour(module)
+    inputs, outputs, parameters = (_class(said, module, cls) for cls in _CLASSES)
+    taken = said.arguments("begin")
+    direct = (*(inputs._fields if "inputs" in taken else ()), *([TIME.name] * ("t" in taken)))
+    fields = {
+        "Inputs": declared(inputs, "input"),
+        "Outputs": declared(outputs, "output", direct),
+        "Parameters": declared(parameters, "parameter"),
+    }
+    _hold_apart(fields)
+    own = ParameterSet(parameters, **fields["Parameters"])
+    internal = (H_MAX,) if "n" in said.arguments("advance") else ()
+    ports = (
+        *(port for field in fields["Inputs"].values() for port in ports_in(field)),
+        *_fed_through(fields["Outputs"], fields["Inputs"], direct),
+        *own.ports,
+        *internal,
+    )
+    summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
+    origin = Origin(*(str(getattr(module, f"__{said}__", "")) for said in Origin._fields))
+    return Definition(name, summary, origin, ports, own, {}, said)
+
+
+def _class(said: Behaviour, module: ModuleType, cls: str) -> Any:
+    """The class of a name, if it is what the hooks take and return."""
+    argument, made = cls.lower(), getattr(module, cls, Nothing)
+    used = getattr(said, argument)
+    if used is Nothing and made is not Nothing:
+        raise Misdeclared(f"{cls} is there, but no hook takes {argument}", cls)
+    if used is not made:
+        word = getattr(used, "__name__", used)
+        raise Misdeclared(f"{argument} are of the type {word}; call it {cls}", "advance")
+    return made
+
+
+def _fed_through(
+    fields: Mapping[str, Field], inputs: Mapping[str, Field], direct: Sequence[str]
+) -> Iterator[Port]:
+    """The outputs, with the names of ports where the fields of the inputs stood.
+
+    At the start they depend on all that `begin` takes.
+    """
+    names = {field: [port.name for port in ports_in(ports)] for field, ports in inputs.items()}
+    names[TIME.name] = [TIME.name]
+    for field, ports in fields.items():
+        for port in ports_in(ports):
+            for one in port.feedthrough:
+                if one not in names:
+                    why = f"depends on {one!r}; there are {', '.join(names)}"
+                    raise Misdeclared(f"Outputs.{field} {why}", "Outputs", field)
+            later = [one for one in direct if one not in (*port.feedthrough, TIME.name)]
+            yield replace(
+                port,
+                feedthrough=tuple(name for one in port.feedthrough for name in names[one]),
+                initially=tuple(name for one in later for name in names[one]),
+            )
+
+
+def _hold_apart(fields: Mapping[str, Mapping[str, Field]]) -> None:
+    """Hold the names of ports apart, also from those that a component has anyway."""
+    taken = dict.fromkeys((FAULT.name, TIME.name, H_MAX.name), "every component")
+    for cls, found in fields.items():
+        for field in found:
+            if field in taken:
+                why = f"has a name that {taken[field]} has already"
+                raise Misdeclared(f"{cls}.{field} {why}", cls, field)
+            taken[field] = cls

@@ -6,7 +6,7 @@ from the ports.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -14,6 +14,7 @@ from auv_fmu import __version__
 from auv_fmu.euler import STEP
 from fmus.ports.definition import Definition
 from fmus.ports.port import FAULT, Port, Value
+from fmus.ports.units import unit_of
 
 #: Start, end and step of an experiment when the host names none [s].
 EXPERIMENT = (0.0, 100.0, STEP)
@@ -30,35 +31,6 @@ _LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
 #: How a variable gets its value at the start time; the standard forbids to say so of others.
 _INITIAL = {"output": "calculated", "parameter": "exact"}
-
-
-class Unit(NamedTuple):
-    """A unit, the name of the type that variables of this unit have, and its base units."""
-
-    type_name: str
-    exponents: Mapping[str, int]
-
-
-#: SI units of the ports.
-UNITS: dict[str, Unit] = {
-    "1": Unit("Dimensionless", {}),
-    "1/s": Unit("Rate", {"s": -1}),
-    "s": Unit("Time", {"s": 1}),
-    "m": Unit("Length", {"m": 1}),
-    "m/s": Unit("Velocity", {"m": 1, "s": -1}),
-    "m/s2": Unit("Acceleration", {"m": 1, "s": -2}),
-    "rad": Unit("Angle", {"rad": 1}),
-    "rad/s": Unit("AngularVelocity", {"rad": 1, "s": -1}),
-    "N": Unit("Force", {"kg": 1, "m": 1, "s": -2}),
-    "N.m": Unit("Torque", {"kg": 1, "m": 2, "s": -2}),
-    "W": Unit("Power", {"kg": 1, "m": 2, "s": -3}),
-    "kg": Unit("Mass", {"kg": 1}),
-    "kg/s": Unit("LinearDamping", {"kg": 1, "s": -1}),
-    "N/m": Unit("Stiffness", {"kg": 1, "s": -2}),
-    "kg/m": Unit("QuadraticDamping", {"kg": 1, "m": -1}),
-    "kg.m2": Unit("MomentOfInertia", {"kg": 1, "m": 2}),
-    "kg.m2/s": Unit("AngularDamping", {"kg": 1, "m": 2, "s": -1}),
-}
 
 
 class Dependency(NamedTuple):
@@ -117,7 +89,7 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
 def value_attributes(port: Port) -> dict[str, str]:
     """What is said of a variable's values."""
     said = {
-        "declaredType": UNITS[port.unit].type_name if port.unit else None,
+        "declaredType": unit_of(port.unit).type_name if port.unit else None,
         "unit": port.unit,
         "start": port.start,
         "min": port.minimum,
@@ -135,9 +107,16 @@ def unit_definitions(units: Sequence[str]) -> Element:
     """Units by the base units that they are made of."""
     definitions = Element("UnitDefinitions")
     for unit in units:
-        base = {name: str(exponent) for name, exponent in UNITS[unit].exponents.items()}
+        defined, said = SubElement(definitions, "Unit", name=unit), unit_of(unit)
+        if said.exponents is None:
+            continue
+        base = {name: str(exponent) for name, exponent in said.exponents.items()}
+        if said.factor != 1.0:
+            base["factor"] = _literal(said.factor)
+        if said.offset:
+            base["offset"] = _literal(said.offset)
         # Some readers cannot do with an element without attributes; one is the default.
-        SubElement(SubElement(definitions, "Unit", name=unit), "BaseUnit", base or {"factor": "1"})
+        SubElement(defined, "BaseUnit", base or {"factor": "1"})
     return definitions
 
 
@@ -226,8 +205,9 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
     units = units_of(ports)
-    root.insert(1, unit_definitions(units))
-    root.insert(2, _type_definitions(units))
+    if units:
+        root.insert(1, unit_definitions(units))
+        root.insert(2, _type_definitions(units))
     return root
 
 
@@ -240,7 +220,7 @@ def _variable(reference: int, port: Port) -> Element:
 def _type_definitions(units: Sequence[str]) -> Element:
     definitions = Element("TypeDefinitions")
     for unit in units:
-        name = UNITS[unit].type_name
+        name = unit_of(unit).type_name
         simple_type = SubElement(definitions, "SimpleType", name=name)
         SubElement(simple_type, "Real", quantity=name, unit=unit)
     return definitions

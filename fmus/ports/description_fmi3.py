@@ -13,7 +13,6 @@ from xml.etree.ElementTree import Element, SubElement
 from fmus.ports.definition import Definition
 from fmus.ports.description import (
     CAPABILITIES,
-    UNITS,
     default_experiment,
     dependencies,
     dependent_on,
@@ -28,6 +27,7 @@ from fmus.ports.description import (
 from fmus.ports.groups import slices
 from fmus.ports.port import FAULT, TIME, Port
 from fmus.ports.quantities import member_of
+from fmus.ports.units import unit_of
 
 #: What FMI 3.0 calls the types of variables.
 TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
@@ -88,7 +88,7 @@ def _configuration(root: Element, **attributes: str) -> Element:
 def _type_definitions(units: Sequence[str]) -> Element:
     definitions = Element("TypeDefinitions")
     for unit in units:
-        name = UNITS[unit].type_name
+        name = unit_of(unit).type_name
         SubElement(definitions, "Float64Type", name=name, quantity=name, unit=unit)
     return definitions
 

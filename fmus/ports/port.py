@@ -29,6 +29,20 @@ class Refusal(Exception):
     """A value or a step that a component does not accept; the text says why."""
 
 
+class Misdeclared(TypeError):
+    """A component that cannot be; the text says why.
+
+    Attributes:
+        place: the names of a class or a function, and of its field, that it is about.
+
+    """
+
+    def __init__(self, why: str, *place: str) -> None:
+        """Say what is wrong, and where."""
+        self.place = place
+        super().__init__(why)
+
+
 @dataclass(frozen=True)
 class Port:
     """One scalar variable of a component.
@@ -38,7 +52,7 @@ class Port:
         causality: `input`, `output`, `parameter`, or `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
         type: of FMI: `Real`, `Integer`, `Boolean` or `String`.
-        unit: of a Real, a key of :data:`fmus.ports.description.UNITS`.
+        unit: of a Real, as :mod:`fmus.ports.units` reads it.
         start: value before anything is set. Outputs have none.
         description: one line.
         minimum, maximum: inclusive bounds of a number.

@@ -87,11 +87,11 @@ def _lies_in(folder: Path, source: Path, top: str) -> bool:
     return folder in source.parents and source.relative_to(folder).parts[0] in (top, f"{top}.py")
 
 
-def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:
+def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:
     """The contents of an FMU, before it is sealed.
 
     Args:
-        script: name of the FMU's script.
+        name: of the FMU.
         text: of the script, which settles a slave (:mod:`fmus.python.loading`).
         loader: `native` or `plain`.
         own: folder of modules that go into the FMU beside this package's; None: none.
@@ -103,12 +103,13 @@ def fmu_entries(script: str, text: str, loader: str, own: Path | None = None) ->
     with TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
-        path = _stage(text, stage, script, own)
+        # Not the name itself: some file systems would take lag.py, beside it, for Lag.py.
+        path = _stage(text, stage, f"{name}_fmu", own)
         raw = pythonfmu.FmuBuilder.build_FMU(
             path, dest=built, project_files=set(stage.iterdir()) - {path}
         )
         with zipfile.ZipFile(raw) as archive:
-            entries = {name: archive.read(name) for name in archive.namelist()}
+            entries = {entry: archive.read(entry) for entry in archive.namelist()}
     entries["model.png"] = documentation.ICON.read_bytes()
     entries["documentation/licenses/license.txt"] = licences(PYTHON).encode()
     return _with_loader(entries) if loader == "native" else entries
@@ -246,10 +247,13 @@ class PythonKind:
         """
         places = [module.rpartition(".") for module in source.modules]
         text = _SCRIPT.format(
-            imports="\n".join(f"from {package} import {name}" for package, _, name in places),
+            imports="\n".join(
+                f"from {package} import {name}" if package else f"import {name}"
+                for package, _, name in places
+            ),
             modules=", ".join(name for _, _, name in places),
             component=source.name,
         )
-        entries = fmu_entries(source.name, text, self.loader)
+        entries = fmu_entries(source.name, text, self.loader, source.root)
         entries |= documentation.fmu_documents(source)
         seal(entries, path)

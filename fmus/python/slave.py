@@ -27,7 +27,7 @@ from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import define
-from fmus.ports.groups import SCOPE, gathered, hints_of, reals_first, scattered, slices
+from fmus.ports.groups import SCOPE, Nothing, gathered, hints_of, reals_first, scattered, slices
 from fmus.ports.port import Refusal
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
 
@@ -69,7 +69,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
     outputs = reals_first([port for port in definition.ports if port.causality == "output"])
     places = slices([port for port in outputs if port.type == "Real"])
     members: dict[str, Any] = {
-        "__module__": modules[0].__package__,
+        "__module__": modules[0].__package__ or modules[0].__name__,
         "__doc__": definition.summary,
         **definition.about,
         "description": definition.description,
@@ -82,6 +82,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
         **SCOPE,
         **said.hooks,
         "Random": Random,
+        "nothing": Nothing(),
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
     }
@@ -122,7 +123,8 @@ def _steps(said: Behaviour) -> Iterator[str]:
                 "    return self._latest, outputs",
             ]
         else:
-            lines += [f"    return {_call(said, hook)}"]
+            state = "nothing, " if said.is_stateless else ""
+            lines += [f"    return {state}{_call(said, hook)}"]
         yield "\n".join(lines)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
 
 from fmus.kinds import NATIVE, PYTHON
@@ -16,10 +17,18 @@ from orchestrator.commands.options import (
     add_set,
     assignments,
 )
-from orchestrator.commands.streams import OK, describe, say, show
+from orchestrator.commands.streams import OK, describe, finished, say, show
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
-from orchestrator.runs.bundle import CONTROLLER_BASES, DEFAULT_FOLDERS, build_own, new_controller
+from orchestrator.runs.bundle import DEFAULT_FOLDERS
+from orchestrator.runs.own_components import (
+    CONTROLLER_BASES,
+    LIKENESSES,
+    build_own,
+    changes,
+    new_component,
+    new_controller,
+)
 from orchestrator.runs.request import Files
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
@@ -45,9 +54,10 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         "script",
         nargs="?",
         type=Path,
-        metavar="SCRIPT.py",
-        help="script with your own PythonFMU component; its FMU is written next to it; "
-        "default: build the bundle",
+        metavar="SCRIPT.py|DIR",
+        help="your own component: a script with the functions begin and advance, the folder of "
+        "such a script, or a script with a PythonFMU class (only for --kind "
+        f"{PYTHON}); its FMU is written next to it; default: build the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
     add_out(parser, f"{folders}, or the folder of SCRIPT.py")
@@ -59,13 +69,41 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         "compiler) or plain (only for hosts that are Python programs); default: native if there "
         "is a C compiler",
     )
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="rebuild each time that SCRIPT.py, or a module beside it, changes; Ctrl-C ends it",
+    )
     parser.set_defaults(action=_build)
 
 
 def add_new(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu new`."""
-    describe(parser, "Create the files of your own component.", "new controller my_law")
+    describe(parser, "Create the files of your own component.", "new component my_filter")
     kinds = parser.add_subparsers(required=True, metavar="KIND", help="kind of component")
+    component = kinds.add_parser(
+        "component", help="create a folder with a component for both kinds of FMU, and its tests"
+    )
+    describe(
+        component,
+        "Create a folder with a component in one Python file, which both kinds of FMU are made "
+        "from, and with its tests, a scenario that runs it, and a README.",
+        "new component water_tank --like plant",
+    )
+    component.add_argument(
+        "name", metavar="NAME", help="name of the component, for example WaterTank or water_tank"
+    )
+    component.add_argument(
+        "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
+    )
+    component.add_argument(
+        "--like",
+        choices=LIKENESSES,
+        default=LIKENESSES[0],
+        help="what it is at first: controller (PID with limits), plant (a tank), filter (low-pass "
+        f"of second order) or empty (the least there can be); default: {LIKENESSES[0]}",
+    )
+    component.set_defaults(action=_component)
     controller = kinds.add_parser(
         "controller", help="create a folder with a controller and a scenario, ready to run"
     )
@@ -104,13 +142,9 @@ def add_gains(parser: argparse.ArgumentParser) -> None:
 
 def _build(options: argparse.Namespace) -> int:
     if options.script is not None:
-        if options.kind != PYTHON:
-            raise InputError(
-                f"{options.script}: only the bundle's components are translated to C; "
-                f"use --kind {PYTHON}"
-            )
-        show(build_own(options.script, options.out, options.loader, force=options.force))
-        return OK
+        return _watch(options) if options.watch else _build_own(options)
+    if options.watch:
+        raise InputError("--watch is for your own component: name its script")
     folder = options.out or DEFAULT_FOLDERS[options.kind]
     written = bundle.build_bundle(
         folder,
@@ -128,6 +162,33 @@ def _build(options: argparse.Namespace) -> int:
     return OK
 
 
+def _build_own(options: argparse.Namespace) -> int:
+    built = build_own(
+        options.script,
+        options.out,
+        options.loader,
+        kind=options.kind,
+        fmi=options.fmi,
+        platforms=options.platforms,
+        force=options.force,
+        hear=lambda line: None if options.watch else say(line),
+    )
+    show(f"{built}, {datetime.now():%H:%M:%S}" if options.watch else built)
+    return OK
+
+
+def _watch(options: argparse.Namespace) -> int:
+    """Build at once and after each change, until Ctrl-C; mistakes do not end it."""
+    for _ in changes(options.script):
+        try:
+            _build_own(options)
+        except InputError as error:
+            say(str(error))
+        if not finished():
+            break
+    return OK
+
+
 def _described(settings: Mapping[str, str]) -> str:
     """How FMUs were built, in words."""
     if settings["kind"] == PYTHON:
@@ -140,6 +201,18 @@ def _controller(options: argparse.Namespace) -> int:
     for path in (script, scenario, *others):
         show(path)
     show(f"edit {script}, then build and run it:")
+    show(f"  auv-fmu build {script}")
+    show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
+    return OK
+
+
+def _component(options: argparse.Namespace) -> int:
+    files = new_component(options.name, options.folder, options.like)
+    for path in files:
+        show(path)
+    script, test, scenario, _ = files
+    show(f"edit {script}, then test, build and run it:")
+    show(f"  pytest {test}")
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

@@ -33,7 +33,7 @@ COMMANDS = {
     "view": ("look", "write a page that plays a stored result in 3D"),
     "live": ("look", "write a page in which a scenario runs while you change its settings"),
     "animate": ("look", "write a film of a scenario"),
-    "new": ("build", "create a controller from a template"),
+    "new": ("build", "create a component or a controller from a template"),
     "report": ("many_runs", "run all scenarios and compare them with the paper"),
     "table": (
         "many_runs", "compare the paper's table with every reading"

@@ -89,7 +89,8 @@ DEEPER = {
     """,
     INT: """
         (I + I) | (I - I) | I * I | (I // I) | (I % I) | abs(I) | min(I, I) | max(I, I, 2) | -I | 5
-        | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v) | int(B)
+        | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
+        | int(B)
         | Mode.HIGH | R.k
     """,
     BOOL: """

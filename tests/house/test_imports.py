@@ -26,7 +26,7 @@ FLOORS = {
     ),
     "fmus": (
         "ports", "components", "kinds", "discovery", "documentation", "compilers",
-        "python", "native", "build",
+        "python", "native", "trial", "script", "check", "build",
     ),
 }  # fmt: skip
 
@@ -36,8 +36,8 @@ ALLOWED = {
     "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
     "orchestrator": {
         "auv_fmu", "dask", "distributed", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
-        "matplotlib", "numba", "numpy", "pandas", "PIL", "platformdirs", "pyarrow", "pydantic",
-        "pydantic_core", "scipy", "tqdm",
+        "matplotlib", "numba", "numpy", "onnx", "pandas", "PIL", "platformdirs", "pyarrow",
+        "pydantic", "pydantic_core", "scipy", "tqdm",
     },
 }  # fmt: skip
 

@@ -77,7 +77,19 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
     [
         ("def advance", "def _advance", "has no advance"),
         ("class Outputs(TypedDict)", "class Output(TypedDict)", "has no Outputs"),
-        ("def _moved", "def moved", r"moved is not one of the hooks check, begin, .*, expected$"),
+        (
+            "def _moved",
+            "def moved",
+            "moved is not one of the hooks check, .*, expected; names of other functions begin "
+            "with _$",
+        ),
+        ("(h: float,", "(h,", "advance takes h of no type$"),
+        ("(h: float,", "(h: real,", "advance has a type that is not known: name 'real' is not "),
+        (
+            "Gains) -> tuple[State, Outputs]:\n    return State",
+            "Gains) -> Outputs:\n    return State",
+            r"begin does not return tuple\[State, Outputs\]$",
+        ),
         (
             "advance(h: float,",
             "advance(h: float, dt: float,",

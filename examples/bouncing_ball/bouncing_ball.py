@@ -1,0 +1,80 @@
+"""A ball that falls, bounces and comes to rest.
+
+    dh/dt = v,  dv/dt = g
+
+It is stepped by the explicit Euler rule. A step that ends at or below the ground is a bounce: the
+ball is put back just above the ground, and its velocity is reversed and reduced by the factor `e`.
+A ball that would leave the ground slower than `v_min` stays there. So a bounce is seen at the end
+of an internal step, and a smaller `h_max` gives a more exact one.
+
+This is the model BouncingBall of the Reference FMUs of the Modelica Association, with the same
+names and values. With `h_max` = 0.001 s it gives their published result bit for bit.
+
+Look at `h` and `v`. Each bounce reaches about `e` * `e` of the height of the last one, and after
+2.6 s the ball rests. Try another `e` during the run.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from fmus.ports.variable import Variable
+
+#: The smallest normal number: just above the ground [m].
+GROUND = 2.2250738585072014e-308
+
+
+class Parameters(NamedTuple):
+    """The ball, and where it starts."""
+
+    g: Annotated[float, Variable("m/s2", "Gravity acting on the ball", maximum=0.0)] = -9.81
+    e: Annotated[
+        float, Variable("1", "Coefficient of restitution", minimum=0.5, maximum=1.0, tunable=True)
+    ] = 0.7
+    v_min: Annotated[
+        float, Variable("m/s", "Velocity below which the ball stops bouncing", minimum=0.0)
+    ] = 0.1
+    h0: Annotated[float, Variable("m", "Height at the start", minimum=0.0)] = 1.0
+    v0: Annotated[float, Variable("m/s", "Velocity at the start")] = 0.0
+
+
+class State(NamedTuple):
+    """Its motion."""
+
+    h: Annotated[float, Variable("m", "Height of the ball")]
+    v: Annotated[float, Variable("m/s", "Velocity of the ball")]
+    rests: Annotated[bool, Variable("1", "The ball has come to rest")]
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    h: Annotated[float, Variable("m", "Height of the ball")]
+    v: Annotated[float, Variable("m/s", "Velocity of the ball, upwards")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    h, v = parameters.h0, parameters.v0
+    return State(h, v, False), Outputs(h, v)
+
+
+def advance(parameters: Parameters, state: State, h: float, n: int) -> tuple[State, Outputs]:
+    """State and outputs after n steps of h seconds."""
+    for _ in range(n):
+        if state.rests:
+            break
+        state = _fallen(parameters, state, h)
+    return state, Outputs(state.h, state.v)
+
+
+def _fallen(parameters: Parameters, state: State, h: float) -> State:
+    """The state after one step, and a bounce if it ends in one."""
+    height = state.h + h * state.v
+    velocity = state.v + h * parameters.g
+    if height > 0 or velocity >= 0:
+        return State(height, velocity, False)
+    rebound = -velocity * parameters.e
+    if rebound < parameters.v_min:
+        return State(GROUND, 0.0, True)
+    return State(GROUND, rebound, False)

@@ -1,0 +1,93 @@
+"""A pendulum on a cart, which is at home upside down in courses of control.
+
+    (M + m) p'' + m l cos(a) a'' = u - c p' + m l sin(a) a'^2
+    m l cos(a) p'' + m l^2 a''   = m g l sin(a)
+
+`p` is the position of the cart and `angle` the angle a of the pendulum, which is 0 where it stands
+upright, and positive to the right. The rod has no mass. Lagrange's equations give both lines; see
+the balance systems of K. J. Åström and R. M. Murray, Feedback Systems. They are linear in the
+accelerations, which `solve` finds, and stepped by the Runge-Kutta method of fourth order.
+
+With the default values the pendulum falls over from 0.1 rad and swings. There is no friction, so
+`energy` stays constant: how much it drifts shows how good a step is. Look at `p`, `angle` and
+`energy`; then try to balance it, with `u` as the force on the cart.
+"""
+
+from __future__ import annotations
+
+from math import cos, sin
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector, solve
+from fmus.ports.variable import POSITIVE, Variable
+
+
+class Parameters(NamedTuple):
+    """Cart and pendulum, and how it starts."""
+
+    M: Annotated[float, Variable("kg", "Mass of the cart", POSITIVE)] = 1.0
+    m: Annotated[float, Variable("kg", "Mass of the pendulum", POSITIVE)] = 0.2
+    l: Annotated[float, Variable("m", "Length of the pendulum", POSITIVE)] = 0.5
+    c: Annotated[float, Variable("kg/s", "Friction of the cart", minimum=0.0)] = 0.0
+    g: Annotated[float, Variable("m/s2", "Gravity", minimum=0.0)] = 9.81
+    angle0: Annotated[float, Variable("rad", "Angle at the start")] = 0.1
+
+
+class Inputs(NamedTuple):
+    """What acts on it."""
+
+    u: Annotated[float, Variable("N", "Force on the cart")] = 0.0
+
+
+class State(NamedTuple):
+    """Its motion."""
+
+    q: Annotated[Vector, 2, Variable("1", "Position and angle")]
+    dq: Annotated[Vector, 2, Variable("1", "Their rates")]
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    p: Annotated[float, Variable("m", "Position of the cart")]
+    angle: Annotated[float, Variable("rad", "Angle of the pendulum from upright")]
+    v: Annotated[float, Variable("m/s", "Velocity of the cart")]
+    rate: Annotated[float, Variable("rad/s", "Rate of the angle")]
+    energy: Annotated[float, Variable("J", "Energy, which is 0 for a level pendulum at rest")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start: it rests."""
+    return _seen(parameters, Vector((0.0, parameters.angle0)), Vector((0.0, 0.0)))
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
+) -> tuple[State, Outputs]:
+    """State and outputs after n steps of h seconds with held inputs."""
+    M, m, l = parameters.M, parameters.m, parameters.l
+
+    def acceleration(q: Annotated[Vector, 2], dq: Annotated[Vector, 2]) -> Annotated[Vector, 2]:
+        s, c = sin(q[1]), cos(q[1])
+        mass = Matrix(((M + m, m * l * c), (m * l * c, m * l * l)))
+        force = inputs.u - parameters.c * dq[0] + m * l * s * dq[1] * dq[1]
+        return solve(mass, Vector((force, m * parameters.g * l * s)))
+
+    q, dq = state.q, state.dq
+    for _ in range(n):
+        v1, a1 = dq, acceleration(q, dq)
+        v2, a2 = dq + h / 2 * a1, acceleration(q + h / 2 * v1, dq + h / 2 * a1)
+        v3, a3 = dq + h / 2 * a2, acceleration(q + h / 2 * v2, dq + h / 2 * a2)
+        v4, a4 = dq + h * a3, acceleration(q + h * v3, dq + h * a3)
+        q += h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
+        dq += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    return _seen(parameters, q, dq)
+
+
+def _seen(
+    parameters: Parameters, q: Annotated[Vector, 2], dq: Annotated[Vector, 2]
+) -> tuple[State, Outputs]:
+    m, l, v, turn = parameters.m, parameters.l, dq[0], parameters.l * dq[1]
+    bob = v * v + 2 * v * turn * cos(q[1]) + turn * turn
+    energy = (parameters.M * v * v + m * bob) / 2 + m * parameters.g * l * cos(q[1])
+    return State(q, dq), Outputs(q[0], q[1], v, dq[1], energy)

@@ -1,0 +1,91 @@
+"""A combustion engine whose torque is looked up in a map.
+
+    J dw/dt = torque(throttle, w) - load
+
+The map has a row for each throttle and a column for each speed. Between them the torque is
+interpolated in both directions: `interpolate` in each row at the speed, then between the rows at
+the throttle. Outside the map the torque of its edge holds. A closed throttle brakes. This is how
+engines are modelled from measurements on a test bench; see L. Guzzella and C. H. Onder,
+Introduction to Modeling and Control of Internal Combustion Engine Systems, chapter 2. The numbers
+of this map are invented.
+
+A load above the torque slows the engine down to a standstill, which it does not leave before the
+torque is above the load.
+
+With the default values it accelerates from idle until torque and load are equal. Look at `speed`,
+and at `stalled` with a load of 150 N.m.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector, interpolate
+from fmus.ports.variable import POSITIVE, Variable
+
+SPEEDS = Vector((0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0))  #: [rad/s]
+THROTTLES = Vector((0.0, 0.25, 0.5, 1.0))
+TORQUES = Matrix(  #: [N.m]
+    (
+        (10.0, 0.0, -10.0, -18.0, -26.0, -36.0, -50.0),
+        (60.0, 80.0, 62.0, 40.0, 22.0, 4.0, -20.0),
+        (70.0, 110.0, 116.0, 104.0, 86.0, 60.0, 20.0),
+        (80.0, 120.0, 142.0, 150.0, 144.0, 120.0, 60.0),
+    )
+)
+
+
+class Parameters(NamedTuple):
+    """What turns, and how fast at the start."""
+
+    J: Annotated[float, Variable("kg.m2", "Moment of inertia", minimum=POSITIVE)] = 0.2
+    speed0: Annotated[float, Variable("rad/s", "Speed at the start", minimum=0.0)] = 80.0
+
+
+class Inputs(NamedTuple):
+    """Pedal and load."""
+
+    throttle: Annotated[float, Variable("1", "Opening of the throttle", 0.0, 1.0)] = 0.4
+    load: Annotated[float, Variable("N.m", "Torque of the load", minimum=0.0)] = 60.0
+
+
+class State(NamedTuple):
+    """What is kept from step to step."""
+
+    speed: Annotated[float, Variable("rad/s", "Speed of the shaft")]
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    speed: Annotated[float, Variable("rad/s", "Speed of the shaft", feedthrough=())]
+    torque: Annotated[float, Variable("N.m", "Torque of the engine", feedthrough=("throttle",))]
+    power: Annotated[float, Variable("W", "Power of the engine", feedthrough=("throttle",))]
+    stalled: Annotated[bool, Variable("1", "It stands still", feedthrough=())]
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    return _seen(parameters.speed0, inputs)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
+) -> tuple[State, Outputs]:
+    """State and outputs after n steps of h seconds with held inputs."""
+    speed = state.speed
+    for _ in range(n):
+        torque = _torque(inputs.throttle, speed) - inputs.load
+        speed = max(speed + h * torque / parameters.J, 0.0)
+    return _seen(speed, inputs)
+
+
+def _torque(throttle: float, speed: float) -> float:
+    """The torque of the engine [N.m]."""
+    rows = Vector(interpolate(speed, SPEEDS, TORQUES[k]) for k in range(len(THROTTLES)))
+    return interpolate(throttle, THROTTLES, rows)
+
+
+def _seen(speed: float, inputs: Inputs) -> tuple[State, Outputs]:
+    torque = _torque(inputs.throttle, speed)
+    return State(speed), Outputs(speed, torque, speed * torque, speed == 0)

@@ -1,0 +1,87 @@
+"""A Kalman filter that estimates position and velocity from noisy positions.
+
+    x' = F x,          P' = F P F' + Q                  prediction
+    K  = P' H' (H P' H' + r^2)^-1                       gain
+    x  = x' + K (z - H x'),  P = (I - K H) P'           correction
+
+The state x is position and velocity. Between two measurements, h seconds apart, the acceleration is
+taken for white noise of the density `q`, and `r` is the standard deviation of a measurement. This
+is the usual model of a target that manoeuvres a little; see Bar-Shalom, Li and Kirubarajan,
+Estimation with Applications to Tracking and Navigation, section 6.2.
+
+A larger `q` makes the filter faster, and its estimate less smooth. Only the ratio of `q` and the
+square of `r` decides about the gain.
+
+With the default values the target rests at 1 m, and the estimate goes there from 0. Look at `p`
+and at `std_p`, which tells how good the filter believes it to be.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector
+from fmus.ports.variable import POSITIVE, Variable
+
+IDENTITY = Matrix(((1.0, 0.0), (0.0, 1.0)))
+H = Matrix(((1.0, 0.0),))  #: Only the position is measured.
+
+
+class Parameters(NamedTuple):
+    """How much the target moves, and what is known at the start."""
+
+    q: Annotated[
+        float, Variable("m2/s3", "Density of the acceleration", minimum=0.0, tunable=True)
+    ] = 0.1
+    r: Annotated[
+        float, Variable("m", "Standard deviation of a position", minimum=POSITIVE, tunable=True)
+    ] = 0.5
+    p0: Annotated[float, Variable("m", "First estimate of the position")] = 0.0
+    v0: Annotated[float, Variable("m/s", "First estimate of the velocity")] = 0.0
+    std_p0: Annotated[float, Variable("m", "Standard deviation of p0", 0.0)] = 10.0
+    std_v0: Annotated[float, Variable("m/s", "Standard deviation of v0", 0.0)] = 1.0
+
+
+class Inputs(NamedTuple):
+    """What is measured."""
+
+    z: Annotated[float, Variable("m", "Measured position")] = 1.0
+
+
+class State(NamedTuple):
+    """What it knows."""
+
+    x: Annotated[Vector, 2, Variable("1", "Position and velocity")]
+    P: Annotated[Matrix, 2, 2, Variable("1", "Covariance of their errors")]
+
+
+class Outputs(NamedTuple):
+    """What it tells."""
+
+    p: Annotated[float, Variable("m", "Estimated position")]
+    v: Annotated[float, Variable("m/s", "Estimated velocity")]
+    std_p: Annotated[float, Variable("m", "Standard deviation of p")]
+    std_v: Annotated[float, Variable("m/s", "Standard deviation of v")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    std = Matrix(((parameters.std_p0, 0.0), (0.0, parameters.std_v0)))
+    return _seen(Vector((parameters.p0, parameters.v0)), std @ std)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float
+) -> tuple[State, Outputs]:
+    """State and outputs after a measurement, which is taken every h seconds."""
+    F = Matrix(((1.0, h), (0.0, 1.0)))
+    Q = Matrix(((h * h * h / 3, h * h / 2), (h * h / 2, h))) * parameters.q
+    x, P = F @ state.x, F @ state.P @ F.T + Q
+    K = P @ H.T / ((H @ P @ H.T)[0, 0] + parameters.r * parameters.r)
+    x += K @ (Vector((inputs.z,)) - H @ x)
+    return _seen(x, (IDENTITY - K @ H) @ P)
+
+
+def _seen(x: Annotated[Vector, 2], P: Annotated[Matrix, 2, 2]) -> tuple[State, Outputs]:
+    return State(x, P), Outputs(x[0], x[1], sqrt(P[0, 0]), sqrt(P[1, 1]))

@@ -1,0 +1,92 @@
+"""A sensor with dead time, lag and noise, such as a thermometer at the end of a pipe.
+
+    T dx/dt = u(t - delay) - x,  y = x + noise
+
+The dead time is a line of 50 cells. At the end of each fiftieth of the delay the oldest cell takes
+the present input, and what it held leaves the line. So the delay is exact within one cell, whatever
+the steps are. Nothing is moved: only the position of the oldest cell goes around. The lag is solved
+exactly for the value that leaves the line.
+
+`measured` adds the noise: a component asks for standard normal numbers by the argument `n`, and
+`seed` says where they start. The same seed gives the same noise in each run.
+
+Lag with dead time is the standard model of slow processes; see Åström and Hägglund, Advanced PID
+Control, chapter 2. With the default values a step from 20 to 80 degC arrives after 2 s, and `y` has
+passed 63 % of it after 5 s. Look at `x` and `y`.
+"""
+
+from __future__ import annotations
+
+from math import exp
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Vector
+from fmus.ports.variable import POSITIVE, Variable
+
+CELLS = 50
+
+
+class Parameters(NamedTuple):
+    """The sensor."""
+
+    delay: Annotated[float, Variable("s", "Dead time", minimum=POSITIVE)] = 2.0
+    T: Annotated[float, Variable("s", "Time constant", minimum=POSITIVE, tunable=True)] = 3.0
+    start: Annotated[float, Variable("degC", "Temperature before the start")] = 20.0
+    std: Annotated[float, Variable("K", "Standard deviation of the noise", minimum=0.0)] = 0.2
+    seed: Annotated[int, Variable("1", "Seed of the noise")] = 1
+
+
+class Inputs(NamedTuple):
+    """What it measures."""
+
+    u: Annotated[float, Variable("degC", "Temperature")] = 80.0
+
+
+class State(NamedTuple):
+    """What is on its way."""
+
+    line: Annotated[Vector, CELLS, Variable("degC", "Temperatures in the pipe")]
+    oldest: Annotated[int, Variable("1", "Place of the oldest of them")]
+    age: Annotated[float, Variable("s", "Time since a cell was filled")]
+    x: Annotated[float, Variable("degC", "Temperature of the sensor")]
+
+
+class Outputs(NamedTuple):
+    """What it tells."""
+
+    x: Annotated[float, Variable("degC", "Temperature of the sensor")]
+    y: Annotated[float, Variable("degC", "Measured temperature")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    start = parameters.start
+    return State(Vector(start for _ in range(50)), 0, 0.0, start), Outputs(start, start)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float
+) -> tuple[State, Outputs]:
+    """State and outputs after a step of h seconds with held inputs."""
+    line, oldest, age = state.line, state.oldest, state.age + h
+    leaving = line[oldest]
+    period = parameters.delay / CELLS
+    for _ in range(CELLS):
+        if age < period * (1 - 1e-9):
+            break
+        age -= period
+        leaving = line[oldest]
+        line = line.replaced(oldest, inputs.u)
+        oldest = (oldest + 1) % CELLS
+    x = leaving + (state.x - leaving) * exp(-h / parameters.T)
+    return State(line, oldest, min(age, period), x), Outputs(x, x)
+
+
+def seed(parameters: Parameters) -> int:
+    """The seed of the noise."""
+    return parameters.seed
+
+
+def measured(parameters: Parameters, y: float, n: tuple[float]) -> float:
+    """The measured temperature with noise."""
+    return y + parameters.std * n[0]

@@ -1,0 +1,95 @@
+"""A linear quadratic regulator that brings a cart to rest at its origin.
+
+    p[k+1] = p[k] + T v[k] + T^2 / (2 m) u[k],  v[k+1] = v[k] + T / m u[k]
+
+Of all controllers, u = -K x with x = (p, v) has the least cost, which is the sum of
+
+    x'Q x + r u^2,  Q = diag(q_p, q_v)
+
+over all samples. The gain follows from the discrete algebraic Riccati equation
+
+    K = (r + B'P B)^-1 B'P A,  P = Q + A'P (A - B K)
+
+which is iterated from P = Q, at the start. See Åström and Wittenmark, Computer-Controlled Systems,
+section 11.2. Step this component every `T` seconds, the period that the gain is made for.
+
+A larger `r` makes the control slower and cheaper. Look at `K_p`, `K_v` and `rounds`, and
+connect `u` to a cart whose position and velocity come back as `p` and `v`.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector
+from fmus.ports.port import Refusal
+from fmus.ports.variable import POSITIVE, Variable
+
+#: Most rounds of the iteration, and the relative change of the gain that ends it.
+ROUNDS, ACCURACY = 10_000, 1e-12
+
+
+class Parameters(NamedTuple):
+    """The cart, and what its control costs."""
+
+    m: Annotated[float, Variable("kg", "Mass of the cart", minimum=POSITIVE)] = 2.0
+    T: Annotated[float, Variable("s", "Sampling period", minimum=POSITIVE)] = 0.05
+    q_p: Annotated[float, Variable("1/m2", "Weight of the position", minimum=0.0)] = 1.0
+    q_v: Annotated[float, Variable("s2/m2", "Weight of the velocity", minimum=0.0)] = 0.1
+    r: Annotated[float, Variable("1/N2", "Weight of the force", minimum=POSITIVE)] = 0.01
+
+
+class Inputs(NamedTuple):
+    """What is measured of the cart."""
+
+    p: Annotated[float, Variable("m", "Position of the cart")] = 1.0
+    v: Annotated[float, Variable("m/s", "Velocity of the cart")] = 0.0
+
+
+class State(NamedTuple):
+    """What is computed once."""
+
+    K: Annotated[Matrix, 1, 2, Variable("1", "Gain")]
+    rounds: Annotated[int, Variable("1", "Rounds of the iteration")]
+
+
+class Outputs(NamedTuple):
+    """What it does."""
+
+    u: Annotated[float, Variable("N", "Force on the cart")]
+    K_p: Annotated[float, Variable("N/m", "Gain of the position", feedthrough=())]
+    K_v: Annotated[float, Variable("N.s/m", "Gain of the velocity", feedthrough=())]
+    rounds: Annotated[int, Variable("1", "Rounds of the iteration", feedthrough=())]
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    m, T = parameters.m, parameters.T
+    A = Matrix(((1.0, T), (0.0, 1.0)))
+    B = Matrix(((T * T / (2 * m),), (T / m,)))
+    Q = Matrix(((parameters.q_p, 0.0), (0.0, parameters.q_v)))
+
+    def gain(P: Annotated[Matrix, 2, 2]) -> Annotated[Matrix, 1, 2]:
+        return (B.T @ P @ A) / (parameters.r + (B.T @ P @ B)[0, 0])
+
+    P, K, change, rounds = Q, gain(Q), inf, 0
+    while change > ACCURACY * max(K[0]) and rounds < ROUNDS:
+        P = Q + A.T @ P @ (A - B @ K)
+        better = gain(P)
+        change = max(Vector(abs(difference) for difference in (better - K)[0]))
+        K = better
+        rounds += 1
+    if rounds == ROUNDS:
+        raise Refusal(f"the gain has not converged after {ROUNDS} rounds")
+    return _seen(State(K, rounds), inputs)
+
+
+def advance(state: State, inputs: Inputs) -> tuple[State, Outputs]:
+    """State and outputs after a sample."""
+    return _seen(state, inputs)
+
+
+def _seen(state: State, inputs: Inputs) -> tuple[State, Outputs]:
+    K = state.K[0]
+    return state, Outputs(-(K @ Vector((inputs.p, inputs.v))), K[0], K[1], state.rounds)

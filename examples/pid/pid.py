@@ -1,0 +1,88 @@
+"""A PID controller whose integral does not wind up.
+
+    u = K (b r - y) + I + D, limited to u_min .. u_max
+
+    dI/dt = K / Ti (r - y) + (u - v) / Tt        v: the value of u before it is limited
+    Td / N dD/dt + D = -K Td dy/dt
+
+This is the form of Åström and Wittenmark, Computer-Controlled Systems, section 8.5. `b` weights the
+set point, which reduces the overshoot. The derivative acts on the measured value only, through a
+filter of the time constant Td / N.
+
+While the actuator is at a limit, u - v is not zero, and leads the integral back within about `Tt`
+seconds. Without it the integral would wind up, and the controller would react late after the set
+point has been reached.
+
+With the default values nothing answers, so `u` rises to its limit and `integral` stops rising.
+Connect `y` to a plant such as DcMotor or WaterTank.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from fmus.ports.port import Refusal
+from fmus.ports.variable import POSITIVE, Variable
+
+
+class Parameters(NamedTuple):
+    """Gain, times and limits."""
+
+    K: Annotated[float, Variable("1", "Gain", tunable=True)] = 2.0
+    Ti: Annotated[float, Variable("s", "Integral time", minimum=POSITIVE, tunable=True)] = 1.0
+    Td: Annotated[float, Variable("s", "Derivative time", minimum=0.0, tunable=True)] = 0.1
+    Tt: Annotated[float, Variable("s", "Tracking time", minimum=POSITIVE, tunable=True)] = 0.5
+    N: Annotated[float, Variable("1", "Largest gain of the derivative", 1.0, tunable=True)] = 10.0
+    b: Annotated[float, Variable("1", "Weight of the set point", 0.0, 1.0, tunable=True)] = 1.0
+    u_min: Annotated[float, Variable("1", "Lower limit of the output", tunable=True)] = -5.0
+    u_max: Annotated[float, Variable("1", "Upper limit of the output", tunable=True)] = 5.0
+
+
+class Inputs(NamedTuple):
+    """What is wanted, and what is measured."""
+
+    r: Annotated[float, Variable("1", "Set point")] = 1.0
+    y: Annotated[float, Variable("1", "Measured value")] = 0.0
+
+
+class State(NamedTuple):
+    """Its memory."""
+
+    integral: Annotated[float, Variable("1", "Integral part")]
+    derivative: Annotated[float, Variable("1", "Derivative part")]
+    y: Annotated[float, Variable("1", "Last measured value")]
+
+
+class Outputs(NamedTuple):
+    """What it tells the actuator."""
+
+    u: Annotated[float, Variable("1", "Output to the actuator")]
+    integral: Annotated[float, Variable("1", "Integral part")]
+    derivative: Annotated[float, Variable("1", "Derivative part")]
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse limits that leave nothing between them."""
+    if not parameters.u_min < parameters.u_max:
+        raise Refusal(f"u_min = {parameters.u_min:g} must be below u_max = {parameters.u_max:g}")
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    v = parameters.K * (parameters.b * inputs.r - inputs.y)
+    u = min(max(v, parameters.u_min), parameters.u_max)
+    return State(0.0, 0.0, inputs.y), Outputs(u, 0.0, 0.0)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float
+) -> tuple[State, Outputs]:
+    """State and outputs after a sample, which is taken every h seconds."""
+    K, Td, N = parameters.K, parameters.Td, parameters.N
+    change = inputs.y - state.y
+    derivative = (Td * state.derivative - K * Td * N * change) / (Td + N * h)
+    v = K * (parameters.b * inputs.r - inputs.y) + state.integral + derivative
+    u = min(max(v, parameters.u_min), parameters.u_max)
+    rate = K / parameters.Ti * (inputs.r - inputs.y) + (u - v) / parameters.Tt
+    integral = state.integral + h * rate
+    return State(integral, derivative, inputs.y), Outputs(u, integral, derivative)

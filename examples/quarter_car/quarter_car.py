@@ -1,0 +1,91 @@
+"""A quarter of a car: a body on a spring and a damper, on a wheel with an elastic tyre.
+
+    m_body   dv1/dt = -k (z1 - z2) - d (v1 - v2)
+    m_wheel  dv2/dt =  k (z1 - z2) + d (v1 - v2) - k_tyre (z2 - road)
+
+All heights are measured from the position at rest. This is the usual model for a first choice of a
+suspension; see R. Rajamani, Vehicle Dynamics and Control, chapter 10. A softer damper is better for
+the comfort, a stiffer one for the grip.
+
+The equations are linear, dx/dt = A x + b road, and stepped by the trapezoidal rule
+
+    (I - h/2 A) x[k+1] = (I + h/2 A) x[k] + h b road
+
+A linear system is solved in each step. The rule is stable for steps of any length, although the
+wheel moves much faster than the body.
+
+With the default values the car has just reached a kerb of 5 cm. Look at `body` and `wheel`, at
+`acceleration` for the comfort, and at `tyre_force` for the grip.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector, solve
+from fmus.ports.variable import POSITIVE, Variable
+
+IDENTITY = Matrix(
+    ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
+)
+
+
+class Parameters(NamedTuple):
+    """Masses, springs and the damper."""
+
+    m_body: Annotated[float, Variable("kg", "Mass of the body", POSITIVE)] = 300.0
+    m_wheel: Annotated[float, Variable("kg", "Mass of the wheel", POSITIVE)] = 40.0
+    k: Annotated[float, Variable("N/m", "Stiffness of the spring", 0.0, tunable=True)] = 18000.0
+    d: Annotated[float, Variable("kg/s", "Coefficient of the damper", 0.0, tunable=True)] = 1200.0
+    k_tyre: Annotated[float, Variable("N/m", "Stiffness of the tyre", 0.0)] = 180000.0
+
+
+class Inputs(NamedTuple):
+    """What it drives over."""
+
+    road: Annotated[float, Variable("m", "Height of the road")] = 0.05
+
+
+class State(NamedTuple):
+    """Heights and velocities."""
+
+    x: Annotated[Vector, 4, Variable("1", "Body, its velocity, wheel, its velocity")]
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    body: Annotated[float, Variable("m", "Height of the body", feedthrough=())]
+    wheel: Annotated[float, Variable("m", "Height of the wheel", feedthrough=())]
+    acceleration: Annotated[float, Variable("m/s2", "Acceleration of the body", feedthrough=())]
+    tyre_force: Annotated[float, Variable("N", "Force of the tyre, beyond the weight")]
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
+    """State and outputs at the start: it rests at height 0."""
+    return _seen(parameters, inputs, Vector((0.0, 0.0, 0.0, 0.0)))
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
+) -> tuple[State, Outputs]:
+    """State and outputs after n steps of h seconds with held inputs."""
+    A = _dynamics(parameters)
+    push = Vector((0.0, 0.0, 0.0, h * parameters.k_tyre / parameters.m_wheel * inputs.road))
+    x = state.x
+    for _ in range(n):
+        x = solve(IDENTITY - h / 2 * A, x + h / 2 * (A @ x) + push)
+    return _seen(parameters, inputs, x)
+
+
+def _dynamics(parameters: Parameters) -> Annotated[Matrix, 4, 4]:
+    k, d = parameters.k, parameters.d
+    body = Vector((-k, -d, k, d)) / parameters.m_body
+    wheel = Vector((k, d, -k - parameters.k_tyre, -d)) / parameters.m_wheel
+    return Matrix(((0.0, 1.0, 0.0, 0.0), body, (0.0, 0.0, 0.0, 1.0), wheel))
+
+
+def _seen(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 4]) -> tuple[State, Outputs]:
+    acceleration = _dynamics(parameters)[1] @ x
+    force = parameters.k_tyre * (inputs.road - x[2])
+    return State(x), Outputs(x[0], x[2], acceleration, force)

@@ -1,0 +1,64 @@
+"""An actuator with a limited rate, and backlash between its motor and its output.
+
+    x follows u, by at most `rising` upwards and `falling` downwards in a second
+    y = min(max(y, x - width / 2), x + width / 2)
+
+The second line is the play operator, the usual model of backlash: the output rests while the motor
+crosses the gap, and is then pushed by one of its sides. See G. Tao and P. V. Kokotovic, Adaptive
+Control of Systems with Actuator and Sensor Nonlinearities, 1996.
+
+So `y` depends on where `x` came from, not only on where it is. Backlash makes a loop with an
+integral hunt: it circles around its set point.
+
+With the default values the motor runs to 1, and the output follows half the gap later. Connect a
+sine, and plot `y` over `u`: the loop is as wide as the gap.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from fmus.ports.variable import Variable
+
+
+class Parameters(NamedTuple):
+    """Its limits, and its gap."""
+
+    rising: Annotated[float, Variable("1/s", "Largest rate upwards", 0.0, tunable=True)] = 0.5
+    falling: Annotated[float, Variable("1/s", "Largest rate downwards", 0.0, tunable=True)] = 0.5
+    width: Annotated[float, Variable("1", "Width of the gap", 0.0, tunable=True)] = 0.1
+    x0: Annotated[float, Variable("1", "Position at the start")] = 0.0
+
+
+class Inputs(NamedTuple):
+    """Where it should go."""
+
+    u: Annotated[float, Variable("1", "Commanded position")] = 1.0
+
+
+class State(NamedTuple):
+    """Where it is."""
+
+    x: Annotated[float, Variable("1", "Position of the motor")]
+    y: Annotated[float, Variable("1", "Position of the output")]
+
+
+class Outputs(NamedTuple):
+    """Where it is seen."""
+
+    x: Annotated[float, Variable("1", "Position of the motor")]
+    y: Annotated[float, Variable("1", "Position of the output")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start, in the middle of the gap."""
+    return State(parameters.x0, parameters.x0), Outputs(parameters.x0, parameters.x0)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float
+) -> tuple[State, Outputs]:
+    """State and outputs after a step of h seconds with held inputs."""
+    x = state.x + min(max(inputs.u - state.x, -parameters.falling * h), parameters.rising * h)
+    y = min(max(state.y, x - parameters.width / 2), x + parameters.width / 2)
+    return State(x, y), Outputs(x, y)

@@ -1,0 +1,98 @@
+"""The traffic light of a pedestrian crossing, as a state machine.
+
+    GREEN -> AMBER -> RED -> RED_AMBER -> GREEN ...
+
+The light is green for the cars until a pedestrian presses the button, and for `green` seconds at
+least. It then runs through the other modes, each for the time that its parameter says. A button
+that is pressed at any time except red is remembered. Pedestrians may walk while the cars have red.
+
+A mode is a member of an `IntEnum`. As a parameter it is a text, such as RED; as an output it is its
+number. A mode changes at the end of a communication step, so a step should be short compared with
+the times. By how much it ends late counts for the next mode, so that no error adds up.
+
+With the default values the button is held, and the light repeats itself every 22 s. Look at `mode`,
+`walk` and `cycles`.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, NamedTuple
+
+from fmus.ports.variable import POSITIVE, Variable
+
+#: By how much a sum of steps may miss the end of a mode [s].
+ROUNDING = 1e-9
+
+
+class Mode(IntEnum):
+    """What the cars see."""
+
+    GREEN = 0
+    AMBER = 1
+    RED = 2
+    RED_AMBER = 3
+
+
+class Parameters(NamedTuple):
+    """How long each mode lasts, and which is the first."""
+
+    green: Annotated[float, Variable("s", "Least time of green", POSITIVE, tunable=True)] = 10.0
+    amber: Annotated[float, Variable("s", "Time of amber", POSITIVE, tunable=True)] = 3.0
+    red: Annotated[float, Variable("s", "Time of red", POSITIVE, tunable=True)] = 8.0
+    red_amber: Annotated[float, Variable("s", "Time of red and amber", POSITIVE)] = 1.0
+    first: Annotated[Mode, Variable("1", "Mode at the start")] = Mode.GREEN
+
+
+class Inputs(NamedTuple):
+    """What the pedestrians do."""
+
+    button: Annotated[bool, Variable("1", "The button is pressed")] = True
+
+
+class State(NamedTuple):
+    """What it remembers."""
+
+    mode: Annotated[Mode, Variable("1", "Mode")]
+    elapsed: Annotated[float, Variable("s", "Time in this mode")]
+    requested: Annotated[bool, Variable("1", "A pedestrian waits")]
+    cycles: Annotated[int, Variable("1", "Full cycles")]
+
+
+class Outputs(NamedTuple):
+    """What is seen."""
+
+    mode: Annotated[Mode, Variable("1", "Light for the cars")]
+    walk: Annotated[bool, Variable("1", "Pedestrians may walk")]
+    cycles: Annotated[int, Variable("1", "Full cycles")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    return _seen(State(parameters.first, 0.0, False, 0))
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float
+) -> tuple[State, Outputs]:
+    """State and outputs after a step of h seconds, in which one mode may end."""
+    mode, elapsed = state.mode, state.elapsed + h
+    requested = state.requested or (inputs.button and mode != Mode.RED)
+    after = state._replace(elapsed=elapsed, requested=requested)
+    if mode == Mode.GREEN and requested and elapsed >= parameters.green - ROUNDING:
+        # A request may come long after the least time of green.
+        began = max(parameters.green, state.elapsed)
+        after = after._replace(mode=Mode.AMBER, elapsed=elapsed - began)
+    elif mode == Mode.AMBER and elapsed >= parameters.amber - ROUNDING:
+        over = elapsed - parameters.amber
+        after = after._replace(mode=Mode.RED, elapsed=over, requested=False)
+    elif mode == Mode.RED and elapsed >= parameters.red - ROUNDING:
+        after = after._replace(mode=Mode.RED_AMBER, elapsed=elapsed - parameters.red)
+    elif mode == Mode.RED_AMBER and elapsed >= parameters.red_amber - ROUNDING:
+        over = elapsed - parameters.red_amber
+        after = after._replace(mode=Mode.GREEN, elapsed=over, cycles=state.cycles + 1)
+    return _seen(after)
+
+
+def _seen(state: State) -> tuple[State, Outputs]:
+    return state, Outputs(state.mode, state.mode == Mode.RED, state.cycles)

@@ -1,0 +1,72 @@
+"""A linear system in state-space form, with its matrices as parameters.
+
+    dx/dt = A x + B u
+    y     = C x + D u
+
+It has three states, three inputs and three outputs; a smaller system leaves rows and columns at
+zero. The elements of a matrix are ports of their own: A[1,2] is in the first row and the second
+column. The matrices are tunable, so the system may change during a run. It is stepped by the
+explicit Euler rule.
+
+This is the model StateSpace of the Reference FMUs of the Modelica Association, with the same names
+and values, except that its sizes are fixed. With `h_max` = 0.001 s it gives their published result.
+
+With the default values all matrices are the identity: each state grows like exp(t). Look at `y`;
+then set A to (0, 1, 0), (-1, 0, 0), (0, 0, -1) for an oscillator beside a decay.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector
+from fmus.ports.variable import Variable
+
+IDENTITY = Matrix(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+class Parameters(NamedTuple):
+    """The system, and its start."""
+
+    A: Annotated[Matrix, 3, 3, Variable("1/s", "From states to rates", tunable=True)] = IDENTITY
+    B: Annotated[Matrix, 3, 3, Variable("1/s", "From inputs to rates", tunable=True)] = IDENTITY
+    C: Annotated[Matrix, 3, 3, Variable("1", "From states to outputs", tunable=True)] = IDENTITY
+    D: Annotated[Matrix, 3, 3, Variable("1", "From inputs to outputs", tunable=True)] = IDENTITY
+    x0: Annotated[Vector, 3, Variable("1", "State at the start")] = Vector((0.0, 0.0, 0.0))
+
+
+class Inputs(NamedTuple):
+    """What acts on it."""
+
+    u: Annotated[Vector, 3, Variable("1", "Inputs")] = Vector((1.0, 2.0, 3.0))
+
+
+class State(NamedTuple):
+    """What it remembers."""
+
+    x: Annotated[Vector, 3, Variable("1", "State")]
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    y: Annotated[Vector, 3, Variable("1", "Outputs")]
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    return _seen(parameters, inputs, parameters.x0)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
+) -> tuple[State, Outputs]:
+    """State and outputs after n steps of h seconds with held inputs."""
+    x = state.x
+    for _ in range(n):
+        x += h * (parameters.A @ x + parameters.B @ inputs.u)
+    return _seen(parameters, inputs, x)
+
+
+def _seen(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]) -> tuple[State, Outputs]:
+    return State(x), Outputs(parameters.C @ x + parameters.D @ inputs.u)

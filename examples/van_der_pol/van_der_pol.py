@@ -1,0 +1,59 @@
+"""The van der Pol oscillator, whose damping is negative for small deflections.
+
+    dx0/dt = x1
+    dx1/dt = mu (1 - x0^2) x1 - x0
+
+B. van der Pol described it in 1926, as an electrical circuit with a vacuum tube. Whatever its start
+is, except for the origin, it ends in the same limit cycle. For small `mu` this is nearly a sine of
+amplitude 2. For large `mu` it alternates between slow drifts and sudden jumps.
+
+This is the model VanDerPol of the Reference FMUs of the Modelica Association, with the same names
+and values. It is stepped by the explicit Euler rule, as theirs is. With steps of 0.01 s it gives
+their published result bit for bit.
+
+Plot `x1` over `x0` to see the cycle, and try `mu` = 5.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from fmus.ports.variable import Variable
+
+
+class Parameters(NamedTuple):
+    """The damping, and the start."""
+
+    mu: Annotated[float, Variable("1", "Strength of the damping", minimum=0.0, tunable=True)] = 1.0
+    x0_start: Annotated[float, Variable("1", "Deflection at the start")] = 2.0
+    x1_start: Annotated[float, Variable("1/s", "Rate of the deflection at the start")] = 0.0
+
+
+class State(NamedTuple):
+    """Its motion."""
+
+    x0: Annotated[float, Variable("1", "Deflection")]
+    x1: Annotated[float, Variable("1/s", "Rate of the deflection")]
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    x0: Annotated[float, Variable("1", "Deflection")]
+    x1: Annotated[float, Variable("1/s", "Rate of the deflection")]
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    x0, x1 = parameters.x0_start, parameters.x1_start
+    return State(x0, x1), Outputs(x0, x1)
+
+
+def advance(parameters: Parameters, state: State, h: float, n: int) -> tuple[State, Outputs]:
+    """State and outputs after n steps of h seconds."""
+    x0, x1 = state.x0, state.x1
+    for _ in range(n):
+        acceleration = parameters.mu * ((1 - x0 * x0) * x1) - x0
+        x0 += h * x1
+        x1 += h * acceleration
+    return State(x0, x1), Outputs(x0, x1)

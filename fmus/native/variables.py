@@ -1,0 +1,60 @@
+"""Which names a piece of a program gives a value, and which it uses."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+
+
+def stored_names(*nodes: ast.AST) -> list[str]:
+    """Names that are given a value, but not in functions and expressions of their own."""
+    found: list[str] = []
+    for node in nodes:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.FunctionDef):
+                found.append(child.name)
+            elif isinstance(child, ast.Name) and isinstance(child.ctx, ast.Store):
+                found.append(child.id)
+            elif not isinstance(child, (ast.GeneratorExp, ast.arguments)):
+                found += stored_names(child)
+    return found + [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+
+
+def loaded_names(*nodes: ast.AST) -> list[str]:
+    """Names that are used."""
+    parts = [part for node in nodes for part in ast.walk(node)]
+    names = [n.id for n in parts if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)]
+    return names + [n.target.id for n in parts if isinstance(n, ast.AugAssign)
+                    and isinstance(n.target, ast.Name)]  # fmt: skip
+
+
+def always_stored(node: ast.stmt) -> set[str] | None:
+    """Names that a statement gives a value on every way through it; None: none leads through."""
+    if isinstance(node, (ast.Return, ast.Raise, ast.Break, ast.Continue)):
+        return None
+    if isinstance(node, ast.If):
+        return both(_all_stored(node.body), _all_stored(node.orelse))
+    if isinstance(node, (ast.While, ast.For)):
+        return set()
+    return set(stored_names(node))
+
+
+def _all_stored(statements: Iterable[ast.stmt]) -> set[str] | None:
+    found: set[str] = set()
+    for statement in statements:
+        stored = always_stored(statement)
+        if stored is None:
+            return None
+        found |= stored
+    return found
+
+
+def both(one: set[str] | None, other: set[str] | None) -> set[str] | None:
+    """What is in both; None stands for everything."""
+    if one is None or other is None:
+        return one if other is None else other
+    return one & other
+
+
+def names_in(node: ast.expr) -> set[str]:
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}

@@ -1,0 +1,167 @@
+"""A component of the user's own: where it is, what its FMU is made from, and its mistakes in words.
+
+It is a script with the functions `begin` and `advance`, a folder with such a script of its name,
+or a folder with `ports.py` and `behaviour.py` as the components of the bundle have. Any other
+script holds a slave of PythonFMU.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import sys
+import traceback
+from collections.abc import Iterator
+from keyword import iskeyword
+from pathlib import Path
+
+from fmus.discovery import Source, name_of
+from fmus.ports.port import Misdeclared
+
+#: Functions that tell a component from a slave of PythonFMU.
+_FUNCTIONS = frozenset(("begin", "advance"))
+
+#: What makes a folder a component.
+_FILES = ("ports.py", "behaviour.py")
+
+
+def script_in(path: Path) -> Path:
+    """The script that a path means: itself, or the one in a folder that has its name.
+
+    Returns:
+        The folder, if it is a component by its `ports.py` and `behaviour.py`.
+
+    Raises:
+        ValueError: there is none.
+
+    """
+    if path.is_dir():
+        if all((path / name).is_file() for name in _FILES):
+            return path
+        script = path / f"{path.resolve().name}.py"
+        if not script.is_file():
+            raise ValueError(f"{path}: has neither {script.name} nor {' and '.join(_FILES)}")
+        return script
+    if not (path.is_file() and path.suffix == ".py"):
+        raise ValueError(f"{path}: no such Python file")
+    return path
+
+
+def is_component(path: Path) -> bool:
+    """Whether a script, or a folder, is a component, and not a slave of PythonFMU.
+
+    One that is no Python is taken for a component: a mistake in it is told in the same way.
+    """
+    if path.is_dir():
+        return True
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (SyntaxError, ValueError):
+        return True
+    names = {name for node in tree.body for name in _defined(node)}
+    return not names.isdisjoint(_FUNCTIONS)
+
+
+def _defined(node: ast.stmt) -> Iterator[str]:
+    if isinstance(node, ast.FunctionDef):
+        yield node.name
+    elif isinstance(node, ast.ImportFrom):
+        yield from (alias.asname or alias.name for alias in node.names)
+
+
+def source_of_script(path: Path) -> Source:
+    """What the FMU of a component is made from; its modules can be imported from now on.
+
+    Args:
+        path: as :func:`script_in` gives it.
+
+    Raises:
+        ValueError: its name cannot be that of a module.
+
+    """
+    place = path.resolve()
+    stem, root = place.stem, place.parent
+    if not (stem.isascii() and stem.isidentifier() and stem[0].isalpha()) or iskeyword(stem):
+        raise ValueError(
+            f"{path}: {stem} is not a name for a component; use letters, digits and underscores, "
+            "a letter first"
+        )
+    known = sys.modules.get(stem)
+    is_other = known is not None and not _is_of(known, place)
+    if stem in sys.stdlib_module_names or is_other:
+        raise ValueError(f"{path}: {stem} is already a module of Python; choose another name")
+    if str(root) not in sys.path:
+        sys.path.insert(0, str(root))
+    if place.is_dir():
+        modules = tuple(f"{stem}.{name.removesuffix('.py')}" for name in _FILES)
+        return Source(name_of(stem), modules, place, root)
+    return Source(name_of(stem), (stem,), root, root)
+
+
+def _is_of(module: object, place: Path) -> bool:
+    """Whether a module, or one below it, is that of a place."""
+    file, folders = getattr(module, "__file__", None), getattr(module, "__path__", ())
+    return str(place) in map(str, (file, *folders))
+
+
+# Mistakes
+
+
+def told(error: BaseException, path: Path) -> str:
+    """What an error in a component says, in one line that begins with the file and the line.
+
+    Args:
+        error: of an import, a declaration, a translation or a compiler.
+        path: the script as the user has named it.
+
+    """
+    text, frames, root = str(error), _frames(error, path), path.resolve().parent
+    is_ours = isinstance(error, (OSError, TypeError, ValueError)) or _is_our_own(error)
+    place, said = str(path), text if is_ours else f"{type(error).__name__}: {text}"
+    if isinstance(error, Misdeclared):
+        place += _line_of(error.place, path)
+    elif isinstance(error, SyntaxError):
+        place, said = f"{shown(error.filename or '', path)}:{error.lineno}", error.msg
+    elif frames and not _is_our_own(error):
+        place, said = frames[-1], f"{type(error).__name__}: {text}"
+    elif text.startswith((f"{path}:", f"{root}{os.sep}")):
+        # It says where it is.
+        return " ".join(text.replace(str(root), str(path.parent)).split())
+    return " ".join(f"{place}: {said}".split())
+
+
+def _is_our_own(error: BaseException) -> bool:
+    return type(error).__module__.partition(".")[0] == "fmus"
+
+
+def shown(file: str, path: Path) -> str:
+    """A file beside a script, or the script, as the user would name it; others as they are."""
+    root = path.resolve().parent
+    file_is_in = Path(file).is_relative_to(root)
+    return str(path.parent / Path(file).relative_to(root)) if file_is_in else file
+
+
+def _frames(error: BaseException, path: Path) -> list[str]:
+    """Where an error passed through the user's files, the innermost last."""
+    root = path.resolve().parent
+    return [
+        f"{shown(frame.filename, path)}:{frame.lineno}"
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).is_relative_to(root)
+    ]
+
+
+def _line_of(place: tuple[str, ...], path: Path) -> str:
+    """Where a class or a function of a script is, or a field of it; empty: not in it."""
+    if not (place and path.is_file()):
+        return ""
+    for node in ast.parse(path.read_bytes()).body:
+        if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name != place[0]:
+            continue
+        fields = {
+            part.target.id: part.lineno
+            for part in node.body
+            if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
+        }
+        return f":{fields.get(place[-1], node.lineno)}"
+    return ""

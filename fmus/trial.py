@@ -1,0 +1,151 @@
+"""Run a component as plain Python, for its tests and for a debugger.
+
+The component runs in the class that its FMU of the Python kind holds, with the same checks, so its
+numbers are those of the FMU:
+
+    import pid
+    from fmus.trial import run
+
+    result = run(pid, {"k_p": 2.0}, lambda t: {"measured": 0.1 * t}, stop_time=10.0, step=0.1)
+    assert result["command"][-1] < 1.0
+
+Breakpoints in its file work, and what it raises goes on to the caller.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from enum import IntEnum
+from math import isfinite
+from types import ModuleType
+from typing import Any, Union
+
+from fmus.discovery import name_of
+from fmus.ports.port import Port, Refusal
+from fmus.ports.quantities import group_name
+from fmus.python.callbacks import ANSWER
+from fmus.python.slave import slave_of
+
+#: Inputs by the names of their ports, or a function of the time that gives them.
+Inputs = Union[Mapping[str, Any], Callable[[float], Mapping[str, Any]]]
+
+
+def run(
+    module: ModuleType,
+    parameters: Mapping[str, Any] | None = None,
+    inputs: Inputs | None = None,
+    *,
+    stop_time: float,
+    step: float,
+    start_time: float = 0.0,
+) -> dict[str, list[Any]]:
+    """Run a component on its own.
+
+    Args:
+        module: of the component.
+        parameters: by the names of their ports; others have their default values.
+        inputs: for each step, at its beginning; those that are not named keep their values.
+        stop_time: end of the run [s].
+        step: length of a communication step [s].
+        start_time: begin of the run [s].
+
+    Returns:
+        The time, and each output by the name of its port: values at the start and after each step.
+
+    Raises:
+        ValueError: there is no such port, or the times make no run.
+        Refusal: the component does not take a value or a step; the text says why.
+        Exception: whatever the component raises.
+
+    """
+    if not (step > 0.0 and isfinite(step) and stop_time >= start_time):
+        raise ValueError(f"no run from {start_time:g} s to {stop_time:g} s by steps of {step:g} s")
+    one = _Trial(module, start_time)
+    given = inputs if callable(inputs) else lambda t: inputs or {}
+    one.set("parameter", parameters or {})
+    one.set("input", given(start_time))
+    one.begin()
+    outputs = [port for port in one.ports.values() if port.causality == "output"]
+    result: dict[str, list[Any]] = {"time": [], **{port.name: [] for port in outputs}}
+    count = round((stop_time - start_time) / step)
+    for k in range(count + 1):
+        t = start_time + k * step
+        result["time"].append(t)
+        for port in outputs:
+            result[port.name].append(one.get(port))
+        if k < count:
+            one.set("input", given(t))
+            one.advance(t, step)
+    return result
+
+
+class _Trial:
+    """One instance, whose refusals are raised."""
+
+    def __init__(self, module: ModuleType, start_time: float) -> None:
+        name = name_of(module.__name__.rpartition(".")[2])
+        self._slave: Any = slave_of(name, module)(instance_name=name)
+        self._slave.setup_experiment(start_time)
+        self.ports = {port.name: port for port in self._slave._store.ports}
+        self._references = {name: reference for reference, name in enumerate(self.ports)}
+        self._start_time = start_time
+
+    def set(self, causality: str, values: Mapping[str, Any]) -> None:
+        """Set ports of a causality, one by one or all of a vector."""
+        known = [port for port in self.ports.values() if port.causality == causality]
+        for name, value in values.items():
+            ports = [port for port in known if name in (port.name, group_name(port.name))]
+            if not ports:
+                names = ", ".join(port.name for port in known) or "none"
+                raise ValueError(f"no {causality} {name!r}; there are: {names}")
+            given = [value] if ports[0].name == name else _flat(value)
+            if len(given) != len(ports):
+                raise ValueError(f"{name}: {len(given)} values for {len(ports)} ports")
+            for port, one in zip(ports, given):
+                put = getattr(self._slave, f"set_{port.type.lower()}")
+                put([self._references[port.name]], [_meant(port, one)])
+                self._refuse()
+
+    def get(self, port: Port) -> Any:
+        """The value of an output."""
+        read = getattr(self._slave, f"get_{port.type.lower()}")
+        [value] = read([self._references[port.name]])
+        return value
+
+    def begin(self) -> None:
+        """Enter the run."""
+        slave = self._slave
+        slave.enter_initialization_mode()
+        slave.exit_initialization_mode()
+        if slave._untold:
+            # Once more, past what turns an exception into a message.
+            slave._meaning(slave._store.parameters)
+            slave.begin(slave._unpack(slave._store.inputs), self._start_time)
+        self._refuse()
+
+    def advance(self, t: float, h: float) -> None:
+        """Take a step."""
+        slave = self._slave
+        if not slave.do_step(t, h):
+            n = slave._internal_steps(t, h)
+            slave.advance(slave._state, slave._unpack(slave._store.inputs), t, h / n, n)
+            self._refuse()
+
+    def _refuse(self) -> None:
+        """Raise what the component has logged, if it has refused something."""
+        said = [entry.msg for entry in self._slave.log_queue if entry.category != ANSWER]
+        if said and (self._slave._store.fault or self._slave._untold):
+            raise Refusal(said[-1].replace("%%", "%"))
+        self._slave.log_queue.clear()
+
+
+def _meant(port: Port, value: Any) -> Any:
+    """A value of the type that a port takes."""
+    if port.type == "Real" and not isinstance(value, str):
+        return float(value)
+    return value.name if isinstance(value, IntEnum) and port.type == "String" else value
+
+
+def _flat(value: Any) -> list[Any]:
+    """The numbers of a vector or a matrix, row by row."""
+    return [x for part in value for x in _flat(part)] if isinstance(value, tuple) else [value]

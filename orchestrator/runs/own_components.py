@@ -1,0 +1,206 @@
+"""Components of the user's own: files to begin with, and their FMUs.
+
+`auv-fmu new` writes a folder from the templates, `auv-fmu build` builds what is in it.
+"""
+
+from __future__ import annotations
+
+import keyword
+import re
+import shutil
+import time
+from collections.abc import Callable, Iterator, Mapping
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from fmus.discovery import name_of
+from fmus.kinds import FMI_VERSIONS, PYTHON
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.bundle import run_fmus
+from orchestrator.runs.folder import replace_files
+
+_TEMPLATES = Path(__file__).with_name("templates")
+
+#: What a controller for the closed loop can stand on: plain PythonFMU, or the base that the
+#: bundle's components have.
+CONTROLLER_BASES = ("plain", "hardened")
+
+#: What a component can be like at first.
+LIKENESSES = ("controller", "plant", "filter", "empty")
+
+#: Names in the templates of a controller that give way to the user's own.
+_CLASS, _MODULE = "OwnController", "own_controller"
+
+#: The same in those of a component; with what its README changes and looks at, by its likeness.
+_COMPONENT, _FILE = "OwnComponent", "own_component"
+_EXAMPLES = {
+    "controller": ("K=4", "command"),
+    "plant": ("a=0.002", "level"),
+    "filter": ("f=0.5", "y"),
+    "empty": ("x0=1", "x"),
+}
+_SETTING, _OUTPUT = "own_setting", "own_output"
+
+#: How often files are looked at [s].
+_INTERVAL = 0.2
+
+
+def new_controller(
+    name: str, folder: Path | None = None, base: str = CONTROLLER_BASES[0]
+) -> list[Path]:
+    """Make a folder with a controller that runs in the closed loop.
+
+    Args:
+        name: of the controller, `MyLaw` or `my_law`.
+        folder: made if it does not exist; None: one with the name, in the current folder.
+        base: one of :data:`CONTROLLER_BASES`.
+
+    Returns:
+        The script, the scenario, the README and the FMU.
+
+    Raises:
+        InputError: the name is not usable, the folder is not empty or cannot be written.
+
+    """
+    module, class_name = _names(name, "controller")
+    contents = {
+        f"{module}.py": f"controller/{base}.py.txt",
+        f"{module}.toml": f"controller/{_MODULE}.toml",
+        "README.md": "controller/README.md",
+    }
+    files = _write(Path(name), folder, contents, {_CLASS: class_name, _MODULE: module})
+    return [*files, build_own(files[0])]
+
+
+def new_component(name: str, folder: Path | None = None, like: str = LIKENESSES[0]) -> list[Path]:
+    """Make a folder with a component, whose file is both kinds of FMU.
+
+    Args:
+        name: of the component, `WaterTank` or `water_tank`.
+        folder: made if it does not exist; None: one with the name, in the current folder.
+        like: one of :data:`LIKENESSES`.
+
+    Returns:
+        The component, its tests, the scenario and the README.
+
+    Raises:
+        InputError: the name is not usable, the folder is not empty or cannot be written.
+
+    """
+    module, _ = _names(name, "component")
+    contents = {
+        f"{module}.py": f"component/{like}.py.txt",
+        f"test_{module}.py": f"component/test_{like}.py.txt",
+        f"{module}.toml": f"component/{like}.toml",
+        "README.md": "component/README.md",
+    }
+    setting, output = _EXAMPLES[like]
+    names = {_COMPONENT: name_of(module), _FILE: module, _SETTING: setting, _OUTPUT: output}
+    return _write(Path(name), folder, contents, names)
+
+
+def _write(
+    named: Path, folder: Path | None, contents: Mapping[str, str], names: Mapping[str, str]
+) -> list[Path]:
+    """Write files from templates into a new folder, with other names in them."""
+    folder = named if folder is None else folder
+    if folder.is_dir() and any(folder.iterdir()):
+        raise InputError(f"{folder}: is not empty; choose a new or empty folder")
+    with replace_files(folder, contents) as unfinished:
+        for target, template in contents.items():
+            text = (_TEMPLATES / template).read_text(encoding="utf-8")
+            for name, own in names.items():
+                text = text.replace(name, own)
+            (unfinished / target).write_text(text, encoding="utf-8")
+    return [folder / target for target in contents]
+
+
+def _names(name: str, what: str) -> tuple[str, str]:
+    """Names of the module and of the class.
+
+    Raises:
+        InputError: Python would not take them, or has such a module already.
+
+    """
+    if not (name.isascii() and name.isidentifier() and name[0].isalpha()):
+        raise InputError(
+            f"{name!r}: not a name for a {what}; use letters, digits and underscores, a "
+            "letter first"
+        )
+    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    words = [word for word in module.split("_") if word]
+    class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
+    if keyword.iskeyword(module) or keyword.iskeyword(class_name) or find_spec(module):
+        raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
+    return module, class_name
+
+
+def build_own(
+    script: Path,
+    folder: Path | None = None,
+    loader: str | None = None,
+    *,
+    kind: str = PYTHON,
+    fmi: str = FMI_VERSIONS[0],
+    platforms: str | None = None,
+    force: bool = False,
+    hear: Callable[[str], None] = lambda line: None,
+) -> Path:
+    """Build the FMU of a user's component.
+
+    Args:
+        script: a component in one Python file, a script with a slave of PythonFMU, or a folder
+            with one of them.
+        folder: of the FMU, which gets the name of the component; None: the script's own.
+        loader: of the Python kind, `native` or `plain`; None: native where it can be compiled.
+        kind: one of :data:`fmus.kinds.KINDS`.
+        fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
+        platforms: of the native kind, with commas between them; None: this machine.
+        force: move aside a file of the user's that has the name of the FMU.
+        hear: called with a line when a library is made.
+
+    Raises:
+        InputError: the script is missing or fails, or the folder cannot be written.
+
+    """
+    options = [str(script), "--kind", kind, "--fmi", fmi]
+    options += ["--loader", loader] if loader is not None else []
+    options += ["--platforms", platforms] if platforms is not None else []
+    with TemporaryDirectory(dir=process_folder()) as temporary:
+        run_fmus("build", Path(temporary), *options, hear=hear)
+        [built] = Path(temporary).glob("*.fmu")
+        own = script if script.is_dir() else script.parent
+        place = own if folder is None else folder
+        with replace_files(place, [built.name], force=force) as unfinished:
+            shutil.copyfile(built, unfinished / built.name)
+    return place / built.name
+
+
+def changes(script: Path) -> Iterator[None]:
+    """Yield at once, and then each time that a script, or a module beside it, has changed."""
+    seen = None
+    while True:
+        now = _versions(script)
+        if now == seen:
+            time.sleep(_INTERVAL)
+            continue
+        # An editor may write in several steps.
+        time.sleep(0.0 if seen is None else _INTERVAL)
+        if seen is None or _versions(script) == now:
+            seen = now
+            yield
+
+
+def _versions(script: Path) -> dict[Path, tuple[int, int]]:
+    """The modules beside a script, and in folders beside it, as they are now."""
+    folder = script if script.is_dir() else script.parent
+    found = {}
+    for path in (*folder.glob("*.py"), *folder.glob("*/*.py")):
+        try:
+            status = path.stat()
+        except OSError:
+            continue  # it has just been removed
+        found[path] = (status.st_mtime_ns, status.st_size)
+    return found

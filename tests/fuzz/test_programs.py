@@ -1,0 +1,58 @@
+"""Random programs of the language in CI: few of what `python -m fuzz.programs` tries."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from fmus.compilers import machines_compiler
+from fuzz.programs import BATCH, Program, same, tried
+from support.hosts import GCC
+from support.language import TOO_LARGE, Answer
+
+#: Seeds of CI: those of the night come after them.
+FEW, MORE = range(40), range(1000, 1100)
+
+needs_compiler = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+
+
+@needs_compiler
+def test_programs_do_the_same_in_both_languages():
+    assert list(tried(FEW, (str(machines_compiler()), "-O0"))) == []
+
+
+@needs_compiler
+@pytest.mark.slow
+@pytest.mark.parametrize("start", MORE[::BATCH])
+def test_more_programs_do_the_same_in_both_languages(start: int):
+    assert list(tried(range(start, start + BATCH), (str(machines_compiler()), "-O2"))) == []
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(GCC is None, reason="gcc is not installed")
+def test_sanitizers_find_nothing_in_them():
+    command = [
+        sys.executable,
+        "-m",
+        "fuzz.programs",
+        "--sanitize",
+        "--seed",
+        "2000",
+        "--runs",
+        "100",
+    ]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
+    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert process.stdout == "40 programs, 0 of them differ\n", process.stderr
+
+
+def test_a_seed_is_a_program_and_one_that_differs_would_be_seen():
+    assert Program("it", 7).text() == Program("it", 7).text() != Program("it", 8).text()
+    assert same(Answer((1.0, -0.0)), Answer((1.0, -0.0)))
+    assert not same(Answer((0.0,)), Answer((-0.0,)))
+    assert not same(Answer((1.0,)), Answer(error="ValueError: math domain error"))
+    assert same(Answer((2.0**31,)), Answer(error=TOO_LARGE))
