@@ -462,7 +462,7 @@ def test_size_is_that_of_vectors_and_matrices_too_and_of_no_integer():
 
 @pytest.mark.parametrize("n", [2**31, -(2**31) - 1, 10**400])
 def test_integers_of_more_than_32_bits_have_no_size(n):
-    with pytest.raises(OverflowError, match="^an integer exceeds 32 bits$"):
+    with pytest.raises(OverflowError, match="an integer exceeds 32 bits"):
         measuring(Typed)(TYPED._replace(n=n))
 
 
