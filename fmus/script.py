@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from keyword import iskeyword
 from pathlib import Path
 
-from fmus.discovery import Source, name_of
+from fmus.discovery import Source, lies_in, name_of
 from fmus.ports.port import Misdeclared
 
 #: Functions that tell a component from a slave of PythonFMU.
@@ -126,7 +126,8 @@ def told(error: BaseException, path: Path) -> str:
         place, said = frames[-1], f"{type(error).__name__}: {text}"
     elif text.startswith((f"{path}:", f"{root}{os.sep}")):
         # It says where it is.
-        return " ".join(text.replace(str(root), str(path.parent)).split())
+        beside = str(path.parent / "x")[:-1]
+        return " ".join(text.replace(f"{root}{os.sep}", beside).split())
     return " ".join(f"{place}: {said}".split())
 
 
@@ -145,9 +146,10 @@ def _frames(error: BaseException, path: Path) -> list[str]:
     """Where an error passed through the user's files, the innermost last."""
     root = path.resolve().parent
     return [
-        f"{shown(frame.filename, path)}:{frame.lineno}"
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(root)
+        f"{shown(file, path)}:{line}"
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        for file in [frame.f_code.co_filename]
+        if lies_in(root, Path(file), str(frame.f_globals.get("__name__")))
     ]
 
 

@@ -222,9 +222,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     for name in ("begin", "advance"):
         if is_stateless and hints[name]["return"] is outputs:
             continue
-        found: list[Any] = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
-        returned[1] = returned[1] or (*found[1:], Nothing)[0]
-        if found != returned:
+        parts = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
+        returned[1] = returned[1] or (*parts[1:], Nothing)[0]
+        if parts != returned:
             words = ", ".join(map(_word, returned[1:]))
             raise Misdeclared(f"{where}.{name} does not return tuple[{words}]", name)
     return Behaviour(

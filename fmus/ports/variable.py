@@ -231,6 +231,7 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
     variability = "tunable" if said.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
+    minimum, maximum = bounds or (said.minimum, said.maximum)
     port = Port(
         name,
         causality,
@@ -239,7 +240,8 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
         ": ".join(filter(None, (said.description, part.label))),
         said.unit if kind == "Real" else None,
         start,
-        *(bounds or (said.minimum, said.maximum)),
+        minimum,
+        maximum,
         choices,
         tuple(said.feedthrough or ()),
     )
