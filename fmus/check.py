@@ -18,7 +18,8 @@ from fmus.discovery import lies_in
 from fmus.native.functions import function_in_c
 from fmus.native.language import foreign
 from fmus.native.program import Program, Untranslatable
-from fmus.native.translator import tables, translated
+from fmus.native.tables import tables
+from fmus.native.translator import translated
 from fmus.script import is_component, script_in, shown, source_of_script, told
 
 #: Where a line says that it is about.

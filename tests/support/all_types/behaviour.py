@@ -47,6 +47,7 @@ class Inputs(NamedTuple):
     v: Annotated[Vector, 3]
     A: Annotated[Matrix, 2, 2]
     pair: tuple[int, int]
+    want: Mode
 
 
 class Inner(NamedTuple):
@@ -156,6 +157,8 @@ def advance(
             number += parameters.step
     if inputs.k == 7:
         mode = Mode.COOL if mode == Mode.HEAT else Mode.HEAT
+    if inputs.want == Mode.COOL:
+        mode = inputs.want
     x += parameters.offset @ inputs.v / (100.0 + inputs.k)
     before = state.inner
     inner = before._replace(

@@ -33,7 +33,7 @@ _LINE = re.compile(r"behaviour\.py:\d+: ")
 
 MOST, LEAST = 2**31 - 1, -(2**31)
 
-INTEGERS = ("k", "pair[1]", "pair[2]")
+INTEGERS = ("k", "pair[1]", "pair[2]", "want")
 REALS = ("u", "v[1]", "v[2]", "v[3]", "A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]")
 
 
@@ -207,6 +207,7 @@ def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
     [
         ("Integer", {"k": -6}, Status.Discard, "k = -6: must be at least -5"),
         ("Integer", {"pair[1]": 5, "k": -9}, Status.Discard, "k = -9: must be at least -5"),
+        ("Integer", {"want": 1}, Status.Discard, "want = 1: use one of 0, 2, -7"),
         ("Integer", {"n": 1}, Status.Discard, "n is an output and cannot be set"),
         ("Boolean", {"on": 1}, Status.Discard, "on is an output and cannot be set"),
         ("Boolean", {"fault": 1}, Status.Discard, "fault is an output and cannot be set"),
@@ -338,7 +339,7 @@ def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeyp
 
 # Any calls
 
-numbers = st.sampled_from((0, 1, -1, 3, 7, -5, -6, MOST, LEAST, MOST - 3)) | st.integers(
+numbers = st.sampled_from((0, 1, -1, 3, 7, 2, -7, -5, -6, MOST, LEAST, MOST - 3)) | st.integers(
     LEAST, MOST
 )
 reals = st.floats(-1e3, 1e3) | st.sampled_from((0.0, -0.0, 1e7, 1e99, 1e300, nan, inf))
@@ -435,6 +436,7 @@ def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
         (("inputs", 8), -6, "k = -6: must be at least -5"),
         (("inputs", 8), 1.0, "k = 1.0: must be a Integer"),
         (("inputs", 9), 1, "go = 1: must be a Boolean"),
+        (("inputs", 12), 1, "want = 1: use one of 0, 2, -7"),
         (("outputs", 11), 2.0, "n = 2.0: must be a Integer"),
         (("outputs", 11), 2, "its outputs do not match its state"),
         (("outputs", 0), 0.25 + 1e-6, "its outputs do not match its state"),
@@ -463,8 +465,9 @@ _AFTER = 4 + 4 + 8 + 4 + 4 + 4 * 624
         (0, 4, "its outputs do not match its state"),
         (-4, 2, "it has missing or unknown parts"),
         (-4 - 4, 7, "flags[3]: must be a Boolean"),
-        (-4 - 8 * 4 - 11 * 8 - 3 * 4, 2, "go: must be a Boolean"),
-        (-4 - 8 * 4 - 11 * 8 - 4 * 4, -6, "k = -6: must be at least -5"),
+        (-4 - 8 * 4 - 11 * 8 - 4, 1, "want = 1: use one of 0, 2, -7"),
+        (-4 - 8 * 4 - 11 * 8 - 4 * 4, 2, "go: must be a Boolean"),
+        (-4 - 8 * 4 - 11 * 8 - 5 * 4, -6, "k = -6: must be at least -5"),
     ],
 )
 def test_words_of_another_type_are_refused_in_c(libraries, place, word, why):

@@ -174,6 +174,15 @@ def test_a_port_of_another_type_than_its_number_is_found_at_once(name, kind, why
         unpacking(Several, wrong, {})
 
 
+class Asked(NamedTuple):
+    kind: Kind
+
+
+def test_an_input_may_be_a_member_of_an_enumeration():
+    [made] = unpacking(Asked, [port("kind", "Integer")], {})([5])
+    assert made is Kind.B
+
+
 class Whole(NamedTuple):
     n: int
     kind: Kind
