@@ -21,8 +21,9 @@ from fmus.ports.port import Misdeclared
 #: Functions that tell a component from a slave of PythonFMU.
 _FUNCTIONS = frozenset(("begin", "advance"))
 
-#: What makes a folder a component.
-_FILES = ("ports.py", "behaviour.py")
+#: What makes a folder a component: a package, and its modules in it.
+_MODULES = ("ports", "behaviour")
+_FILES = ("__init__.py", *(f"{module}.py" for module in _MODULES))
 
 
 def script_in(path: Path) -> Path:
@@ -40,7 +41,7 @@ def script_in(path: Path) -> Path:
             return path
         script = path / f"{path.resolve().name}.py"
         if not script.is_file():
-            raise ValueError(f"{path}: has neither {script.name} nor {' and '.join(_FILES)}")
+            raise ValueError(f"{path}: has neither {script.name} nor all of {', '.join(_FILES)}")
         return script
     if not (path.is_file() and path.suffix == ".py"):
         raise ValueError(f"{path}: no such Python file")
@@ -93,7 +94,7 @@ def source_of_script(path: Path) -> Source:
     if str(root) not in sys.path:
         sys.path.insert(0, str(root))
     if place.is_dir():
-        modules = tuple(f"{stem}.{name.removesuffix('.py')}" for name in _FILES)
+        modules = tuple(f"{stem}.{module}" for module in _MODULES)
         return Source(name_of(stem), modules, place, root)
     return Source(name_of(stem), (stem,), root, root)
 

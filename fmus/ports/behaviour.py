@@ -207,9 +207,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
-    for name, taken in hints.items():
-        known = (*HOOKS[name], *noisy, "return")
-        for argument in taken.keys() - set(known):
+    for name, found in hints.items():
+        known = (*HOOKS[name], *noisy)
+        for argument in found.keys() - {*known, "return"}:
             why = f"{argument}, which is not one of {', '.join(known)}"
             raise Misdeclared(f"{where}.{name} takes {why}", name)
     if "measured" in hooks and len(noisy) != 1:
