@@ -42,7 +42,7 @@ def test_the_run_may_begin_later(lag):
 
 
 VECTOR = (
-    ('u: Annotated[float, Variable("m", "Set point")] = 0.0', 'u: Annotated[tuple[float, float], Variable("m", "Set point")]'),
+    ('float, Variable("m", "Set point")] = 0.0', 'tuple[float, float], Variable("m", "Places")]'),
     ("inputs.u", "inputs.u[1]"),
 )  # fmt: skip
 

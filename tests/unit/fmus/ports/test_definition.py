@@ -42,10 +42,7 @@ def test_internal_steps_give_it_their_longest(defined):
 
 
 TAKES = ("begin(parameters: Parameters)", "begin(parameters: Parameters, inputs: Inputs)")
-AND_TIME = (
-    'inputs: Inputs) -> tuple[State, Outputs]:\n    """State and outputs at',
-    'inputs: Inputs, t: float) -> tuple[State, Outputs]:\n    """State and outputs at',
-)
+AND_TIME = ("inputs: Inputs) ->", "inputs: Inputs, t: float) ->")
 SAID = ('Variable("m", "Value")', 'Variable("m", "Value", feedthrough=())')
 
 
@@ -102,21 +99,71 @@ def advance(t: float, h: float) -> tuple[Nothing, Outputs]:
 @pytest.mark.parametrize(
     ("old", "new", "why", "place"),
     [
-        ("    u: Anno", "    x: Anno", "Outputs.x has a name that Inputs has already", ("Outputs", "x")),
-        ("    u: Anno", "    fault: Anno", "Inputs.fault has a name that every component has already", ("Inputs", "fault")),
-        ("    T: Anno", "    time: Anno", "Parameters.time has a name that every component has", ("Parameters", "time")),
-        ("    T: Anno", "    h_max: Anno", "Parameters.h_max has a name that every component has", ("Parameters", "h_max")),
-        ('"Value")', '"Value", feedthrough=("v",))', "Outputs.x depends on 'v'; there are u, time", ("Outputs", "x")),
+        (
+            "    u: Anno",
+            "    x: Anno",
+            "Outputs.x has a name that Inputs has already",
+            ("Outputs", "x"),
+        ),
+        (
+            "    u: Anno",
+            "    fault: Anno",
+            "Inputs.fault has a name that every component has already",
+            ("Inputs", "fault"),
+        ),
+        (
+            "    T: Anno",
+            "    time: Anno",
+            "Parameters.time has a name that every component has",
+            ("Parameters", "time"),
+        ),
+        (
+            "    T: Anno",
+            "    h_max: Anno",
+            "Parameters.h_max has a name that every component has",
+            ("Parameters", "h_max"),
+        ),
+        (
+            '"Value")',
+            '"Value", feedthrough=("v",))',
+            "Outputs.x depends on 'v'; there are u, time",
+            ("Outputs", "x"),
+        ),
         ("class Inputs", "class Ins(NamedTuple):\n    pass\n\n\nclass Inputs", None, None),
-        ("inputs: Inputs", "inputs: State", "inputs are of the type State; call it Inputs", ("advance",)),
-        ("state: State, inputs: Inputs", "state: State", "Inputs is there, but no hook takes inputs", ("Inputs",)),
-        ("-> tuple[State, Outputs]:\n    \"\"\"State and outputs after", "-> tuple[State, Inputs]:\n    \"\"\"State and outputs after", "own_lag.advance does not return tuple[State, Outputs]", ("advance",)),
+        (
+            "inputs: Inputs",
+            "inputs: State",
+            "inputs are of the type State; call it Inputs",
+            ("advance",),
+        ),
+        (
+            "state: State, inputs: Inputs",
+            "state: State",
+            "Inputs is there, but no hook takes inputs",
+            ("Inputs",),
+        ),
+        (
+            'Outputs]:\n    """State and outputs after',
+            'Inputs]:\n    """State and outputs after',
+            "own_lag.advance does not return tuple[State, Outputs]",
+            ("advance",),
+        ),
         ("class Outputs", "class Outs", "own_lag has no Outputs", ()),
         ("def begin", "def start", "own_lag has no begin", ()),
-        ("def check", "def test", "own_lag.test is not one of the hooks check, begin, derive", ("test",)),
-        ("h: float", "dt: float", "own_lag.advance takes dt, which is not one of parameters, sta", ("advance",)),
+        (
+            "def check",
+            "def test",
+            "own_lag.test is not one of the hooks check, begin, derive",
+            ("test",),
+        ),
+        (
+            "h: float",
+            "dt: float",
+            "own_lag.advance takes dt, which is not one of parameters, sta",
+            ("advance",),
+        ),
     ],
-)  # fmt: skip
+)
 def test_mistakes_are_named(defined, old, new, why, place):
     if why is None:
         defined((old, new))

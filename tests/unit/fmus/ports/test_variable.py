@@ -133,34 +133,90 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
 @pytest.mark.parametrize(
     ("causality", "field", "why"),
     [
-        ("input", float, 'has no unit and no description; write p: Annotated[float, Variable("m", "What it is")]'),
+        (
+            "input",
+            float,
+            'has no unit and no description; write p: Annotated[float, Variable("m", "Wh',
+        ),
         ("input", Vector, "has no unit and no description; write p: Annotated[Vector, 3, Variable"),
-        ("input", Annotated[Vector, METRES], "is a Vector without its size; write Annotated[Vector, 3, Variable(...)]"),
-        ("input", Annotated[Matrix, 2, METRES], "is a Matrix without its size; write Annotated[Matrix, 2, 3, Variable(...)]"),
+        (
+            "input",
+            Annotated[Vector, METRES],
+            "is a Vector without its size; write Annotated[Vector, 3, Variable(...)]",
+        ),
+        (
+            "input",
+            Annotated[Matrix, 2, METRES],
+            "is a Matrix without its size; write Annotated[Matrix, 2, 3, Variable(...)]",
+        ),
         ("input", Annotated[Vector, 0, METRES], "is a Vector without its size"),
-        ("input", Annotated[str, METRES], "has the type str; use float, int, bool, an IntEnum, a tuple of them, Vector, Matrix or a NamedTuple"),
+        (
+            "input",
+            Annotated[str, METRES],
+            "has the type str; use float, int, bool, an IntEnum, a tuple of them, Ve",
+        ),
         ("input", Annotated[list[float], METRES], "has the type list[float]; use float"),
-        ("input", Annotated[tuple[float, int], METRES], "has elements of several types; write a NamedTuple"),
+        (
+            "input",
+            Annotated[tuple[float, int], METRES],
+            "has elements of several types; write a NamedTuple",
+        ),
         ("input", Annotated[int, METRES], "is of the type int; only a float has a unit"),
-        ("input", Annotated[Vector, 3, Variable(members=("x", "y"))], "has 2 members for 3 numbers"),
+        (
+            "input",
+            Annotated[Vector, 3, Variable(members=("x", "y"))],
+            "has 2 members for 3 numbers",
+        ),
         ("input", Annotated[float, Variable(members=("x",))], "has 1 members for one numbers"),
-        ("input", Annotated[float, Variable(tunable=True)], "is no parameter, and tunable is for parameters"),
-        ("input", Annotated[float, Variable(feedthrough=())], "is no output, and feedthrough is for outputs"),
-        ("output", Annotated[float, Variable(feedthrough="u")], "has the feedthrough u; write a tuple of names"),
-        ("output", Annotated[float, Variable(minimum=0.0)], "is an output; minimum and maximum are for inputs and parameters"),
-        ("parameter", Annotated[float, METRES], "has no default value, which a parameter starts with"),
+        (
+            "input",
+            Annotated[float, Variable(tunable=True)],
+            "is no parameter, and tunable is for parameters",
+        ),
+        (
+            "input",
+            Annotated[float, Variable(feedthrough=())],
+            "is no output, and feedthrough is for outputs",
+        ),
+        (
+            "output",
+            Annotated[float, Variable(feedthrough="u")],
+            "has the feedthrough u; write a tuple of names",
+        ),
+        (
+            "output",
+            Annotated[float, Variable(minimum=0.0)],
+            "is an output; minimum and maximum are for inputs and parameters",
+        ),
+        (
+            "parameter",
+            Annotated[float, METRES],
+            "has no default value, which a parameter starts with",
+        ),
         ("input", (Annotated[float, METRES], "x"), "starts with p = 'x': must be a Real"),
         ("input", (Annotated[float, METRES], None), None),
         ("input", (Annotated[int, PLAIN], 1.5), "starts with p = 1.5: must be a Integer"),
         ("input", (Annotated[float, METRES], float("nan")), "starts with p = nan: must be finite"),
-        ("parameter", (Annotated[float, Variable(minimum=1.0)], 0.0), "starts with p = 0: must be at least 1"),
+        (
+            "parameter",
+            (Annotated[float, Variable(minimum=1.0)], 0.0),
+            "starts with p = 0: must be at least 1",
+        ),
         ("input", Annotated[float, Variable(minimum=1.0)], "starts with p = 0: must be at least 1"),
-        ("parameter", (Annotated[Vector, 2, METRES], Vector((1.0,))), "starts with (1.0,), which has not 2 elements"),
-        ("parameter", (Annotated[Vector, 2, METRES], 1.0), "starts with 1.0, which has not 2 elements"),
+        (
+            "parameter",
+            (Annotated[Vector, 2, METRES], Vector((1.0,))),
+            "starts with (1.0,), which has not 2 elements",
+        ),
+        (
+            "parameter",
+            (Annotated[Vector, 2, METRES], 1.0),
+            "starts with 1.0, which has not 2 elements",
+        ),
         ("parameter", (Annotated[Mode, PLAIN], 3), "starts with 3, which is no Mode"),
         ("parameter", (Gains, 3), "starts with 3, which is no Gains"),
     ],
-)  # fmt: skip
+)
 def test_mistakes_are_named(causality, field, why):
     if why is None:
         assert ports(causality, p=field)[0].start == 0.0
