@@ -266,5 +266,7 @@ def _meant(part: _Part, causality: str, place: tuple[str, ...]) -> tuple[str, An
         raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
     if causality == "parameter":
         return "String", start.name, {one.name: one for one in members}, None
-    bounds = (int(min(members)), int(max(members))) if causality == "input" else None
-    return "Integer", int(start), {}, bounds
+    if causality == "output":
+        return "Integer", int(start), {}, None
+    named = {one.name: int(one) for one in members}
+    return "Integer", int(start), named, (int(min(members)), int(max(members)))
