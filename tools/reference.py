@@ -3,7 +3,8 @@
 For each FMU, in the manner of the FMI cross-check: `NAME_in.csv` with inputs over time,
 `NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment, in the folder `reference` of
 its component. For the system: `reference/auv_ref.csv` and `auv_ref.opt`, from a Jacobi run, which
-is what most tools do.
+is what most tools do. For each example: the same in `examples/NAME/reference`, with experiments of
+100 steps that suit it.
 
 Beside them, what the FMU carries, as the draft FMI-LS-REF has it: `fmi-ls-manifest.xml`, which
 names the others; `experiments.exp`, in the draft MA-HS-Experiments; a parameter set for each group
@@ -17,6 +18,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
@@ -25,6 +28,8 @@ import numpy as np
 from fmpy.util import write_csv
 
 from fmus.discovery import REFERENCE, RELATED_MANIFEST, components
+from fmus.kinds import PYTHON
+from fmus.ports.port import FAULT
 from orchestrator.formats.ssp.writer import parameter_set_xml
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.files import CsvFile
@@ -32,12 +37,51 @@ from orchestrator.master.plan import make_plan
 from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.own_components import build_own
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.values import Value
 
-#: Length of the reference runs [s] and their step [s].
-STOP_TIME, STEP = 4.0, 0.02
+#: The components that are examples.
+EXAMPLES = Path(__file__).parents[1] / "examples"
+
+
+class Span(NamedTuple):
+    """How long a reference run is, and its step [s]."""
+
+    stop_time: float
+    step: float
+
+    @property
+    def times(self) -> np.ndarray:
+        """Of all communication points."""
+        return np.arange(round(self.stop_time / self.step) + 1) * self.step
+
+
+#: The reference runs of the bundle.
+SPAN = Span(4.0, 0.02)
+STOP_TIME, STEP = SPAN
+
+#: The reference runs of examples: those that 10 s do not suit.
+EXAMPLE_SPAN = Span(10.0, 0.1)
+_SPANS = {
+    "battery": Span(6000.0, 60.0),
+    "bouncing_ball": Span(3.0, 0.03),
+    "cart_pendulum": Span(5.0, 0.05),
+    "dc_motor": Span(2.0, 0.02),
+    "extended_kalman_filter": Span(50.0, 0.5),
+    "lag_with_delay": Span(20.0, 0.2),
+    "lqr": Span(5.0, 0.05),
+    "luenberger_observer": Span(2.0, 0.02),
+    "notch_filter": Span(5.0, 0.05),
+    "quarter_car": Span(2.0, 0.02),
+    "state_machine": Span(50.0, 0.5),
+    "state_space": Span(2.0, 0.02),
+    "thermostat": Span(6000.0, 60.0),
+    "van_der_pol": Span(20.0, 0.2),
+    "water_tank": Span(500.0, 5.0),
+    "waypoint_guidance": Span(100.0, 1.0),
+}
 
 #: Of the results that an FMU carries, one row in so many; and how close a tool comes: the libraries
 #: of mathematics of two machines may differ in the last place.
@@ -69,19 +113,31 @@ _STANDARD = {
 }
 
 
-def reference_inputs(component: Component) -> np.ndarray:
-    """Inputs without special values: a sine of its own for each, small enough for the gate."""
-    names = [variable.name for variable in component.having("input")]
-    time = np.arange(round(STOP_TIME / STEP) + 1) * STEP
-    table = np.zeros(len(time), dtype=[(name, np.float64) for name in ("time", *names)])
+def reference_inputs(component: Component, span: Span = SPAN) -> np.ndarray:
+    """Inputs without special values: each circles around its start with a frequency of its own.
+
+    A Real is a sine, small enough for the gate; a Boolean is true while that is not negative.
+    """
+    inputs = component.having("input")
+    time = span.times
+    kinds = ((one.name, np.int32 if one.type == "Boolean" else np.float64) for one in inputs)
+    table = np.zeros(len(time), dtype=[("time", np.float64), *kinds])
     table["time"] = time
-    for i, name in enumerate(names, start=1):
-        table[name] = 0.1 * np.sin((0.5 + 0.1 * i) * time)
+    for i, one in enumerate(inputs, start=1):
+        sine = np.sin((0.5 + 0.1 * i) * (STOP_TIME / span.stop_time * time))
+        if one.type == "Boolean":
+            table[one.name] = sine >= 0.0
+        else:
+            start = float(component.starts[one.name])
+            table[one.name] = start + 0.1 * (abs(start) or 1.0) * sine
     return table
 
 
 def reference_outputs(
-    component: Component, inputs: np.ndarray, values: Mapping[str, Value] | None = None
+    component: Component,
+    inputs: np.ndarray | None,
+    values: Mapping[str, Value] | None = None,
+    span: Span = SPAN,
 ) -> np.ndarray:
     """Outputs of an FMU that runs alone with these inputs, by fmpy.
 
@@ -89,23 +145,31 @@ def reference_outputs(
         component: the FMU.
         inputs: over time.
         values: of its parameters; None: its own.
+        span: of the run.
 
     """
-    names = [variable.name for variable in component.having("output") if variable.type == "Real"]
+    outputs = component.having("output")
     table: np.ndarray = fmpy.simulate_fmu(
         str(component.fmu),
-        stop_time=STOP_TIME,
-        step_size=STEP,
-        output_interval=STEP,
+        stop_time=span.stop_time,
+        step_size=span.step,
+        output_interval=span.step,
         start_values=dict(values or {}),
         input=inputs,
-        output=names,
+        output=[one.name for one in outputs if one.name != FAULT.name],
     )
-    return table
+    # fmpy reads only numbers.
+    kinds = [
+        (name, np.int32 if kind.kind == "b" else kind)
+        for name, (kind, *_) in (table.dtype.fields or {}).items()
+    ]
+    return table.astype(kinds)
 
 
 def parameter_sets(component: Component) -> Iterator[tuple[str, dict[str, Value]]]:
     """The parameter sets of an FMU that scenarios give it, by their names."""
+    if component.description.modelName not in components():
+        return
     for name, (scenarios, _) in SETS.items():
         values: dict[str, Value] = {}
         for scenario in scenarios:
@@ -147,28 +211,50 @@ def write_reference(dist: Path, root: Path) -> list[Path]:
     written[-1].parent.mkdir(exist_ok=True)
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
     simulate_to_end(make_plan(closed_loop(dist), jacobi), [CsvFile(written[-1])])
-    written.append(_write_options(written[-1].with_name("auv")))
+    written.append(_write_options(written[-1].with_name("auv"), SPAN))
     return written
 
 
-def write_component_reference(fmu: Path, folder: Path) -> list[Path]:
+def write_examples(root: Path) -> list[Path]:
+    """Write the reference results of the examples, and return the files written.
+
+    Args:
+        root: of the repository that they are for.
+
+    """
+    written = []
+    with TemporaryDirectory() as temporary:
+        for script in sorted(EXAMPLES.glob("*/*.py")):
+            # This kind can be built everywhere.
+            fmu = build_own(script, Path(temporary), kind=PYTHON)
+            folder = root / EXAMPLES.name / script.stem / REFERENCE
+            written += write_component_reference(fmu, folder, example_span(script.stem))
+    return written
+
+
+def example_span(name: str) -> Span:
+    """The reference run of an example, by the name of its folder."""
+    return _SPANS.get(name, EXAMPLE_SPAN)
+
+
+def write_component_reference(fmu: Path, folder: Path, span: Span = SPAN) -> list[Path]:
     """Write the reference results of one FMU, and return the files written."""
     folder.mkdir(parents=True, exist_ok=True)
     component = read_component(fmu.stem, fmu)
-    inputs = reference_inputs(component)
-    outputs = reference_outputs(component, inputs)
+    inputs = reference_inputs(component, span)
+    outputs = reference_outputs(component, inputs, span=span)
     written = []
     for suffix, table in (("in", inputs), ("ref", outputs)):
         if len(table.dtype.names or ()) > 1:
             written.append(folder / f"{fmu.stem}_{suffix}.csv")
             write_csv(written[-1], table)
-    written.append(_write_options(folder / fmu.stem))
+    written.append(_write_options(folder / fmu.stem, span))
     stimuli = written[0].name if component.having("input") else None
-    return [*written, *_write_related(component, folder, stimuli, outputs)]
+    return [*written, *_write_related(component, folder, stimuli, outputs, span)]
 
 
 def _write_related(
-    component: Component, folder: Path, stimuli: str | None, outputs: np.ndarray
+    component: Component, folder: Path, stimuli: str | None, outputs: np.ndarray, span: Span
 ) -> Iterator[Path]:
     """Write what the FMU carries, and say which files.
 
@@ -177,6 +263,7 @@ def _write_related(
         folder: to write into.
         stimuli: name of the table of inputs there; None: it has none.
         outputs: of the FMU with its own parameters.
+        span: of the runs.
 
     """
     about = f"Experiments of {component.name} alone"
@@ -187,12 +274,13 @@ def _write_related(
     _relate(manifest, "experiments.exp", "experiment/smoke-test", about)
     if stimuli is not None:
         _relate(manifest, stimuli, "other", "Inputs of the experiments over time")
-    inputs = reference_inputs(component)
+    inputs = reference_inputs(component, span)
     for experiment, values in (("default", {}), *parameter_sets(component)):
         element = SubElement(
             experiments, "Experiment", name=experiment,
             description=SETS[experiment][1] if values else "Parameters as they are in the FMU",
-            startTime="0.0", stopTime=str(STOP_TIME), stepSize=str(STEP), tolerance=str(TOLERANCE),
+            startTime="0.0", stopTime=str(span.stop_time), stepSize=str(span.step),
+            tolerance=str(TOLERANCE),
         )  # fmt: skip
         if values:
             path = folder / f"{experiment}.ssv"
@@ -200,7 +288,7 @@ def _write_related(
             yield path
             _relate(manifest, path.name, "parameter", SETS[experiment][1])
             SubElement(element, "Parameters", source=path.name)
-            outputs = reference_outputs(component, inputs, values)
+            outputs = reference_outputs(component, inputs, values, span)
         if stimuli is not None:
             SubElement(element, "Stimuli", source=stimuli)
         path = folder / f"{experiment}_out.csv"
@@ -224,11 +312,11 @@ def _write_xml(path: Path, root: Element) -> Path:
     return path
 
 
-def _write_options(stem: Path) -> Path:
+def _write_options(stem: Path, span: Span) -> Path:
     path = stem.with_name(f"{stem.name}_ref.opt")
     path.write_text(
-        f"StartTime,0.0\nStopTime,{STOP_TIME}\nStepSize,{STEP}\nRelTol,0.0\n"
-        f"OutputIntervalLength,{STEP}\n",
+        f"StartTime,0.0\nStopTime,{span.stop_time}\nStepSize,{span.step}\nRelTol,0.0\n"
+        f"OutputIntervalLength,{span.step}\n",
         encoding="utf-8",
     )
     return path
@@ -238,7 +326,8 @@ def main() -> None:
     """Write the reference results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parents[1])
-    for path in write_reference(current_fmus(), parser.parse_args().folder):
+    folder = parser.parse_args().folder
+    for path in (*write_reference(current_fmus(), folder), *write_examples(folder)):
         print(path)
 
 

@@ -6,8 +6,8 @@
 
 The voltage of the source is a table over the charge, between whose points it is interpolated. `R0`
 gives the jump at a change of current, the pairs a faster and a slower relaxation after it. See
-G. L. Plett, Battery Management Systems, volume 1, chapter 2. The table is typical of such a cell,
-and not measured on any.
+G. L. Plett, Battery Management Systems. The table is typical of such a cell, and not measured on
+any.
 
 The charge is counted exactly for a held current, and the pairs are solved exactly. A cell that is
 empty gives no current, and a full one cannot be charged: `i` is 0 then. The voltage depends on the

@@ -5,9 +5,8 @@
     d(angle)/dt = w
 
 With k in V.s/rad and N.m/A it is the same number: the electrical power k w i is the mechanical
-power. Such a motor is in every textbook of control; see Franklin, Powell and Emami-Naeini,
-Feedback Control of Dynamic Systems, section 2.3. The equations are stepped by the Runge-Kutta
-method of fourth order.
+power. Such a motor is in every textbook of control; see Franklin, Powell and Emami-Naeini, Feedback
+Control of Dynamic Systems. The equations are stepped by the Runge-Kutta method of fourth order.
 
 Without a load, `speed` settles at u k / (R b + k^2) within a few times J R / k^2, the mechanical
 time constant. The current is largest while the motor starts: up to u / R.

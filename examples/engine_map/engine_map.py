@@ -6,8 +6,8 @@ The map has a row for each throttle and a column for each speed. Between them th
 interpolated in both directions: `interpolate` in each row at the speed, then between the rows at
 the throttle. Outside the map the torque of its edge holds. A closed throttle brakes. This is how
 engines are modelled from measurements on a test bench; see L. Guzzella and C. H. Onder,
-Introduction to Modeling and Control of Internal Combustion Engine Systems, chapter 2. The numbers
-of this map are invented.
+Introduction to Modeling and Control of Internal Combustion Engine Systems. The numbers of this map
+are invented.
 
 A load above the torque slows the engine down to a standstill, which it does not leave before the
 torque is above the load.

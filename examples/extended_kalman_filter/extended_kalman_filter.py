@@ -7,8 +7,8 @@
 The radar is at the origin. The state is the target's position and velocity in the plane, and what
 is measured is g(x) = (sqrt(px^2 + py^2), atan2(py, px)). A filter for such a curved g takes its
 slope at the best estimate there is; see Bar-Shalom, Li and Kirubarajan, Estimation with
-Applications to Tracking and Navigation, section 10.3. The inverse of S is never computed: `solve`
-gives each row of the gain.
+Applications to Tracking and Navigation. The inverse of S is never computed: `solve` gives each row
+of the gain.
 
 The filter starts from a guess, and from how good that is. A target at the origin has no bearing:
 the step is refused. With the default values a target rests 1 km away, and the estimate goes there

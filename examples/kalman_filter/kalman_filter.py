@@ -7,7 +7,7 @@
 The state x is position and velocity. Between two measurements, h seconds apart, the acceleration is
 taken for white noise of the density `q`, and `r` is the standard deviation of a measurement. This
 is the usual model of a target that manoeuvres a little; see Bar-Shalom, Li and Kirubarajan,
-Estimation with Applications to Tracking and Navigation, section 6.2.
+Estimation with Applications to Tracking and Navigation.
 
 A larger `q` makes the filter faster, and its estimate less smooth. Only the ratio of `q` and the
 square of `r` decides about the gain.

@@ -11,8 +11,8 @@ exactly for the value that leaves the line.
 `seed` says where they start. The same seed gives the same noise in each run.
 
 Lag with dead time is the standard model of slow processes; see Åström and Hägglund, Advanced PID
-Control, chapter 2. With the default values a step from 20 to 80 degC arrives after 2 s, and `y` has
-passed 63 % of it after 5 s. Look at `x` and `y`.
+Control. With the default values a step from 20 to 80 degC arrives after 2 s, and `y` has passed
+63 % of it after 5 s. Look at `x` and `y`.
 """
 
 from __future__ import annotations

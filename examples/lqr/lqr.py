@@ -10,8 +10,8 @@ over all samples. The gain follows from the discrete algebraic Riccati equation
 
     K = (r + B'P B)^-1 B'P A,  P = Q + A'P (A - B K)
 
-which is iterated from P = Q, at the start. See Åström and Wittenmark, Computer-Controlled Systems,
-section 11.2. Step this component every `T` seconds, the period that the gain is made for.
+which is iterated from P = Q, at the start. See Åström and Wittenmark, Computer-Controlled Systems.
+Step this component every `T` seconds, the period that the gain is made for.
 
 A larger `r` makes the control slower and cheaper. Look at `K_p`, `K_v` and `rounds`, and
 connect `u` to a cart whose position and velocity come back as `p` and `v`.

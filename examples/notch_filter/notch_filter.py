@@ -3,7 +3,7 @@
     H(s) = (s^2 + w0^2) / (s^2 + w0/Q s + w0^2),  w0 = 2 pi f0
 
 The bilinear transformation, with its frequency scale corrected at `f0`, makes it a discrete filter;
-see Oppenheim and Schafer, Discrete-Time Signal Processing, chapter 7. With t = tan(w0 h / 2):
+see Oppenheim and Schafer, Discrete-Time Signal Processing. With t = tan(w0 h / 2):
 
     b0 = b2 = (1 + t^2) / n,  b1 = a1 = 2 (t^2 - 1) / n,  a2 = (1 - t/Q + t^2) / n
     n = 1 + t/Q + t^2

@@ -5,9 +5,9 @@
     dI/dt = K / Ti (r - y) + (u - v) / Tt        v: the value of u before it is limited
     Td / N dD/dt + D = -K Td dy/dt
 
-This is the form of Åström and Wittenmark, Computer-Controlled Systems, section 8.5. `b` weights the
-set point, which reduces the overshoot. The derivative acts on the measured value only, through a
-filter of the time constant Td / N.
+This is the form of Åström and Wittenmark, Computer-Controlled Systems. `b` weights the set point,
+which reduces the overshoot. The derivative acts on the measured value only, through a filter of the
+time constant Td / N.
 
 While the actuator is at a limit, u - v is not zero, and leads the integral back within about `Tt`
 seconds. Without it the integral would wind up, and the controller would react late after the set

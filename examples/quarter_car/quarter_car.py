@@ -4,8 +4,8 @@
     m_wheel  dv2/dt =  k (z1 - z2) + d (v1 - v2) - k_tyre (z2 - road)
 
 All heights are measured from the position at rest. This is the usual model for a first choice of a
-suspension; see R. Rajamani, Vehicle Dynamics and Control, chapter 10. A softer damper is better for
-the comfort, a stiffer one for the grip.
+suspension; see R. Rajamani, Vehicle Dynamics and Control. A softer damper is better for the
+comfort, a stiffer one for the grip.
 
 The equations are linear, dx/dt = A x + b road, and stepped by the trapezoidal rule
 

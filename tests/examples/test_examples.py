@@ -15,8 +15,9 @@ from scipy.interpolate import RegularGridInterpolator
 from scipy.linalg import expm, solve_discrete_are
 from scipy.signal import bilinear, lfilter
 
-from examples.driver import EXAMPLES, load, run
 from fmus.ports.port import Refusal
+from fmus.trial import run
+from support.examples import EXAMPLES, NAMES, load
 
 REFERENCE = Path(__file__).parent / "reference"
 
@@ -51,7 +52,7 @@ def held(A: Any, B: Any, x0: Any, u: Any, h: float, count: int) -> Any:
     return np.array(states)[:, :n]
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in EXAMPLES.glob("*/*.py")))
+@pytest.mark.parametrize("name", NAMES)
 def test_is_short_and_does_something_with_its_defaults(name: str) -> None:
     text = (EXAMPLES / name / f"{name}.py").read_text()
     assert len(text.splitlines()) < 100
@@ -70,13 +71,13 @@ def test_is_short_and_does_something_with_its_defaults(name: str) -> None:
 
 def test_bouncing_ball_is_the_reference_fmu() -> None:
     published = reference("bouncing_ball")
-    seen = run(load("bouncing_ball"), stop_time=3.0, step=0.01, h_max=0.001)
+    seen = run(load("bouncing_ball"), {"h_max": 0.001}, stop_time=3.0, step=0.01)
     assert seen["h"] == published["h"]
     assert seen["v"] == published["v"]
 
 
 def test_bouncing_ball_bounces_at_the_times_of_the_solution() -> None:
-    seen = run(load("bouncing_ball"), stop_time=2.4, step=1e-4, h_max=1e-5)
+    seen = run(load("bouncing_ball"), {"h_max": 1e-5}, stop_time=2.4, step=1e-4)
     # The times between bounces are a geometric series.
     fall, v = sqrt(2 / 9.81), sqrt(2 * 9.81)
     bounces = [
@@ -89,7 +90,7 @@ def test_bouncing_ball_bounces_at_the_times_of_the_solution() -> None:
 
 def test_van_der_pol_is_the_reference_fmu() -> None:
     published = reference("van_der_pol")
-    seen = run(load("van_der_pol"), stop_time=20.0, step=0.01, h_max=0.01)
+    seen = run(load("van_der_pol"), {"h_max": 0.01}, stop_time=20.0, step=0.01)
     assert seen["x0"][::20] == published["x0"]
     assert seen["x1"][::20] == published["x1"]
 
@@ -97,18 +98,18 @@ def test_van_der_pol_is_the_reference_fmu() -> None:
 def test_van_der_pol_is_the_solution_but_for_the_step() -> None:
     # The rule is of first order: the error falls with h_max.
     for h_max, error in ((1e-3, 0.03), (1e-4, 0.003)):
-        seen = run(load("van_der_pol"), stop_time=10.0, step=0.1, h_max=h_max)
+        seen = run(load("van_der_pol"), {"h_max": h_max}, stop_time=10.0, step=0.1)
         x = solution(lambda t, x: [x[1], (1 - x[0] ** 2) * x[1] - x[0]], [2.0, 0.0], seen["time"])
         assert near([seen["x0"], seen["x1"]], x, atol=error)
 
 
 def test_dahlquist_is_the_reference_fmu() -> None:
     module = load("dahlquist")
-    seen = run(module, stop_time=10.0, step=0.1, h_max=0.1)
+    seen = run(module, {"h_max": 0.1}, stop_time=10.0, step=0.1)
     assert seen["x"] == reference("dahlquist")["x"]
     assert near(seen["exact"], np.exp(-np.array(seen["time"])), rtol=1e-14)
-    assert max(map(abs, run(module, stop_time=150.0, step=1.5, h_max=1.5)["x"][50:])) < 1e-9
-    assert max(map(abs, run(module, stop_time=150.0, step=2.5, h_max=2.5)["x"])) > 1e6
+    assert max(map(abs, run(module, {"h_max": 1.5}, stop_time=150.0, step=1.5)["x"][50:])) < 1e-9
+    assert max(map(abs, run(module, {"h_max": 2.5}, stop_time=150.0, step=2.5)["x"])) > 1e6
 
 
 def test_stair_is_the_reference_fmu() -> None:
@@ -123,7 +124,7 @@ def test_stair_is_the_reference_fmu() -> None:
 
 def test_state_space_is_the_reference_fmu() -> None:
     published = reference("state_space")
-    seen = run(load("state_space"), stop_time=10.0, step=1.0, h_max=0.001)
+    seen = run(load("state_space"), {"h_max": 0.001}, stop_time=10.0, step=1.0)
     for port in ("y[1]", "y[2]", "y[3]"):
         assert seen[port] == published[port]
 
@@ -131,7 +132,7 @@ def test_state_space_is_the_reference_fmu() -> None:
 def test_state_space_is_the_solution_of_any_system() -> None:
     A = [[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]
     given = {f"A[{i + 1},{j + 1}]": A[i][j] for i in range(3) for j in range(3)}
-    seen = run(load("state_space"), {**given, "x0[1]": 2.0}, stop_time=2.0, step=0.1, h_max=1e-4)
+    seen = run(load("state_space"), {**given, "x0[1]": 2.0, "h_max": 1e-4}, stop_time=2.0, step=0.1)
     x = held(np.array(A), np.eye(3), [2.0, 0.0, 0.0], [1.0, 2.0, 3.0], 0.1, 20)
     y = np.transpose([seen["y[1]"], seen["y[2]"], seen["y[3]"]])
     # Euler's rule: half a step of the second derivative, which is up to 5.
@@ -257,7 +258,7 @@ def test_extended_kalman_filter_is_the_textbook_filter() -> None:
 
 
 def test_luenberger_observer_forgets_its_error_as_wanted() -> None:
-    seen = run(load("luenberger_observer"), stop_time=2.0, step=0.02, h_max=0.002)
+    seen = run(load("luenberger_observer"), {"h_max": 0.002}, stop_time=2.0, step=0.02)
     m, d, k, omega, zeta = 1.0, 0.5, 20.0, 15.0, 0.7
     # The gains by placing the poles, which is solved here for its coefficients.
     A, C = np.array([[0.0, 1.0], [-k / m, -d / m]]), np.array([[1.0, 0.0]])
@@ -408,7 +409,7 @@ def test_state_machine_keeps_its_times() -> None:
 
 def test_waypoint_guidance_visits_all_waypoints() -> None:
     module = load("waypoint_guidance")
-    seen = run(module, stop_time=100.0, step=0.1, h_max=0.1)
+    seen = run(module, {"h_max": 0.1}, stop_time=100.0, step=0.1)
     x, y = np.array(seen["position.x"]), np.array(seen["position.y"])
     for a, b in ((20, 0), (20, 20), (0, 20), (0, 0)):
         assert np.hypot(x - a, y - b).min() < 1.6
@@ -422,7 +423,7 @@ def test_waypoint_guidance_is_the_solution_on_a_leg() -> None:
     module, h = load("waypoint_guidance"), 0.1
     # The first leg leads straight up: the robot must turn into it.
     given = {"path[2,1]": 0.0, "path[2,2]": 20.0, "path[3,1]": -20.0}
-    seen = run(module, given, stop_time=15.0, step=h, h_max=1e-3)
+    seen = run(module, {**given, "h_max": 1e-3}, stop_time=15.0, step=h)
 
     def rate(t: float, x: Any) -> list[float]:
         turn = pi / 2 + atan2(x[0], 2.0) - x[2]
@@ -471,7 +472,7 @@ def test_engine_map_is_interpolated_and_integrated() -> None:
         )
         assert seen["torque"][0] == pytest.approx(table((throttle, speed)), abs=1e-10)
         assert seen["power"][0] == seen["torque"][0] * speed
-    seen = run(module, stop_time=8.0, step=0.1, h_max=1e-3)
+    seen = run(module, {"h_max": 1e-3}, stop_time=8.0, step=0.1)
     speed = solution(lambda t, w: (table((0.4, w[0])) - 60.0) / 0.2, [80.0], seen["time"])[0]
     # Euler's rule: half a step times the second derivative, at most.
     assert near(seen["speed"], speed, atol=0.05)
@@ -493,7 +494,7 @@ def test_dc_motor_is_the_exact_solution() -> None:
 
 
 def test_quarter_car_is_the_exact_solution() -> None:
-    seen = run(load("quarter_car"), stop_time=2.0, step=0.01, h_max=1e-3)
+    seen = run(load("quarter_car"), {"h_max": 1e-3}, stop_time=2.0, step=0.01)
     m1, m2, k, d, tyre = 300.0, 40.0, 18000.0, 1200.0, 180000.0
     M, S = np.diag([m1, m2]), np.array([[k, -k], [-k, k + tyre]])
     D = d * np.array([[1.0, -1.0], [-1.0, 1.0]])
@@ -504,7 +505,7 @@ def test_quarter_car_is_the_exact_solution() -> None:
     assert near(seen["acceleration"], (A @ x.T)[2], atol=0.03)
     assert near(seen["tyre_force"], tyre * (0.05 - x[:, 1]), atol=15.0)
     # Stable with steps that are longer than any time constant.
-    assert run(load("quarter_car"), stop_time=50.0, step=0.5, h_max=0.5)["body"][-1] == (
+    assert run(load("quarter_car"), {"h_max": 0.5}, stop_time=50.0, step=0.5)["body"][-1] == (
         pytest.approx(0.05, abs=1e-3)
     )
 
@@ -517,7 +518,7 @@ def test_water_tank_empties_as_torricelli_says() -> None:
     # Euler's rule with 20 ms: half a step of the rate of the outflow.
     assert near(seen["level"], exact, atol=2e-5)
     assert seen["level"][-1] < 1e-8
-    filled = run(module, stop_time=3000.0, step=1.0, h_max=1.0)
+    filled = run(module, {"h_max": 1.0}, stop_time=3000.0, step=1.0)
     assert filled["level"][-1] == pytest.approx(3.16**2 / (2 * 9.81), rel=1e-4)
     assert not any(filled["overflows"])
     over = run(module, {}, lambda t: {"inflow": 0.008}, stop_time=300.0, step=1.0)
@@ -527,13 +528,13 @@ def test_water_tank_empties_as_torricelli_says() -> None:
 
 def test_cart_pendulum_is_the_solution_and_keeps_its_energy() -> None:
     module = load("cart_pendulum")
-    seen = run(module, stop_time=10.0, step=0.02, h_max=0.005)
+    seen = run(module, {"h_max": 0.005}, stop_time=10.0, step=0.02)
     assert np.ptp(seen["energy"]) < 1e-6
     assert seen["energy"][0] == pytest.approx(0.2 * 9.81 * 0.5 * cos(0.1))
     # Without a force the centre of mass stays where it is.
     p, angle = np.array(seen["p"]), np.array(seen["angle"])
     assert near(1.2 * p + 0.2 * 0.5 * np.sin(angle), 0.1 * sin(0.1), atol=1e-8)
-    pushed = run(module, {"c": 0.3}, lambda t: {"u": 1.5}, stop_time=3.0, step=0.02, h_max=0.005)
+    pushed = run(module, {"c": 0.3, "h_max": 0.005}, lambda t: {"u": 1.5}, stop_time=3.0, step=0.02)
 
     def rate(t: float, x: Any) -> list[float]:
         # Solved for the accelerations by hand.

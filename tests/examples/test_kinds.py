@@ -1,0 +1,131 @@
+"""Each example as both kinds of FMU, built as users do: valid, equal, and verified by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.util import read_csv
+from fmpy.validation import validate_fmu
+
+from fmus.compilers import machines_compiler
+from fmus.discovery import REFERENCE
+from fmus.kinds import KINDS, NATIVE, PYTHON
+from fmus.ports.port import FAULT
+from fmus.trial import run
+from orchestrator.commands.main import main
+from orchestrator.machine.disk import hold_lock
+from orchestrator.runs.own_components import build_own
+from reference import example_span, write_component_reference
+from support.examples import EXAMPLES, NAMES, load
+
+#: Together they have all types of ports, noise, matrices, a delay, and no state.
+QUICK = {"kalman_filter", "lag_with_delay", "resistor", "state_machine", "waypoint_guidance"}
+
+#: Those that are built for FMI 3.0, too.
+FMI3 = ("lag_with_delay", "state_machine", "state_space", "waypoint_guidance")
+
+pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+
+each = pytest.mark.parametrize(
+    "name",
+    [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in NAMES],
+)
+
+
+@pytest.fixture(scope="session")
+def fmu(shared: Path) -> Callable[..., Path]:
+    """Builds an example's FMU, unless another test has done so."""
+
+    def built(name: str, kind: str, fmi: str = "2") -> Path:
+        folder = shared / "examples" / f"{kind}{fmi}" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        with hold_lock(folder, wait=True):
+            done = [*folder.glob("fmu/*.fmu")]
+            return (
+                done[0] if done else build_own(EXAMPLES / name, folder / "fmu", kind=kind, fmi=fmi)
+            )
+
+    return built
+
+
+def outputs(path: Path) -> list[str]:
+    """Names of the outputs of an FMU, all but `fault`."""
+    variables = fmpy.read_model_description(str(path)).modelVariables
+    names = [one.name for one in variables if one.causality == "output"]
+    return [name for name in names if name != FAULT.name]
+
+
+def rows(path: Path, **settings: float) -> Any:
+    """Outputs of an FMU over time, as fmpy runs it."""
+    return fmpy.simulate_fmu(str(path), output=outputs(path), **settings)
+
+
+@each
+def test_descriptions_are_valid(fmu, name: str):
+    for kind in KINDS:
+        assert validate_fmu(str(fmu(name, kind))) == []
+
+
+@each
+def test_both_kinds_give_the_same_bits_in_the_default_experiment(fmu, name: str):
+    native, python = (rows(fmu(name, kind), output_interval=0.02) for kind in (NATIVE, PYTHON))
+    assert native["time"][-1] == 100.0 and len(native) == 5001
+    assert native.tobytes() == python.tobytes()
+
+
+@each
+def test_both_kinds_give_the_bits_of_plain_python(fmu, name: str):
+    # A binary fraction: fmpy takes a step as the difference of two times, which is then the same.
+    step, stop_time = 2.0**-6, 20.0
+    plain = run(load(name), stop_time=stop_time, step=step)
+    for kind in KINDS:
+        found = rows(fmu(name, kind), stop_time=stop_time, output_interval=step)
+        for port in ("time", *outputs(fmu(name, kind))):
+            # Not by ==, to which both zeros are equal.
+            column = np.array(plain[port], found[port].dtype)
+            assert column.tobytes() == found[port].tobytes(), (kind, port)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FMI3)
+def test_fmi3_is_valid_and_gives_the_same_bits(fmu, name: str):
+    path = fmu(name, NATIVE, "3")
+    assert validate_fmu(str(path)) == []
+    older, newer = (rows(one, output_interval=0.02) for one in (fmu(name, NATIVE), path))
+    assert len(newer) == 5001
+    for port in outputs(fmu(name, NATIVE)):
+        assert newer[port].tobytes() == older[port].tobytes(), port
+
+
+@each
+@pytest.mark.parametrize("kind", KINDS)
+def test_fmu_agrees_with_the_results_that_it_carries(fmu, capsys, name: str, kind: str):
+    assert main(["verify", str(fmu(name, kind))]) == 0
+    assert "1 of 1 experiments with results agree" in capsys.readouterr().out
+
+
+@each
+def test_committed_reference_is_what_the_tool_writes(fmu, tmp_path: Path, name: str):
+    """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""
+    written = write_component_reference(fmu(name, NATIVE), tmp_path, example_span(name))
+    committed = EXAMPLES / name / REFERENCE
+    assert {path.name for path in written} == {path.name for path in committed.iterdir()}
+    for path in written:
+        if path.suffix != ".csv":
+            assert path.read_bytes() == (committed / path.name).read_bytes()
+            continue
+        ours, theirs = read_csv(path), read_csv(committed / path.name)
+        assert ours.dtype == theirs.dtype
+        for port in theirs.dtype.names:
+            np.testing.assert_allclose(ours[port], theirs[port], rtol=1e-9, atol=1e-9)
+
+
+def test_references_are_small():
+    sizes = [path.stat().st_size for path in EXAMPLES.glob(f"*/{REFERENCE}/*")]
+    assert len(sizes) >= 5 * len(NAMES)
+    assert sum(sizes) < 600_000
