@@ -28,7 +28,7 @@ class SineNetwork(Fmi2Slave):
     def do_step(self, current_time, step_size):
         x = self.sin_input
         first = [tanh(w * x) for w in W1]
-        second = [tanh(sum(w * y for w, y in zip(row, first))) for row in W2]
-        self.sin_output_tf = sum(w * y for w, y in zip(W3, second))
+        second = [tanh(sum(w * y for w, y in zip(row, first, strict=True))) for row in W2]
+        self.sin_output_tf = sum(w * y for w, y in zip(W3, second, strict=True))
         self.sin_output_ref = sin(x)
         return True
