@@ -108,6 +108,8 @@ def _build_own(options: argparse.Namespace) -> int:
         path = script_in(path)
         if is_component(path):
             kind, source = _kind(options), source_of_script(path)
+            # Before PythonFMU imports a copy, in which mistakes would be elsewhere.
+            source.definition  # noqa: B018
             kind.write(source, options.out / f"{source.name}.fmu")
         elif options.kind == PYTHON:
             build_script(path, options.out, options.loader)

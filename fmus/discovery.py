@@ -37,6 +37,12 @@ def package_folder(package: str) -> Path:
     return Path(folder)
 
 
+def lies_in(folder: Path, file: Path, module: str) -> bool:
+    """Whether a module's top-level package stands in a folder, and not in one further below."""
+    top = module.partition(".")[0]
+    return folder in file.parents and file.relative_to(folder).parts[0] in (top, f"{top}.py")
+
+
 def name_of(module: str) -> str:
     """The name of a component, from that of its module or folder: `water_tank`, `WaterTank`."""
     return "".join(word[:1].upper() + word[1:] for word in module.split("_"))

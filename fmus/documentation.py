@@ -151,7 +151,8 @@ def _literal(value: object) -> str:
 
 def _range(port: Port) -> str:
     if port.choices:
-        return ", ".join(port.choices)
+        texts = (f"{number:d} {text}" for text, number in port.choices.items())
+        return ", ".join(texts if port.type == "Integer" else port.choices)
     lower = "" if port.minimum is None else f"≥ {port.minimum:g}"
     upper = "" if port.maximum is None else f"≤ {port.maximum:g}"
     return " ".join(filter(None, (lower, upper)))

@@ -15,14 +15,15 @@ from collections.abc import Iterator
 from keyword import iskeyword
 from pathlib import Path
 
-from fmus.discovery import Source, name_of
+from fmus.discovery import Source, lies_in, name_of
 from fmus.ports.port import Misdeclared
 
 #: Functions that tell a component from a slave of PythonFMU.
 _FUNCTIONS = frozenset(("begin", "advance"))
 
-#: What makes a folder a component.
-_FILES = ("ports.py", "behaviour.py")
+#: What makes a folder a component: a package, and its modules in it.
+_MODULES = ("ports", "behaviour")
+_FILES = ("__init__.py", *(f"{module}.py" for module in _MODULES))
 
 
 def script_in(path: Path) -> Path:
@@ -40,7 +41,7 @@ def script_in(path: Path) -> Path:
             return path
         script = path / f"{path.resolve().name}.py"
         if not script.is_file():
-            raise ValueError(f"{path}: has neither {script.name} nor {' and '.join(_FILES)}")
+            raise ValueError(f"{path}: has neither {script.name} nor all of {', '.join(_FILES)}")
         return script
     if not (path.is_file() and path.suffix == ".py"):
         raise ValueError(f"{path}: no such Python file")
@@ -93,7 +94,7 @@ def source_of_script(path: Path) -> Source:
     if str(root) not in sys.path:
         sys.path.insert(0, str(root))
     if place.is_dir():
-        modules = tuple(f"{stem}.{name.removesuffix('.py')}" for name in _FILES)
+        modules = tuple(f"{stem}.{module}" for module in _MODULES)
         return Source(name_of(stem), modules, place, root)
     return Source(name_of(stem), (stem,), root, root)
 
@@ -121,12 +122,14 @@ def told(error: BaseException, path: Path) -> str:
     if isinstance(error, Misdeclared):
         place += _line_of(error.place, path)
     elif isinstance(error, SyntaxError):
-        place, said = f"{shown(error.filename or '', path)}:{error.lineno}", error.msg
+        place = f"{shown(error.filename or '', path)}:{error.lineno}"
+        said = f"SyntaxError: {error.msg}"
     elif frames and not _is_our_own(error):
         place, said = frames[-1], f"{type(error).__name__}: {text}"
     elif text.startswith((f"{path}:", f"{root}{os.sep}")):
         # It says where it is.
-        return " ".join(text.replace(str(root), str(path.parent)).split())
+        beside = str(path.parent / "x")[:-1]
+        return " ".join(text.replace(f"{root}{os.sep}", beside).split())
     return " ".join(f"{place}: {said}".split())
 
 
@@ -145,9 +148,10 @@ def _frames(error: BaseException, path: Path) -> list[str]:
     """Where an error passed through the user's files, the innermost last."""
     root = path.resolve().parent
     return [
-        f"{shown(frame.filename, path)}:{frame.lineno}"
-        for frame in traceback.extract_tb(error.__traceback__)
-        if Path(frame.filename).is_relative_to(root)
+        f"{shown(file, path)}:{line}"
+        for frame, line in traceback.walk_tb(error.__traceback__)
+        for file in [frame.f_code.co_filename]
+        if lies_in(root, Path(file), str(frame.f_globals.get("__name__")))
     ]
 
 

@@ -23,7 +23,7 @@ from typing import Any, Union
 from fmus.discovery import name_of
 from fmus.ports.port import Port, Refusal
 from fmus.ports.quantities import group_name
-from fmus.python.callbacks import ANSWER
+from fmus.python.loading import ANSWER
 from fmus.python.slave import slave_of
 
 #: Inputs by the names of their ports, or a function of the time that gives them.

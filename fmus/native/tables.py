@@ -49,7 +49,7 @@ def tables(definition: Definition) -> str:
     }
     for found in values.values():
         places |= {port.name: str(place) for place, port in enumerate(found)}
-    names = _names_of_choices(ports)
+    names = names_of_choices(ports)
     rows = "".join(f"    {{{_row(port, places, names)}}},\n" for port in ports)
     return "\n".join(
         (
@@ -99,7 +99,7 @@ def _number(port: Port, value: Value) -> str:
     return repr(float(meant))
 
 
-def _names_of_choices(ports: Sequence[Port]) -> dict[str, str]:
+def names_of_choices(ports: Sequence[Port]) -> dict[str, str]:
     """The name of the table of each port's choices, by the port's; `a.b` is not `a_b`."""
     names: dict[str, str] = {}
     for port in filter(lambda port: port.choices, ports):

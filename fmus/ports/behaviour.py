@@ -207,9 +207,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     types = {**hints["begin"], **hints["advance"]}
     groups = get_type_hints(said["Outputs"])
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
-    for name, taken in hints.items():
-        known = (*HOOKS[name], *noisy, "return")
-        for argument in taken.keys() - set(known):
+    for name, found in hints.items():
+        known = (*HOOKS[name], *noisy)
+        for argument in found.keys() - {*known, "return"}:
             why = f"{argument}, which is not one of {', '.join(known)}"
             raise Misdeclared(f"{where}.{name} takes {why}", name)
     if "measured" in hooks and len(noisy) != 1:
@@ -222,9 +222,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     for name in ("begin", "advance"):
         if is_stateless and hints[name]["return"] is outputs:
             continue
-        found: list[Any] = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
-        returned[1] = returned[1] or (*found[1:], Nothing)[0]
-        if found != returned:
+        parts = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
+        returned[1] = returned[1] or (*parts[1:], Nothing)[0]
+        if parts != returned:
             words = ", ".join(map(_word, returned[1:]))
             raise Misdeclared(f"{where}.{name} does not return tuple[{words}]", name)
     return Behaviour(

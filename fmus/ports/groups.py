@@ -115,7 +115,8 @@ def _check_types(fields: type, hint: Any, ports: Sequence[Port]) -> None:
     """Raise TypeError if a number of a type has a port of another one."""
     for scalar, port in zip(scalars_of(hint), ports):
         if is_class(scalar, IntEnum):
-            fitting: tuple[str, ...] = ("Integer",) if port.causality == "output" else ("String",)
+            is_text = port.causality == "parameter"
+            fitting: tuple[str, ...] = ("String",) if is_text else ("Integer",)
         else:
             fitting = _FITTING.get(scalar, ())
         if port.type not in fitting:
@@ -170,11 +171,16 @@ def unpacking(
 
 def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
     """The text of a value of a type, from the names of its numbers; the scope gets its classes."""
-    parts = parts_of(hint)
+    parts, kind = parts_of(hint), class_of(hint)
     if parts is None:
-        return next(names)
+        name = next(names)
+        if not is_class(kind, IntEnum):
+            return name
+        members = f"members_{kind.__name__}"
+        scope[members] = {int(member): member for member in kind}
+        # What is restored as an output need not be one.
+        return f"{members}.get({name}, {name})"
     text = f"({''.join(f'{gathered(part, names, scope)}, ' for part in parts)})"
-    kind = class_of(hint)
     if not is_class(kind, tuple):
         return text
     name = f"class_{kind.__name__}"

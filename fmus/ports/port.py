@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Union
+from typing import Any, Union
 
 from auv_fmu.euler import STEP
 from fmus.ports.quantities import Members, member_name
@@ -56,7 +56,8 @@ class Port:
         start: value before anything is set. Outputs have none.
         description: one line.
         minimum, maximum: inclusive bounds of a number.
-        choices: values that a String may have, with what each stands for in the equations.
+        choices: values that a String may have, with what each stands for in the equations; of an
+            Integer what each number is called that it may have.
         feedthrough: of an output, what it depends on without a state between: inputs, the time.
         initially: of an output, inputs that its value at the start depends on besides.
 
@@ -71,7 +72,7 @@ class Port:
     start: Value | None = None
     minimum: float | None = None
     maximum: float | None = None
-    choices: Mapping[str, object] = field(default_factory=dict)
+    choices: Mapping[str, Any] = field(default_factory=dict)
     feedthrough: tuple[str, ...] = ()
     initially: tuple[str, ...] = ()
 
@@ -107,10 +108,13 @@ class Port:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
         elif self.type == "Integer" and not -(2**31) <= value < 2**31:
             raise Refusal(f"{self.name} = {value!r:.20}: must fit into 32 bits")
+        elif self.choices and value not in self.choices.values():
+            numbers = ", ".join(f"{number:d}" for number in self.choices.values())
+            raise Refusal(f"{self.name} = {value}: use one of {numbers}")
 
     def meaning(self, value: Value) -> object:
         """What the equations take for a value of this port."""
-        return self.choices[str(value)] if self.choices else value
+        return self.choices[str(value)] if self.type == "String" else value
 
 
 def inputs(group: str, members: Members, description: str) -> tuple[Port, ...]:

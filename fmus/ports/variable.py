@@ -231,6 +231,7 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
     variability = "tunable" if said.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
+    minimum, maximum = bounds or (said.minimum, said.maximum)
     port = Port(
         name,
         causality,
@@ -239,7 +240,8 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
         ": ".join(filter(None, (said.description, part.label))),
         said.unit if kind == "Real" else None,
         start,
-        *(bounds or (said.minimum, said.maximum)),
+        minimum,
+        maximum,
         choices,
         tuple(said.feedthrough or ()),
     )
@@ -264,5 +266,7 @@ def _meant(part: _Part, causality: str, place: tuple[str, ...]) -> tuple[str, An
         raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
     if causality == "parameter":
         return "String", start.name, {one.name: one for one in members}, None
-    bounds = (int(min(members)), int(max(members))) if causality == "input" else None
-    return "Integer", int(start), {}, bounds
+    if causality == "output":
+        return "Integer", int(start), {}, None
+    named = {one.name: int(one) for one in members}
+    return "Integer", int(start), named, (int(min(members)), int(max(members)))

@@ -48,9 +48,9 @@ class Store:
         ports: of the component, `fault` last.
         inputs, outputs: values of all but `fault`.
         input_references, output_references: of them, in the order of their values.
-        real_inputs, real_outputs: the references of the Reals among them.
-        has_others: whether there are outputs that are not Reals.
-        free_inputs: the references of the Real inputs, none of which has a range; else None.
+        real_outputs: the references of the Reals among them.
+        free_inputs: the references of the Real inputs, if none of them has a range; else None.
+        only_inputs, only_outputs: these, if there are no others; else None.
         parameters: by name.
         fault: whether a value or a step was discarded.
 
@@ -62,11 +62,13 @@ class Store:
         references.sort(key=lambda reference: ports[reference].type != "Real")
         self.input_references = [r for r in references if ports[r].causality == "input"]
         self.output_references = [r for r in references if ports[r].causality == "output"]
-        self.real_inputs = [r for r in self.input_references if ports[r].type == "Real"]
+        real_inputs = [r for r in self.input_references if ports[r].type == "Real"]
+        limits = [limit for r in real_inputs for limit in (ports[r].minimum, ports[r].maximum)]
+        self.free_inputs = real_inputs if all(limit is None for limit in limits) else None
+        self.only_inputs = self.free_inputs if real_inputs == self.input_references else None
         self.real_outputs = [r for r in self.output_references if ports[r].type == "Real"]
-        self.has_others = self.real_outputs != self.output_references
-        limits = [limit for r in self.real_inputs for limit in (ports[r].minimum, ports[r].maximum)]
-        self.free_inputs = self.real_inputs if all(limit is None for limit in limits) else None
+        has_others = self.real_outputs != self.output_references
+        self.only_outputs = None if has_others else self.real_outputs
         self.fault_references = [len(ports)]
         self.inputs: list[Value] = [
             MISSING[ports[r].type] if ports[r].start is None else ports[r].start
@@ -198,10 +200,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         store = self._store
         if self._stale:
             self._refresh_outputs(vrs)
-        if vrs != store.real_outputs:
-            return self._get(vrs, "Real")
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
-        return store.outputs[: len(vrs)] if store.has_others else store.outputs
+        if vrs == store.only_outputs:
+            return store.outputs
+        return store.outputs[: len(vrs)] if vrs == store.real_outputs else self._get(vrs, "Real")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         if self._stale:
@@ -220,9 +222,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[Any]) -> None:
         store = self._store
         # A sum is finite only if every value is; _set finds out which one was not.
-        if vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
-            others = store.inputs[len(values) :]
-            store.inputs = [*values, *others] if others else values
+        if vrs == store.only_inputs and self._mode == STEPPING and isfinite(sum(values)):
+            store.inputs = values
+        elif vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
+            store.inputs = [*values, *store.inputs[len(values) :]]
         else:
             self._set(vrs, values, "Real")
 

@@ -16,7 +16,15 @@ import pythonfmu
 
 from fmus import documentation
 from fmus.compilers import machines_compiler, run_compiler
-from fmus.discovery import Source, digest_of, guid_of, licences, package_folder, write_archive
+from fmus.discovery import (
+    Source,
+    digest_of,
+    guid_of,
+    licences,
+    lies_in,
+    package_folder,
+    write_archive,
+)
 from fmus.kinds import PYTHON
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
@@ -72,7 +80,7 @@ def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
         source, top = getattr(found, "__file__", None), name.split(".")[0]
         if top in _FOLDERS and source is not None:
             root = _FOLDERS[top].parent
-        elif own is not None and source is not None and _lies_in(own, Path(source), top):
+        elif own is not None and source is not None and lies_in(own, Path(source), name):
             root = own
         else:
             continue
@@ -80,11 +88,6 @@ def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
     return path
-
-
-def _lies_in(folder: Path, source: Path, top: str) -> bool:
-    """Whether a module's top-level package stands in a folder, and not in one further below."""
-    return folder in source.parents and source.relative_to(folder).parts[0] in (top, f"{top}.py")
 
 
 def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:

@@ -103,6 +103,14 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         help="what it is at first: controller (PID with limits), plant (a tank), filter (low-pass "
         f"of second order) or empty (the least there can be); default: {LIKENESSES[0]}",
     )
+    component.add_argument(
+        "--from",
+        dest="network",
+        type=Path,
+        metavar="FILE",
+        help="compute the neural network of an .onnx or .npz file instead; it has dense layers and "
+        "tanh, relu or sigmoid",
+    )
     component.set_defaults(action=_component)
     controller = kinds.add_parser(
         "controller", help="create a folder with a controller and a scenario, ready to run"
@@ -207,7 +215,7 @@ def _controller(options: argparse.Namespace) -> int:
 
 
 def _component(options: argparse.Namespace) -> int:
-    files = new_component(options.name, options.folder, options.like)
+    files = new_component(options.name, options.folder, options.like, options.network)
     for path in files:
         show(path)
     script, test, scenario, _ = files

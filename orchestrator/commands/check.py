@@ -11,7 +11,8 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
-from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.children import run_module
+from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import load_scenario
@@ -39,8 +40,8 @@ def add_check(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu check`."""
     describe(
         parser,
-        "Validate an FMU, an SSP, a scenario or a study without running it, and list every "
-        "problem. Exit status: 0 without problems, else 2.",
+        "Validate an FMU, an SSP, a scenario, a study or your own component (NAME.py) without "
+        "running it, and list every problem. Exit status: 0 without problems, else 2.",
         "check my_scenario.toml",
     )
     parser.add_argument(
@@ -53,7 +54,9 @@ def add_check(parser: argparse.ArgumentParser) -> None:
 def _check(options: argparse.Namespace) -> int:
     findings = Findings()
     look = _fmu if options.file.endswith(".fmu") else _system
-    if is_study(options.file):
+    if options.file.endswith(".py"):
+        look = _script
+    elif is_study(options.file):
         look = _study
     to_know = look(options, findings)
     for kind, texts in (
@@ -76,6 +79,16 @@ def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
 
     with findings.collecting():
         read_study(options.file)
+    return []
+
+
+def _script(options: argparse.Namespace, findings: Findings) -> list[str]:
+    """Check a component of the user's own; there is nothing else to know."""
+    process = run_module("fmus.check", options.file)
+    if process.returncode != 0:
+        raise InputError(last_line(process.stderr))
+    for text in process.stdout.splitlines():
+        findings.problem(text)
     return []
 
 

@@ -27,7 +27,7 @@ COMMANDS = {
     "list": ("listing", "list the scenarios"),
     "gains": ("build", "check the conditions of Theorems 1 and 2"),
     "run": ("run_command", "run a scenario, a scenario file, an SSP or an FMU"),
-    "check": ("check", "validate an FMU, an SSP, a scenario or a study without running it"),
+    "check": ("check", "validate an FMU, an SSP, a scenario, a study or a component of your own"),
     "sweep": ("many_runs", "run a study"),
     "plot": ("look", "plot signals of stored results"),
     "view": ("look", "write a page that plays a stored result in 3D"),

@@ -87,7 +87,7 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     parts = stages(system, experiment.order)
     columns: dict[PortName, int] = {}
     references: list[int] = []
-    fmus, parameters = [], []
+    fmus, parameters, row = [], [], []
     for number, name in enumerate(chain(*parts)):
         component = system.components[name]
         path = library(component)
@@ -100,11 +100,12 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
         for causality in ("input", "output"):
             ports = [port for port in component.having(causality) if port.type == "Real"]
             first = len(columns)
-            row = f"row + {first}"
-            where = {"references": f"references + {first}", "row": row, "values": row}
+            place = f"row + {first}"
+            where = {"references": f"references + {first}", "row": place, "values": place}
             fmu[f"{causality}s"] = _struct(**where, n_references=len(ports), n=len(ports))
             columns |= {PortName(name, port.name): first + i for i, port in enumerate(ports)}
             references += [port.valueReference for port in ports]
+            row += [_initial(system, name, port.name) for port in ports]
         fmus.append(_struct(**fmu))
         for parameter, value in system.parameters_of(name).items():
             parameters.append(_setting(f"&fmus[{number}]", component.variable(parameter), value))
@@ -124,7 +125,7 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
 enum {{ FMUS = {len(fmus)}, COLUMNS = {len(columns)} }};
 static const double START = {experiment.start_time!r}, STEP = {experiment.step!r};
 static const char header[] = {_text(",".join(("time", *map(str, columns))))};
-static double row[COLUMNS];
+static double row[COLUMNS] = {_listed(row)};
 static const reference references[] = {_listed(references)};
 static fmu fmus[] = {_listed(fmus)};
 static member members[FMUS];
@@ -135,6 +136,13 @@ static const stage connections = {connections};
 static const stage stages[] = {_listed(stepped)};
 static void set_parameters(void) {{ {" ".join(parameters)} }}
 """
+
+
+def _initial(system: System, name: str, port: str) -> float:
+    """What an input is at the start if nothing is connected to it."""
+    set_to = system.parameters_of(name).get(port)
+    value = system.components[name].start(port) if set_to is None else set_to
+    return float(value or 0.0)
 
 
 def _listed(items: Iterable[object]) -> str:

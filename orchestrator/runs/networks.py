@@ -48,6 +48,17 @@ class Network(NamedTuple):
     outputs: str
 
     @property
+    def input_port(self) -> str:
+        """The group of ports of its inputs."""
+        return _port(self.inputs, "x")
+
+    @property
+    def output_port(self) -> str:
+        """The group of ports of its outputs."""
+        found = _port(self.outputs, "y")
+        return f"{found}_out" if found == self.input_port else found
+
+    @property
     def n_inputs(self) -> int:
         """How many numbers it takes."""
         return int(self.layers[0].W.shape[1])
@@ -196,9 +207,6 @@ def component_text(name: str, network: Network, source: str) -> str:
 
     """
     sizes = [network.n_inputs, *(len(layer.W) for layer in network.layers)]
-    inputs, outputs = _port(network.inputs, "x"), _port(network.outputs, "y")
-    if inputs == outputs:
-        outputs = f"{outputs}_out"
     used = {layer.activation for layer in network.layers} - {"none"}
     imports = [f"from math import {names}" for names in [_mathematics(used)] if names]
     head = [
@@ -212,7 +220,12 @@ def component_text(name: str, network: Network, source: str) -> str:
         *(text for i, layer in enumerate(network.layers, 1) for text in _constants(i, layer)),
     ]
     body = [
-        _CLASSES.format(inputs=inputs, n=network.n_inputs, outputs=outputs, m=network.n_outputs),
+        _CLASSES.format(
+            inputs=network.input_port,
+            n=network.n_inputs,
+            outputs=network.output_port,
+            m=network.n_outputs,
+        ),
         *(_FUNCTIONS[word] for word in sorted(used & _FUNCTIONS.keys())),
         _forward(network),
     ]

@@ -41,7 +41,7 @@ _EXAMPLES = {
     "filter": ("f=0.5", "y"),
     "empty": ("x0=1", "x"),
 }
-_SETTING, _OUTPUT = "own_setting", "own_output"
+_SETTING, _OUTPUT, _INPUT = "own_setting", "own_output", "own_input"
 
 #: How often files are looked at [s].
 _INTERVAL = 0.2
@@ -70,51 +70,72 @@ def new_controller(
         f"{module}.toml": f"controller/{_MODULE}.toml",
         "README.md": "controller/README.md",
     }
-    files = _write(Path(name), folder, contents, {_CLASS: class_name, _MODULE: module})
+    texts = {target: _template(file) for target, file in contents.items()}
+    files = _write(Path(name), folder, texts, {_CLASS: class_name, _MODULE: module})
     return [*files, build_own(files[0])]
 
 
-def new_component(name: str, folder: Path | None = None, like: str = LIKENESSES[0]) -> list[Path]:
+def new_component(
+    name: str,
+    folder: Path | None = None,
+    like: str = LIKENESSES[0],
+    network: Path | None = None,
+) -> list[Path]:
     """Make a folder with a component, whose file is both kinds of FMU.
 
     Args:
         name: of the component, `WaterTank` or `water_tank`.
         folder: made if it does not exist; None: one with the name, in the current folder.
         like: one of :data:`LIKENESSES`.
+        network: file of a neural network that it computes instead.
 
     Returns:
         The component, its tests, the scenario and the README.
 
     Raises:
-        InputError: the name is not usable, the folder is not empty or cannot be written.
+        InputError: the name is not usable, the folder is not empty or cannot be written, or the
+            network cannot be read.
 
     """
     module, _ = _names(name, "component")
-    contents = {
-        f"{module}.py": f"component/{like}.py.txt",
-        f"test_{module}.py": f"component/test_{like}.py.txt",
-        f"{module}.toml": f"component/{like}.toml",
-        "README.md": "component/README.md",
+    names = {_COMPONENT: name_of(module), _FILE: module}
+    if network is None:
+        text = _template(f"component/{like}.py.txt")
+        setting, output = _EXAMPLES[like]
+    else:
+        # numpy is for this alone.
+        from orchestrator.runs.networks import component_text, read_network  # noqa: PLC0415
+
+        like, found = "network", read_network(network)
+        text = component_text(name_of(module), found, network.name)
+        names[_INPUT] = found.input_port
+        setting, output = f"'{found.input_port}[1]=0.5'", f"{found.output_port}[1]"
+    texts = {
+        f"{module}.py": text,
+        f"test_{module}.py": _template(f"component/test_{like}.py.txt"),
+        f"{module}.toml": _template(f"component/{like}.toml"),
+        "README.md": _template("component/README.md"),
     }
-    setting, output = _EXAMPLES[like]
-    names = {_COMPONENT: name_of(module), _FILE: module, _SETTING: setting, _OUTPUT: output}
-    return _write(Path(name), folder, contents, names)
+    return _write(Path(name), folder, texts, {**names, _SETTING: setting, _OUTPUT: output})
+
+
+def _template(file: str) -> str:
+    return (_TEMPLATES / file).read_text(encoding="utf-8")
 
 
 def _write(
-    named: Path, folder: Path | None, contents: Mapping[str, str], names: Mapping[str, str]
+    named: Path, folder: Path | None, texts: Mapping[str, str], names: Mapping[str, str]
 ) -> list[Path]:
-    """Write files from templates into a new folder, with other names in them."""
+    """Write texts into a new folder, with other names in them."""
     folder = named if folder is None else folder
     if folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty; choose a new or empty folder")
-    with replace_files(folder, contents) as unfinished:
-        for target, template in contents.items():
-            text = (_TEMPLATES / template).read_text(encoding="utf-8")
+    with replace_files(folder, texts) as unfinished:
+        for target, text in texts.items():
             for name, own in names.items():
                 text = text.replace(name, own)
             (unfinished / target).write_text(text, encoding="utf-8")
-    return [folder / target for target in contents]
+    return [folder / target for target in texts]
 
 
 def _names(name: str, what: str) -> tuple[str, str]:

@@ -16,6 +16,7 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.record import read_result
 from support.markdown import DOCS, blocks
+from support.patches import patch
 from support.texts import mentions
 from support.tiers import slow
 
@@ -37,18 +38,6 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> Path:
                 refused, _, arguments = line.rpartition("auv-fmu ")
                 assert bool(main(shlex.split(arguments))) == (refused == "! "), line
     return folder
-
-
-def patch(folder: Path, difference: str) -> None:
-    """Apply a change that names its file in the first line."""
-    first, *lines = difference.splitlines()
-    file = folder / first.removeprefix("--- ")
-    before, after = (
-        "".join(f"{line[1:]}\n" for line in lines if not line.startswith(other)) for other in "+-"
-    )
-    text = file.read_text(encoding="utf-8")
-    assert text.count(before) == 1, f"{file} holds {text.count(before)} times:\n{before}"
-    file.write_text(text.replace(before, after), encoding="utf-8")
 
 
 def final_error(folder: Path) -> list[float]:

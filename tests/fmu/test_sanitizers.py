@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from support.all_types import build
 from support.hosts import GCC, MEMORY, THREADS, arguments_of, sanitized, sanitized_host
 from support.settings import NAMES
 
@@ -54,6 +55,14 @@ def test_nothing_is_wrong_whatever_a_host_calls(fmus, tmp_path: Path, name: str)
 
 def test_nothing_stays_of_a_logger_that_does_not_come_back(fmus, tmp_path: Path):
     assert said_by(sanitized_host("leaving", tmp_path), *fmus[NAMES[0]]) == "left 52 times\n"
+
+
+def test_nothing_is_wrong_with_ports_and_states_of_all_types(tmp_path: Path):
+    all_types = arguments_of(build.sanitized(tmp_path / build.NAME))
+    assert "1000 steps" in said_by(sanitized_host("host", tmp_path), *all_types)
+    host = sanitized_host("random_calls", tmp_path)
+    for seed in SEEDS:
+        assert "fatal 0," in said_by(host, *all_types, str(seed), str(CALLS))
 
 
 @pytest.mark.parametrize("fmus", [THREADS], indirect=True)

@@ -25,8 +25,8 @@ FLOORS = {
         "studies", "paper", "commands",
     ),
     "fmus": (
-        "ports", "components", "kinds", "discovery", "documentation", "compilers",
-        "python", "native", "trial", "script", "check", "build",
+        "ports", "components", "kinds", "discovery", "documentation", "script", "compilers",
+        "python", "trial", "native", "check", "build",
     ),
 }  # fmt: skip
 

@@ -20,7 +20,6 @@ RUNTIME = ROOT / "fmus/native/runtime"
 
 _SHIM = """
 #include "equations.c"
-static Error unseen;
 #define OUT __attribute__((visibility("default")))
 OUT void check(model_parameters *p, Error *e) { model_check(p, e); }
 OUT void begin(model_parameters *p, model_inputs *i, double t, model_state *s, model_outputs *o,
@@ -34,9 +33,9 @@ OUT int credible(model_parameters *p, model_state *s, model_inputs *i, Error *e)
 { return model_credible(p, s, i, e); }
 OUT void restart(model_parameters *p, model_state *s, model_inputs *i, Error *e)
 { model_restart(p, s, i, e); }
-OUT void measure(model_parameters *p, double *n, model_outputs *o)
-{ model_measure(p, n, o, &unseen); }
-OUT unsigned long seed(model_parameters *p) { return model_seed(p, &unseen); }
+OUT void measure(model_parameters *p, double *n, model_outputs *o, Error *e)
+{ model_measure(p, n, o, e); }
+OUT unsigned long seed(model_parameters *p, Error *e) { return model_seed(p, e); }
 OUT const char *restarted(void) { return MODEL_RESTARTED; }
 """
 

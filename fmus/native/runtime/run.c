@@ -50,6 +50,7 @@ static int accept(instance *it, const Error *error, message *why) {
     run *run = &it->run;
     moment *next = &run->moments[!run->now];
     double draws[AT_LEAST_ONE(MODEL_DRAWS)];
+    Error unmeasured;
     if (error->raised) return compose(why, "%s", error->why);
     if (!bounded(&next->state)) {
         return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
@@ -60,10 +61,10 @@ static int accept(instance *it, const Error *error, message *why) {
         }
     }
     if (MODEL_DRAWS > 0) {
-        Error noisy = {0};
         for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&run->noise);
-        model_measure(&it->meant.model, draws, &next->outputs.groups, &noisy);
-        if (noisy.raised) return compose(why, "%s", noisy.why);
+        unmeasured.raised = 0;
+        model_measure(&it->meant.model, draws, &next->outputs.groups, &unmeasured);
+        if (unmeasured.raised) return compose(why, "%s", unmeasured.why);
         if (!all_finite(next->outputs.values, MODEL_OUTPUTS)) {
             return compose(why, "a sampled output is not finite");
         }

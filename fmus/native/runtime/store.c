@@ -65,7 +65,14 @@ static int is_finite(const port *port, double number, message *why) {
 /* Whether a port that takes numbers can take one. */
 static int in_range(const port *port, double number, message *why) {
     if (!is_finite(port, number, why)) return 0;
-    if (number < port->minimum) {
+    if (port->n_choices > 0 && text_of(port, number) == NULL) {
+        compose(why, "%s = %f: use one of ", port->name, number);
+        for (size_t i = 0; i < port->n_choices; i++) {
+            message one;
+            compose(&one, i > 0 ? ", %f" : "%f", (double)port->choices[i].number);
+            append_text(why, one.text);
+        }
+    } else if (number < port->minimum) {
         compose(why, "%s = %g: must be at least %g", port->name, number, port->minimum);
     } else if (number > port->maximum) {
         compose(why, "%s = %g: must be at most %g", port->name, number, port->maximum);

@@ -271,7 +271,9 @@ def _job(system: System, experiment: Experiment) -> dict[str, object]:
         if found:
             raise InputError(f"can be compared only without {what}")
     return {
-        "fmus": {name: str(component.fmu) for name, component in system.components.items()},
+        "fmus": {
+            name: str(component.fmu.resolve()) for name, component in system.components.items()
+        },
         "wires": wires,
         "wanted": outputs,
         "steps": experiment.rows - 1,

@@ -20,7 +20,7 @@ class Mode(IntEnum):
 class Limits(NamedTuple):
     """A set in the set of parameters."""
 
-    default: float = 4.0
+    default: float = 2.0
     most: int = 2_147_483_647
     kind: Mode = Mode.OFF
 
@@ -47,6 +47,7 @@ class Inputs(NamedTuple):
     v: Annotated[Vector, 3]
     A: Annotated[Matrix, 2, 2]
     pair: tuple[int, int]
+    want: Mode
 
 
 class Inner(NamedTuple):
@@ -156,6 +157,8 @@ def advance(
             number += parameters.step
     if inputs.k == 7:
         mode = Mode.COOL if mode == Mode.HEAT else Mode.HEAT
+    if inputs.want == Mode.COOL:
+        mode = inputs.want
     x += parameters.offset @ inputs.v / (100.0 + inputs.k)
     before = state.inner
     inner = before._replace(
@@ -181,6 +184,8 @@ def advance(
 
 def seed(parameters: Parameters) -> int:
     """Of the noise."""
+    if parameters.step == 13:
+        raise Refusal("step = 13: no seed")
     return parameters.step
 
 
@@ -188,7 +193,7 @@ def measured(
     parameters: Parameters, noisy: Annotated[Vector, 2], n: Annotated[Vector, 2]
 ) -> Annotated[Vector, 2]:
     """The first two numbers of the line, with noise."""
-    return noisy + parameters.gain * n
+    return noisy + parameters.gain * n / parameters.limits.default
 
 
 def expected(state: State, outputs: Outputs) -> Outputs:

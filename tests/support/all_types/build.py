@@ -40,16 +40,32 @@ def definition() -> Definition:
     return define(NAME, ports, behaviour)
 
 
-def native(folder: Path, fmi: str = "2", sanitizers: str = "", compiler: str = "cc") -> Path:
-    """Its FMU in C for this machine, unpacked into a folder, and beside it as a file."""
+def native(
+    folder: Path,
+    fmi: str = "2",
+    sanitizers: str = "",
+    compiler: str = "cc",
+    of: Definition | None = None,
+) -> Path:
+    """The FMU in C for this machine, unpacked into a folder, and beside it as a file.
+
+    Args:
+        folder: to be made.
+        fmi: version.
+        sanitizers: as the compiler names them.
+        compiler: that makes it.
+        of: another component.
+
+    """
+    of = of or definition()
     platform = "linux64" if fmi == "2" else fmpy.platform_tuple
-    library = folder / f"binaries/{platform}/{NAME}.so"
+    library = folder / f"binaries/{platform}/{of.name}.so"
     library.parent.mkdir(parents=True)
     (folder / "sources").mkdir()
-    identity = f'#define MODEL_NAME "{NAME}"\n#define MODEL_GUID "{_GUID}"\n'
-    for name, text in {**sources(definition(), fmi), "identity.h": identity}.items():
+    identity = f'#define MODEL_NAME "{of.name}"\n#define MODEL_GUID "{_GUID}"\n'
+    for name, text in {**sources(of, fmi), "identity.h": identity}.items():
         (folder / "sources" / name).write_text(text, encoding="utf-8")
-    (folder / "modelDescription.xml").write_bytes(_DESCRIBE[fmi](definition(), _GUID))
+    (folder / "modelDescription.xml").write_bytes(_DESCRIBE[fmi](of, _GUID))
     watched = ["-O1", f"-fsanitize={sanitizers}", "-fno-sanitize-recover"]
     options = watched if sanitizers else ["-O2"]
     command = [compiler, *_FLAGS, *options, "-o", library, MAIN[fmi], "-lm"]

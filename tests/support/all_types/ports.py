@@ -36,6 +36,7 @@ INPUTS = (
     *_input("v", 3),
     *_input("A", 2, 2, start=-1.5),
     *_input("pair", 2, kind="Integer"),
+    *_input("want", kind="Integer", choices={mode.name: int(mode) for mode in Mode}),
 )
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import struct
 from binascii import crc32
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
+from importlib import import_module
 from math import inf, nan
 from pathlib import Path
 from typing import Any
@@ -17,15 +19,21 @@ from fmpy.validation import validate_fmu
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from fmus.ports.definition import define
+from fmus.python.slave import slave_of
 from support.all_types import build
 from support.fmi3 import Fmi3Library
+from support.instances import messages_of
 from support.raw import Host, Library, Status, initialised, instance
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
+#: Where an exception was raised, which only the kind in Python knows.
+_LINE = re.compile(r"behaviour\.py:\d+: ")
+
 MOST, LEAST = 2**31 - 1, -(2**31)
 
-INTEGERS = ("k", "pair[1]", "pair[2]")
+INTEGERS = ("k", "pair[1]", "pair[2]", "want")
 REALS = ("u", "v[1]", "v[2]", "v[3]", "A[1,1]", "A[1,2]", "A[2,1]", "A[2,2]")
 
 
@@ -58,7 +66,7 @@ class Run:
         self.saved: list[int] = []
 
     def note(self, status: Status, *more: Any) -> Status:
-        said = [(message.status, message.text) for message in self.host.messages]
+        said = [(message.status, _LINE.sub("", message.text)) for message in self.host.messages]
         self.host.messages.clear()
         self.answers.append((status, said, *map(bits, more)))
         return status
@@ -167,6 +175,24 @@ def test_integer_that_leaves_32_bits_discards_the_step(stepping):
     answers_agree(stepping)
 
 
+def test_what_seed_and_noise_raise_is_said_in_both_kinds(libraries):
+    for values, why in (
+        ({"step": 13}, "initialisation refused: step = 13: no seed"),
+        (
+            {"limits.default": 0.0},
+            "initialisation refused: ZeroDivisionError: float division by zero",
+        ),
+    ):
+        kind = "Integer" if "step" in values else "Real"
+        with ExitStack() as stack:
+            runs = [Run(stack.enter_context(instance(library))) for library in libraries]
+            for run in runs:
+                run.set_all(kind, values)
+                run.start()
+                assert run.answers[-1] == (Status.Error, [(Status.Error, why)])
+            answers_agree(runs)
+
+
 def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
     for run in stepping:
         run.set("Real", u=1e9)
@@ -181,6 +207,7 @@ def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
     [
         ("Integer", {"k": -6}, Status.Discard, "k = -6: must be at least -5"),
         ("Integer", {"pair[1]": 5, "k": -9}, Status.Discard, "k = -9: must be at least -5"),
+        ("Integer", {"want": 1}, Status.Discard, "want = 1: use one of 0, 2, -7"),
         ("Integer", {"n": 1}, Status.Discard, "n is an output and cannot be set"),
         ("Boolean", {"on": 1}, Status.Discard, "on is an output and cannot be set"),
         ("Boolean", {"fault": 1}, Status.Discard, "fault is an output and cannot be set"),
@@ -228,9 +255,91 @@ def test_outputs_before_the_run_follow_all_that_is_set(runs):
     answers_agree(runs)
 
 
+#: Numbers that are no tuples, as ports, as groups of a dictionary, and with noise.
+SCALARS = """\
+from __future__ import annotations
+
+from typing import NamedTuple, TypedDict
+
+from fmus.ports.groups import Nothing, ParameterSet
+from fmus.ports.port import Port, parameter
+
+DESCRIPTION = "Scalars"
+
+
+class Parameters(NamedTuple):
+    std: float
+
+
+class Inputs(NamedTuple):
+    u: float
+    w: tuple[float, float]
+
+
+class Outputs(TypedDict):
+    seen: float
+    y: float
+    k: int
+
+
+PARAMETERS = ParameterSet(Parameters, std=parameter("std", 0.5, "1", "Deviation"))
+PORTS = (
+    Port("u", "input", "continuous", "Real", "Value", "1", 1.0, -8.0, 8.0),
+    Port("w.x", "input", "continuous", "Real", "Value", "1", 0.0),
+    Port("w.y", "input", "continuous", "Real", "Value", "1", 2.0),
+    Port("seen", "output", "continuous", "Real", "Value"),
+    Port("y", "output", "continuous", "Real", "Value"),
+    Port("k", "output", "discrete", "Integer", "Value"),
+    *PARAMETERS.ports,
+)
+
+
+def begin(inputs: Inputs) -> tuple[Nothing, Outputs]:
+    return Nothing(), {"seen": inputs.u, "y": inputs.u + inputs.w[1], "k": int(inputs.u)}
+
+
+def advance(state: Nothing, inputs: Inputs, parameters: Parameters) -> tuple[Nothing, Outputs]:
+    y = inputs.w[0] * parameters.std
+    return state, {"seen": inputs.u, "y": inputs.u + y, "k": int(1000.0 * inputs.u)}
+
+
+def seed() -> int:
+    return 7
+
+
+def measured(parameters: Parameters, n: float, y: float) -> float:
+    return y + parameters.std * n
+"""
+
+
+def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeypatch):
+    """A Real input in a range is looked at, also where all are set in one call."""
+    (tmp_path / "scalars.py").write_text(SCALARS)
+    monkeypatch.syspath_prepend(tmp_path)
+    module = import_module("scalars")
+    slave = slave_of("Scalars", module, module)(instance_name="scalars")
+    slave._has_loader = True
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    library = Library(build.native(tmp_path / "native", of=define("Scalars", module, module)))
+    with initialised(library) as host:
+        for t, values in enumerate(([3.0, -1.0, 0.5], [3.0, -9.0, 9.0], [8.5, 0.0, 0.0])):
+            slave.set_real([0, 1, 2], values)
+            status = host.set("Real", [0, 1, 2], values)
+            assert status == (Status.Discard if t == 2 else Status.OK)
+            assert slave.do_step(t, 0.25)
+            assert host.step(t, 0.25) == Status.OK
+            _, got = host.get("Real", [3, 4])
+            assert [*map(bits, got)] == [*map(bits, slave.get_real([3, 4]))]
+            assert host.get("Integer", [5])[1] == slave.get_integer([5]) == [3000]
+        [said] = host.messages
+    assert messages_of(slave) == [said.text] == ["u = 8.5: must be at most 8"]
+
+
 # Any calls
 
-numbers = st.sampled_from((0, 1, -1, 3, 7, -5, -6, MOST, LEAST, MOST - 3)) | st.integers(
+numbers = st.sampled_from((0, 1, -1, 3, 7, 2, -7, -5, -6, MOST, LEAST, MOST - 3)) | st.integers(
     LEAST, MOST
 )
 reals = st.floats(-1e3, 1e3) | st.sampled_from((0.0, -0.0, 1e7, 1e99, 1e300, nan, inf))
@@ -241,9 +350,15 @@ def some(names: Sequence[str], values: st.SearchStrategy[Any]) -> st.SearchStrat
 
 
 calls = st.one_of(
-    st.tuples(st.just("set_all"), st.just("Integer"), some((*INTEGERS, "step", "n"), numbers)),
+    st.tuples(
+        st.just("set_all"), st.just("Integer"), some((*INTEGERS, "step", "n", "mixed.n"), numbers)
+    ),
     st.tuples(st.just("set_all"), st.just("Boolean"), some(("go", "counts"), st.booleans())),
-    st.tuples(st.just("set_all"), st.just("Real"), some((*REALS, "gain", "K[2,1]"), reals)),
+    st.tuples(
+        st.just("set_all"),
+        st.just("Real"),
+        some((*REALS, "gain", "K[2,1]", "limits.default"), reals),
+    ),
     st.tuples(
         st.just("set_all"), st.just("Real"), st.fixed_dictionaries(dict.fromkeys(REALS, reals))
     ),
@@ -321,6 +436,7 @@ def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
         (("inputs", 8), -6, "k = -6: must be at least -5"),
         (("inputs", 8), 1.0, "k = 1.0: must be a Integer"),
         (("inputs", 9), 1, "go = 1: must be a Boolean"),
+        (("inputs", 12), 1, "want = 1: use one of 0, 2, -7"),
         (("outputs", 11), 2.0, "n = 2.0: must be a Integer"),
         (("outputs", 11), 2, "its outputs do not match its state"),
         (("outputs", 0), 0.25 + 1e-6, "its outputs do not match its state"),
@@ -349,8 +465,9 @@ _AFTER = 4 + 4 + 8 + 4 + 4 + 4 * 624
         (0, 4, "its outputs do not match its state"),
         (-4, 2, "it has missing or unknown parts"),
         (-4 - 4, 7, "flags[3]: must be a Boolean"),
-        (-4 - 8 * 4 - 11 * 8 - 3 * 4, 2, "go: must be a Boolean"),
-        (-4 - 8 * 4 - 11 * 8 - 4 * 4, -6, "k = -6: must be at least -5"),
+        (-4 - 8 * 4 - 11 * 8 - 4, 1, "want = 1: use one of 0, 2, -7"),
+        (-4 - 8 * 4 - 11 * 8 - 4 * 4, 2, "go: must be a Boolean"),
+        (-4 - 8 * 4 - 11 * 8 - 5 * 4, -6, "k = -6: must be at least -5"),
     ],
 )
 def test_words_of_another_type_are_refused_in_c(libraries, place, word, why):

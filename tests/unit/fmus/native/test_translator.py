@@ -28,6 +28,7 @@ from support.equations import (
     ROOT,
     RUNTIME,
     WHY,
+    Error,
     bits,
     equations,
     filled,
@@ -388,9 +389,8 @@ def test_noise_of_the_localisation(random):
     parameters, outputs = value(both.parameters, random, wild), value(both.outputs, random, wild)
     n = value(tuple[float, float, float], random, wild)
     passed = filled(both.outputs, outputs)
-    both.library.measure(
-        byref(filled(both.parameters, parameters)), (c_double * 3)(*n), byref(passed)
-    )
+    given = filled(both.parameters, parameters)
+    both.library.measure(byref(given), (c_double * 3)(*n), byref(passed), byref(Error()))
     measured = both.behaviour.measured(parameters, outputs["y"], n)
     assert outcome(passed) == outcome({**outputs, "y": measured})
 
@@ -401,4 +401,4 @@ def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
     parameters = structure(both.parameters)()
     parameters.noise.seed = seed
     both.library.seed.restype = c_ulong
-    assert both.library.seed(byref(parameters)) == seed % 2**32
+    assert both.library.seed(byref(parameters), byref(Error())) == seed % 2**32

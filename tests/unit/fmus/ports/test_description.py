@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
-from fmus.ports.description import complete
+from fmus.ports.description import complete, dependencies, value_attributes
 from fmus.ports.port import FAULT, Port, inputs, outputs, parameter
 
 A, B = inputs("a", {"x": "m"}, "Place")[0], inputs("b", {1: "N"}, "Force")[0]
@@ -86,3 +86,20 @@ def test_description_says_what_the_ports_are():
     found = ElementTree.tostring(complete(ElementTree.fromstring(BEFORE), PORTS), "unicode")
     expected, actual = (ElementTree.canonicalize(xml, strip_text=True) for xml in (AFTER, found))
     assert actual == expected
+
+
+def test_integers_and_truth_values_depend_as_reals_do():
+    """All but `fault`, which is false at the start."""
+    ports = (
+        Port("k", "input", "discrete", "Integer", "Number", start=3, minimum=-5),
+        Port("on", "input", "discrete", "Boolean", "Switch", start=True),
+        Port("n", "output", "discrete", "Integer", "Number", feedthrough=("k",)),
+        Port("full", "output", "discrete", "Boolean", "Whether", initially=("on",)),
+        parameter("gain", 1.0, "1", "Gain"),
+        FAULT,
+    )
+    assert [*dependencies(ports)] == [(3, [1], [1, 5]), (4, [], [2, 5]), (6, [], [])]
+    said = ["start", "min", "max", "unit"]
+    assert [
+        [value_attributes(port).get(name) for name in said] for port in ports[:2]
+    ] == [["3", "-5", None, None], ["true", None, None, None]]  # fmt: skip

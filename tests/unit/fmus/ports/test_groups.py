@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, TypedDict
+from enum import IntEnum
+from typing import Annotated, NamedTuple, TypedDict
 
 import pytest
 
+from auv_fmu.linear_algebra import Matrix, Vector
 from fmus.ports.groups import Nothing, ParameterSet, packing, slices, unpacking
-from fmus.ports.port import inputs, outputs, parameter, parameters
+from fmus.ports.port import Port, inputs, outputs, parameter, parameters, setting
 from fmus.ports.quantities import NU, POSITION, TAU, per_axis
 from fmus.python.component import Component
 
@@ -118,3 +120,116 @@ def test_a_component_whose_parameters_mean_nothing_is_no_component():
         class Meaningless(Component[Nothing, Inputs, Outputs, Nothing]):
             ports = (*IN, *OUT, ELL)
             parameter_set = ParameterSet(Nothing)
+
+
+class Kind(IntEnum):
+    A = 1
+    B = 5
+
+
+class Several(NamedTuple):
+    n: int
+    x: float
+    v: Annotated[Vector, 2]
+    M: Annotated[Matrix, 2, 1]
+    on: bool
+
+
+def port(name: str, kind: str, causality: str = "input") -> Port:
+    return Port(name, causality, "discrete", kind, "One of several")
+
+
+SEVERAL = (
+    port("n", "Integer"),
+    port("x", "Real"),
+    *(port(f"v[{i}]", "Real") for i in (1, 2)),
+    *(port(f"M[{i},1]", "Real") for i in (1, 2)),
+    port("on", "Boolean"),
+)
+
+#: Reals first.
+VALUES = [1.5, 2.0, 3.0, 4.0, 5.0, 7, True]
+
+
+def test_scalars_vectors_and_matrices_are_made_of_values_with_reals_first():
+    made = unpacking(Several, SEVERAL, {})(VALUES)
+    assert made == (7, 1.5, (2.0, 3.0), ((4.0,), (5.0,)), True)
+    kinds = (made, made.v, made.M, made.M[0])
+    assert tuple(map(type, kinds)) == (Several, Vector, Matrix, Vector)
+    assert packing(Several, SEVERAL)(made) == VALUES
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "why"),
+    [
+        ("n", "Real", "Several: n is of type int, its port is a Real"),
+        ("x", "Integer", "Several: x is of type float, its port is a Integer"),
+        ("on", "Integer", "Several: on is of type bool, its port is a Integer"),
+        ("M[2,1]", "Boolean", r"Several: M\[2,1\] is of type float, its port is a Boolean"),
+    ],
+)
+def test_a_port_of_another_type_than_its_number_is_found_at_once(name, kind, why):
+    wrong = [port(name, kind) if it.name == name else it for it in SEVERAL]
+    with pytest.raises(TypeError, match=why):
+        unpacking(Several, wrong, {})
+
+
+class Asked(NamedTuple):
+    kind: Kind
+
+
+def test_an_input_may_be_a_member_of_an_enumeration():
+    [made] = unpacking(Asked, [port("kind", "Integer")], {})([5])
+    assert made is Kind.B
+
+
+class Whole(NamedTuple):
+    n: int
+    kind: Kind
+    pair: tuple[int, int]
+
+
+WHOLE = tuple(port(name, "Integer", "output") for name in ("n", "kind", "pair[1]", "pair[2]"))
+
+
+def test_integers_of_32_bits_are_packed_and_members_as_integers():
+    values = packing(Whole, WHOLE)(Whole(-(2**31), Kind.B, (2**31 - 1, 0)))
+    assert values == [-(2**31), 5, 2**31 - 1, 0]
+    assert {*map(type, values)} == {int}
+
+
+@pytest.mark.parametrize("whole", [(2**31, 0, 0), (0, -(2**31) - 1, 0), (0, 0, 10**400)])
+def test_integers_of_more_bits_are_not_packed(whole):
+    n, *pair = whole
+    with pytest.raises(OverflowError, match="an integer exceeds 32 bits"):
+        packing(Whole, WHOLE)(Whole(n, Kind.A, tuple(pair)))
+
+
+class Chosen(NamedTuple):
+    kind: Kind
+    K: Annotated[Matrix, 1, 2]
+    n: int
+    on: bool
+    gains: Gains
+
+
+def test_parameters_are_members_of_enumerations_matrices_and_sets():
+    kinds = {kind.name: kind for kind in Kind}
+    declared = ParameterSet(
+        Chosen,
+        kind=setting("kind", "B", "Which", kinds),
+        K=parameters("K", (1.0, 2.0), {"a": "1", "b": "1"}, "Gain"),
+        n=setting("n", 3, "How many"),
+        on=setting("on", True, "Whether"),
+        gains=ParameterSet(Gains, K1=K1, lambda_=LAMBDA),
+    )
+    made = declared.of({port.name: port.start for port in declared.ports})
+    assert made == (Kind.B, ((1.0, 2.0),), 3, True, ((1.0, 2.0, 3.0), 4.0))
+    assert (type(made.kind), type(made.K), type(made.K[0])) == (Kind, Matrix, Vector)
+    assert declared.paths["K.b"] == ("K", 0, 1)
+    with pytest.raises(TypeError, match="kind is of type Kind, its port is a Integer"):
+        ParameterSet(Only, kind=setting("kind", 1, "Which"))
+
+
+class Only(NamedTuple):
+    kind: Kind

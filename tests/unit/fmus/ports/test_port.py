@@ -7,12 +7,21 @@ from math import inf, nan
 import pytest
 
 from fmus.ports.port import Port, Refusal, inputs, parameter, parameters
-from fmus.ports.quantities import ETA_WITHOUT_ROLL, TAU, THETA, group_name, member_name, per_axis
+from fmus.ports.quantities import (
+    ETA_WITHOUT_ROLL,
+    TAU,
+    THETA,
+    group_name,
+    member_name,
+    member_of,
+    per_axis,
+)
 
 REAL = parameter("k", 1.0, "1", "Gain", 0.5, 2.5)
 UNBOUNDED = parameter("k", 1.0, "1", "Gain")
 INTEGER = Port("n", "parameter", "fixed", "Integer", "Number", start=0)
 BOOLEAN = Port("on", "parameter", "fixed", "Boolean", "Switch", start=False)
+NAMED = Port("m", "input", "discrete", "Integer", "Kind", start=8, choices={"a": -7, "b": 8})
 STRING = Port("s", "parameter", "fixed", "String", "Kind", start="a", choices={"a": 7, "b": 8})
 LARGEST = float.fromhex("0x1.fffffffffffffp+1023")
 
@@ -28,6 +37,7 @@ LARGEST = float.fromhex("0x1.fffffffffffffp+1023")
         (INTEGER, -(2**31)),
         (BOOLEAN, True),
         (STRING, "b"),
+        (NAMED, -7),
     ],
 )
 def test_good_value_comes_back(port, value):
@@ -51,6 +61,8 @@ def test_good_value_comes_back(port, value):
         (BOOLEAN, 1, "on = 1: must be a Boolean"),
         (STRING, "c", "s = 'c': use one of a, b"),
         (STRING, 0, "s = 0: must be a String"),
+        (NAMED, 1, "m = 1: use one of -7, 8"),
+        (INTEGER, 2**31, "n = 2147483648: must fit into 32 bits"),
     ],
 )
 def test_bad_value_is_refused_with_the_reason(port, value, why):
@@ -59,9 +71,22 @@ def test_bad_value_is_refused_with_the_reason(port, value, why):
     assert str(refusal.value) == why
 
 
+@pytest.mark.parametrize("value", [0.0, -1e9, 7.5])
+def test_value_may_be_sound_and_out_of_range(value):
+    """As an output may be."""
+    REAL.sound(value)
+    with pytest.raises(Refusal, match="must be"):
+        REAL.checked(value)
+
+
 def test_choices_stand_for_what_the_equations_take():
     assert STRING.meaning("b") == 8
     assert REAL.meaning(2.0) == 2.0
+    assert NAMED.meaning(8) == 8
+
+
+def test_a_scalar_is_its_own_member():
+    assert [member_of(name) for name in ("u", "tau.u", "K[1,2]", "x_1")] == ["u", "u", "1,2", "x_1"]
 
 
 def test_inputs_start_at_zero_and_parameters_are_fixed():

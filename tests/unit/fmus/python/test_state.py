@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from enum import IntEnum
 from math import inf, isfinite, nan, sqrt
-from typing import Any, NamedTuple, Union
+from typing import Annotated, Any, NamedTuple, Union
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
+from auv_fmu.linear_algebra import Matrix, Vector
 from fmus.ports.port import Refusal
 from fmus.python.state import Snapshot, measuring, nearly_equal, restored
 from support.instances import ClassInstance
@@ -437,3 +439,54 @@ def test_whole_numbers_may_stand_for_floats():
 @pytest.mark.parametrize("kind", [frozenset, tuple])
 def test_what_is_of_no_known_type_is_left_as_it_is(kind):
     assert restored(kind, [1, [2, [3]]]) == (1, (2, (3,)))
+
+
+class Colour(IntEnum):
+    RED = 1
+    BLUE = 4
+
+
+class Typed(NamedTuple):
+    n: int
+    colour: Colour
+    v: Annotated[Vector, 2]
+    M: Annotated[Matrix, 1, 2]
+
+
+TYPED = Typed(-3, Colour.BLUE, Vector((3.0, 0.0)), Matrix(((0.0, 4.0),)))
+
+
+def test_size_is_that_of_vectors_and_matrices_too_and_of_no_integer():
+    assert measuring(Typed)(TYPED) == 5.0
+
+
+@pytest.mark.parametrize("n", [2**31, -(2**31) - 1, 10**400])
+def test_integers_of_more_than_32_bits_have_no_size(n):
+    with pytest.raises(OverflowError, match="an integer exceeds 32 bits"):
+        measuring(Typed)(TYPED._replace(n=n))
+
+
+def test_json_gives_members_vectors_and_matrices_back():
+    again = restored(Typed, json.loads(json.dumps(TYPED)))
+    assert again == TYPED
+    kinds = (again, again.colour, again.v, again.M, again.M[0])
+    assert tuple(map(type, kinds)) == (Typed, Colour, Vector, Matrix, Vector)
+
+
+@pytest.mark.parametrize(
+    ("kind", "value", "why"),
+    [
+        (int, 2**31, "an integer exceeds 32 bits"),
+        (int, -(2**31) - 1, "an integer exceeds 32 bits"),
+        (Colour, 2, "2 is not of type Colour"),
+        (Colour, 1.0, "1.0 is not of type Colour"),
+        (Colour, True, "True is not of type Colour"),
+        (Colour, "RED", "'RED' is not of type Colour"),
+        (Annotated[Vector, 2], [1.0], "[1.0] instead of 2 values"),
+        (Annotated[Matrix, 1, 2], [[1.0, inf]], "a value is not finite"),
+    ],
+)
+def test_what_no_run_can_have_led_to_is_refused(kind, value, why):
+    with pytest.raises(Refusal) as refusal:
+        restored(kind, value)
+    assert str(refusal.value) == why

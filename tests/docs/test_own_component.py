@@ -1,0 +1,149 @@
+"""The guide to your own component, followed literally, and its FMUs where there is no Python."""
+
+from __future__ import annotations
+
+import io
+import shlex
+import shutil
+import sys
+from contextlib import redirect_stdout
+from importlib.util import find_spec
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+
+from fmus.compilers import machines_compiler
+from fmus.kinds import TARGETS
+from orchestrator.commands.main import main
+from orchestrator.exchange import c_host
+from orchestrator.master.experiment import Experiment
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.record import read_result
+from support.markdown import DOCS, blocks
+from support.patches import patch
+
+PAGE = DOCS / "tutorials" / "your-own-component.md"
+
+pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+
+QEMU, WINE = map(shutil.which, ("qemu-aarch64", "wine"))
+ARM_LIBRARIES = Path("/usr/aarch64-linux-gnu")
+
+#: Commands that need packages which are not everywhere.
+EXTRAS = {" hosts ": ("libcosimpy", "ecospy"), "policy": ("onnx",)}
+
+
+def network(path: Path) -> None:
+    """A policy as training leaves it."""
+    onnx, random = pytest.importorskip("onnx"), np.random.default_rng(1)
+    make, row = onnx.helper, onnx.TensorProto.FLOAT
+    known = [
+        onnx.numpy_helper.from_array(random.normal(size=size).astype(np.float32), name)
+        for name, size in (("W1", (8, 4)), ("b1", 8), ("W2", (2, 8)), ("b2", 2))
+    ]
+    nodes = [
+        make.make_node("Gemm", ["observation", "W1", "b1"], ["z"], transB=1),
+        make.make_node("Tanh", ["z"], ["a"]),
+        make.make_node("Gemm", ["a", "W2", "b2"], ["action"], transB=1),
+    ]
+    graph = make.make_graph(
+        nodes,
+        "policy",
+        [make.make_tensor_value_info("observation", row, [1, 4])],
+        [make.make_tensor_value_info("action", row, [1, 2])],
+        known,
+    )
+    onnx.save(make.make_model(graph, ir_version=8), str(path))
+
+
+@pytest.fixture(scope="module")
+def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A folder in which everything on the page was done, and what was printed."""
+    folder, said = tmp_path_factory.mktemp("component"), io.StringIO()
+    before = [*sys.path]
+    with pytest.MonkeyPatch.context() as here, redirect_stdout(said):
+        here.chdir(folder)
+        for language, text in blocks(PAGE, "sh", "diff", "python"):
+            if language == "diff":
+                patch(folder, text)
+            elif language == "python":
+                exec(compile(text, str(PAGE), "exec"), {})
+            for line in text.splitlines() if language == "sh" else ():
+                needed = [package for part, packages in EXTRAS.items() for package in packages
+                          if part in line]  # fmt: skip
+                if not all(map(find_spec, needed)):
+                    continue
+                if "policy.onnx" in line:
+                    network(folder / "policy.onnx")
+                assert main(shlex.split(line)[1:]) == 0, line
+    sys.path[:] = before
+    return folder, said.getvalue()
+
+
+def test_both_kinds_give_the_same_table(followed: tuple[Path, str]):
+    folder, _ = followed
+    python, native = (folder / f"{kind}-kind/result.csv" for kind in ("python", "native"))
+    assert python.read_bytes() == native.read_bytes()
+    command = read_result(python.parent)[1]["Pid.command"]
+    # The proportional part of 1.5 (0.2 - 0) at the start, and the integral after it.
+    assert command[0] == pytest.approx(0.3, rel=1e-15)
+    assert command[-1] == pytest.approx(0.3 * (1.0 + 10.0 / 5.0), rel=5e-3)
+
+
+def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
+    """fmpy here; those of the page say how far they are off."""
+    folder, said = followed
+    rows = [
+        fmpy.simulate_fmu(
+            str(path), stop_time=10.0, step_size=0.02, output_interval=0.02,
+            start_values={"set_point": 0.2}, output=["command"],
+        )["command"]
+        for path in (
+            folder / "pid/Pid.fmu", folder / "native/Pid.fmu", folder / "native/fmi3/Pid.fmu"
+        )
+    ]  # fmt: skip
+    # fmpy takes the difference of two times for the step, which is off by a rounding error.
+    table = read_result(folder / "native-kind")[1]["Pid.command"]
+    for row in rows:
+        np.testing.assert_array_equal(row, rows[0])
+        np.testing.assert_allclose(row, table, rtol=1e-12)
+    if all(map(find_spec, EXTRAS[" hosts "])):
+        lines = [line.split() for line in said.splitlines()]
+        found = {words[0]: words for words in lines if words[:1] and "0.0e+00" in words}
+        assert found.keys() >= {"libcosim-ssp", "ecos", "fmpy", "c-program"}, said
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
+@pytest.mark.parametrize(
+    ("machine", "platform", "ending", "tool", "tolerance"),
+    [
+        ("aarch64-linux", "aarch64-linux", ".so", QEMU, 0.0),
+        ("x86_64-windows", "win64", ".dll", WINE, 1e-9),
+    ],
+    ids=["qemu", "wine"],
+)
+def test_other_machines_give_the_same_numbers(
+    followed: tuple[Path, str], tmp_path: Path, machine: str, platform: str, ending: str,
+    tool: str | None, tolerance: float,
+):  # fmt: skip
+    """A host in C, without Python."""
+    if tool is None or (tool == QEMU and not ARM_LIBRARIES.is_dir()):
+        pytest.skip(f"nothing runs programs of {machine} here")
+    folder, _ = followed
+    command = ["build", str(folder / "pid/pid.py"), "--kind", "native", "--out", str(tmp_path)]
+    assert main([*command, "--platforms", platform]) == 0
+    fmpy.extract(tmp_path / "Pid.fmu", unzipdir=tmp_path / "Pid")
+    library = tmp_path / f"Pid/binaries/{platform}/Pid{ending}"
+    _, system = load_scenario(str(folder / "native/Pid.fmu"))
+    system = system.with_parameters({"Pid.set_point": 0.2})
+    zig = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[machine]]
+    name = "host.exe" if ending == ".dll" else "host"
+    experiment = Experiment(10.0, 0.02)
+    host = c_host.compile_host(tmp_path, system, experiment, lambda _: library, zig, name)
+    run = [tool, "-L", ARM_LIBRARIES, host] if tool == QEMU else [tool, host]
+    rows, _ = c_host.run_host(run, tmp_path, experiment.full_steps, ["Pid.command"])
+    here = read_result(folder / "native-kind")[1]["Pid.command"]
+    np.testing.assert_allclose(rows[:, 0], here, rtol=0.0, atol=tolerance)

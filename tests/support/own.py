@@ -1,0 +1,92 @@
+"""A component of one file, and variants of its text."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+LAG = '''\
+"""A first-order lag, T dx/dt = u - x, solved exactly.
+
+Its page.
+"""
+
+from __future__ import annotations
+
+from math import expm1
+from typing import Annotated, NamedTuple
+
+from fmus.ports.variable import POSITIVE, Refusal, Variable
+
+__author__ = "Me"
+__version__ = "1.2"
+
+
+class Parameters(NamedTuple):
+    """What may be set."""
+
+    T: Annotated[float, Variable("s", "Time constant", minimum=POSITIVE, tunable=True)] = 0.5
+    x0: Annotated[float, Variable("m", "Initial value")] = 1.0
+
+
+class Inputs(NamedTuple):
+    """What it follows."""
+
+    u: Annotated[float, Variable("m", "Set point")] = 0.0
+
+
+class State(NamedTuple):
+    """What it remembers."""
+
+    x: float
+
+
+class Outputs(NamedTuple):
+    """What is seen of it."""
+
+    x: Annotated[float, Variable("m", "Value")]
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse what is too far away."""
+    if parameters.x0 > 100.0:
+        raise Refusal("x0 is too far away")
+
+
+def begin(parameters: Parameters) -> tuple[State, Outputs]:
+    """State and outputs at the start."""
+    return State(parameters.x0), Outputs(parameters.x0)
+
+
+def advance(
+    parameters: Parameters, state: State, inputs: Inputs, h: float
+) -> tuple[State, Outputs]:
+    """State and outputs after a step."""
+    x = state.x - (inputs.u - state.x) * expm1(-h / parameters.T)
+    return State(x), Outputs(x)
+'''
+
+
+def write(folder: Path, *changes: tuple[str, str], name: str = "own_lag") -> Path:
+    """The script in a folder, with some words of it changed."""
+    text = LAG
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    path = folder / f"{name}.py"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def imported(
+    patch: pytest.MonkeyPatch, folder: Path, *changes: tuple[str, str], name: str = "own_lag"
+) -> ModuleType:
+    """The module of the script, imported anew."""
+    write(folder, *changes, name=name)
+    patch.syspath_prepend(folder)
+    patch.delitem(sys.modules, name, raising=False)
+    return import_module(name)

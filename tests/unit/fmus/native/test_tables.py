@@ -1,0 +1,60 @@
+"""The tables of ports and of the state in C, for what the components of the bundle do not have."""
+
+from __future__ import annotations
+
+import re
+
+from fmus.native.tables import names_of_choices, tables
+from fmus.ports.port import setting
+from support.all_types import build
+
+
+def row_of(name: str) -> list[str]:
+    """What stands in the table of ports after a name."""
+    [row] = re.findall(rf'    {{"{re.escape(name)}", (.*)}},\n', tables(build.definition()))
+    return row.split(", ")
+
+
+def test_parameters_lie_in_the_structures_of_the_equations():
+    places = {
+        "K[2,1]": "model.K.v[1].v[0]",
+        "offset[3]": "model.offset.v[2]",
+        "limits.default": "model.limits.default_",
+        "mixed.n": "model.mixed.m0",
+        "mixed.x": "model.mixed.m1",
+        "mode": "model.mode",
+    }
+    for name, place in places.items():
+        assert row_of(name)[3] == f"PARAMETER_AT({place})"
+
+
+def test_reals_lie_before_all_others_in_the_order_of_their_ports():
+    inputs = sorted(("k", "u", "go", "v[1]", "A[2,2]", "pair[2]"), key=lambda it: row_of(it)[3])
+    assert {name: int(row_of(name)[3]) for name in inputs} == {
+        "u": 0, "v[1]": 1, "A[2,2]": 7, "k": 8, "go": 9, "pair[2]": 11,
+    }  # fmt: skip
+    assert (row_of("x")[3], row_of("n")[3], row_of("fault")[3]) == ("0", "11", "0")
+
+
+def test_inputs_start_with_values_in_ranges():
+    assert row_of("k")[4:7] == ["3.0", "-5.0", "2147483647.0"]
+    assert row_of("go")[4] == "1.0"
+
+
+def test_members_of_enumerations_are_choices_of_texts_and_states():
+    text = tables(build.definition())
+    members = '{{"OFF", 0}, {"HEAT", 2}, {"COOL", -7}};'
+    for name in ("choices_of_mode", "choices_of_limits_kind", "members_0"):
+        assert f"static const choice {name}[] = {members}" in text
+    assert row_of("limits.kind")[-2:] == ["choices_of_limits_kind", "3"]
+    assert '{INTEGER, 1, "Mode", members_0, 3}, {REAL, 9, NULL' in text
+
+
+def test_choices_of_two_ports_whose_names_differ_in_a_dot_are_two_tables():
+    """A name in C has none."""
+    ports = [setting(name, "a", "Choice", {"a": 0}) for name in ("kind.x", "kind_x", "kind")]
+    assert names_of_choices(ports) == {
+        "kind.x": "choices_of_kind_x",
+        "kind_x": "choices_of_kind_x_",
+        "kind": "choices_of_kind",
+    }

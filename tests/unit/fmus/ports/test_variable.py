@@ -1,0 +1,242 @@
+"""Ports follow from the fields of a class, and mistakes are named with class and field."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, Any, NamedTuple
+
+import pytest
+
+from auv_fmu.linear_algebra import Matrix, Vector
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import Misdeclared, Port
+from fmus.ports.variable import POSITIVE, Variable, declared, ports_in
+
+
+class Mode(IntEnum):
+    OFF = 0
+    SLOW = 3
+    FAST = 5
+
+
+METRES = Variable("m", "Place")
+PLAIN = Variable(description="Some")
+
+
+def made(**fields: Any) -> Any:
+    """A class `Fields` with fields, each a type or a type and a default value."""
+    types = {name: it[0] if isinstance(it, tuple) else it for name, it in fields.items()}
+    defaults = {name: it[1] for name, it in fields.items() if isinstance(it, tuple)}
+    cls: Any = NamedTuple("Fields", [*types.items()])
+    cls.__new__.__defaults__ = tuple(defaults.values())
+    cls._field_defaults = defaults
+    return cls
+
+
+def ports(causality: str, **fields: Any) -> list[Port]:
+    found = declared(made(**fields), causality)
+    return [port for field in found.values() for port in ports_in(field)]
+
+
+def test_a_float_is_a_real_with_unit_bounds_and_start():
+    said = Variable("s", "Time constant", minimum=POSITIVE, maximum=9.0, tunable=True)
+    assert ports("parameter", T=(Annotated[float, said], 2)) == [
+        Port(
+            "T", "parameter", "tunable", "Real", "Time constant", "s", 2.0,
+            minimum=POSITIVE, maximum=9.0,
+        )
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("hint", "start", "kind", "zero"),
+    [(int, 3, "Integer", 0), (bool, True, "Boolean", False), (float, 1.5, "Real", 0.0)],
+)
+def test_numbers_have_the_types_of_fmi(hint, start, kind, zero):
+    [port] = ports("input", u=(Annotated[hint, PLAIN], start))
+    assert (port.type, port.start) == (kind, start)
+    assert port.variability == ("continuous" if hint is float else "discrete")
+    assert port.unit == ("1" if hint is float else None)
+    [port] = ports("input", u=Annotated[hint, PLAIN])
+    assert (port.start, type(port.start)) == (zero, type(zero))
+    [port] = ports("output", u=Annotated[hint, PLAIN])
+    assert (port.type, port.start) == (kind, None)
+
+
+def test_an_enumeration_is_chosen_by_name_and_seen_as_a_number():
+    [port] = ports("parameter", mode=(Annotated[Mode, PLAIN], Mode.SLOW))
+    assert (port.type, port.start) == ("String", "SLOW")
+    assert port.choices == {"OFF": Mode.OFF, "SLOW": Mode.SLOW, "FAST": Mode.FAST}
+    [port] = ports("output", mode=Annotated[Mode, PLAIN])
+    assert (port.type, port.start, port.minimum) == ("Integer", None, None)
+    [port] = ports("input", mode=Annotated[Mode, PLAIN])
+    assert (port.type, port.start, port.minimum, port.maximum) == ("Integer", 0, 0, 5)
+
+
+@pytest.mark.parametrize(
+    ("hint", "names"),
+    [
+        (Annotated[Vector, 2, METRES], ["p[1]", "p[2]"]),
+        (Annotated[tuple[float, float], METRES], ["p[1]", "p[2]"]),
+        (Annotated[Vector, 2, Variable("m", "Place", members=("x", "z"))], ["p.x", "p.z"]),
+        (Annotated[Matrix, 2, 2, METRES], ["p[1,1]", "p[1,2]", "p[2,1]", "p[2,2]"]),
+        (
+            Annotated[tuple[tuple[int, int], tuple[int, int]], PLAIN],
+            ["p[1,1]", "p[1,2]", "p[2,1]", "p[2,2]"],
+        ),
+        (Annotated[Vector, 1, METRES], ["p[1]"]),
+    ],
+)
+def test_elements_have_numbers_or_names(hint, names):
+    found = ports("input", p=hint)
+    assert [port.name for port in found] == names
+    labels = [name[1:].strip("[].") for name in names]
+    text = "Some" if "int" in str(hint) else "Place"
+    assert [port.description for port in found] == [f"{text}: {label}" for label in labels]
+
+
+def test_elements_start_with_those_of_the_default_value():
+    rows = Matrix(((1.0, 2.0), (3.0, 4.0)))
+    found = ports("parameter", K=(Annotated[Matrix, 2, 2, METRES], rows))
+    assert [port.start for port in found] == [1.0, 2.0, 3.0, 4.0]
+
+
+class Gains(NamedTuple):
+    k: Annotated[float, PLAIN] = 1.0
+    v: Annotated[tuple[float, float], PLAIN] = (2.0, 3.0)
+
+
+def test_a_class_in_a_class_is_a_group_with_its_own_start_values():
+    field = declared(made(gains=(Gains, Gains(k=5.0))), "parameter")["gains"]
+    assert isinstance(field, ParameterSet)
+    assert {port.name: port.start for port in field.ports} == {
+        "gains.k": 5.0, "gains.v[1]": 2.0, "gains.v[2]": 3.0,
+    }  # fmt: skip
+    assert field.of({"gains.k": 7.0, "gains.v[1]": 8.0, "gains.v[2]": 9.0}) == Gains(
+        7.0, (8.0, 9.0)
+    )
+    assert [port.start for port in ports("parameter", gains=Gains)] == [1.0, 2.0, 3.0]
+
+
+def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
+    fields = made(
+        a=Annotated[float, PLAIN],
+        b=Annotated[float, Variable(feedthrough=())],
+        c=Annotated[float, Variable(feedthrough=("u",))],
+    )
+    found = declared(fields, "output", ("u", "v"))
+    assert [port.feedthrough for field in found.values() for port in ports_in(field)] == [
+        ("u", "v"), (), ("u",),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("causality", "field", "why"),
+    [
+        (
+            "input",
+            float,
+            'has no unit and no description; write p: Annotated[float, Variable("m", "Wh',
+        ),
+        ("input", Vector, "has no unit and no description; write p: Annotated[Vector, 3, Variable"),
+        (
+            "input",
+            Annotated[Vector, METRES],
+            "is a Vector without its size; write Annotated[Vector, 3, Variable(...)]",
+        ),
+        (
+            "input",
+            Annotated[Matrix, 2, METRES],
+            "is a Matrix without its size; write Annotated[Matrix, 2, 3, Variable(...)]",
+        ),
+        ("input", Annotated[Vector, 0, METRES], "is a Vector without its size"),
+        (
+            "input",
+            Annotated[str, METRES],
+            "has the type str; use float, int, bool, an IntEnum, a tuple of them, Ve",
+        ),
+        ("input", Annotated[list[float], METRES], "has the type list[float]; use float"),
+        (
+            "input",
+            Annotated[tuple[float, int], METRES],
+            "has elements of several types; write a NamedTuple",
+        ),
+        ("input", Annotated[int, METRES], "is of the type int; only a float has a unit"),
+        (
+            "input",
+            Annotated[Vector, 3, Variable(members=("x", "y"))],
+            "has 2 members for 3 numbers",
+        ),
+        ("input", Annotated[float, Variable(members=("x",))], "has 1 members for one numbers"),
+        (
+            "input",
+            Annotated[float, Variable(tunable=True)],
+            "is no parameter, and tunable is for parameters",
+        ),
+        (
+            "input",
+            Annotated[float, Variable(feedthrough=())],
+            "is no output, and feedthrough is for outputs",
+        ),
+        (
+            "output",
+            Annotated[float, Variable(feedthrough="u")],
+            "has the feedthrough u; write a tuple of names",
+        ),
+        (
+            "output",
+            Annotated[float, Variable(minimum=0.0)],
+            "is an output; minimum and maximum are for inputs and parameters",
+        ),
+        (
+            "parameter",
+            Annotated[float, METRES],
+            "has no default value, which a parameter starts with",
+        ),
+        ("input", (Annotated[float, METRES], "x"), "starts with p = 'x': must be a Real"),
+        ("input", (Annotated[float, METRES], None), None),
+        ("input", (Annotated[int, PLAIN], 1.5), "starts with p = 1.5: must be a Integer"),
+        ("input", (Annotated[float, METRES], float("nan")), "starts with p = nan: must be finite"),
+        (
+            "parameter",
+            (Annotated[float, Variable(minimum=1.0)], 0.0),
+            "starts with p = 0: must be at least 1",
+        ),
+        ("input", Annotated[float, Variable(minimum=1.0)], "starts with p = 0: must be at least 1"),
+        (
+            "parameter",
+            (Annotated[Vector, 2, METRES], Vector((1.0,))),
+            "starts with (1.0,), which has not 2 elements",
+        ),
+        (
+            "parameter",
+            (Annotated[Vector, 2, METRES], 1.0),
+            "starts with 1.0, which has not 2 elements",
+        ),
+        ("parameter", (Annotated[Mode, PLAIN], 3), "starts with 3, which is no Mode"),
+        ("parameter", (Gains, 3), "starts with 3, which is no Gains"),
+    ],
+)
+def test_mistakes_are_named(causality, field, why):
+    if why is None:
+        assert ports(causality, p=field)[0].start == 0.0
+        return
+    with pytest.raises(Misdeclared) as caught:
+        ports(causality, p=field)
+    assert str(caught.value).startswith(f"Fields.p {why}")
+    assert caught.value.place == ("Fields", "p")
+
+
+def test_a_class_of_another_kind_is_refused():
+    class Inputs:
+        pass
+
+    with pytest.raises(Misdeclared, match=r"^Inputs is no NamedTuple; write class Inputs\(NamedT"):
+        declared(Inputs, "input")
+
+
+def test_a_type_that_is_not_known_is_named_with_its_field():
+    cls = made(u=Annotated[float, METRES], v=float)
+    cls.__annotations__ = {"u": "float", "v": "Annotate[float, 3]"}
+    with pytest.raises(Misdeclared, match=r"^Fields\.v has a type .*: name 'Annotate' is not def"):
+        declared(cls, "input")

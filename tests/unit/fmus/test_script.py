@@ -1,0 +1,185 @@
+"""What the user names is found, taken for what it is, and its mistakes are told by line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from fmus.build import main
+from fmus.compilers import machines_compiler
+from fmus.discovery import source_of
+from fmus.script import is_component, script_in, source_of_script
+from support.own import write
+
+SLAVE = "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    pass\n"
+
+
+def built(*arguments: object) -> tuple[int, str]:
+    """How a build ends that is a process of its own, and what it says."""
+    process = subprocess.run(
+        [sys.executable, "-P", "-m", "fmus.build", *map(str, arguments)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    return process.returncode, process.stderr.strip()
+
+
+def test_a_file_or_a_folder_of_its_name_is_a_script(tmp_path):
+    folder = tmp_path / "own_lag"
+    folder.mkdir()
+    path = write(folder)
+    assert script_in(path) == path
+    assert script_in(folder) == path
+
+
+@pytest.mark.parametrize("name", ["own.txt", "nothing.py", "folder"])
+def test_anything_else_is_none(tmp_path, name):
+    (tmp_path / "own.txt").touch()
+    (tmp_path / "folder").mkdir()
+    why = f"{name}: no such Python file"
+    if name == "folder":
+        why = r"folder: has neither folder\.py nor all of __init__\.py, ports\.py, behaviour\.py"
+    with pytest.raises(ValueError, match=why):
+        script_in(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("text", "answer"),
+    [
+        (SLAVE, False),
+        ("", False),
+        ("def begin():\n    pass\n", True),
+        ("from other import begin, advance\n", True),
+        ("class A:\n    def advance(self):\n        pass\n", False),
+        ("def f(:\n", True),
+    ],
+)
+def test_functions_make_a_component(tmp_path, text, answer):
+    (tmp_path / "own.py").write_text(text)
+    assert is_component(tmp_path / "own.py") == answer
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("json", "json is already a module of Python; choose another name"),
+        ("fmus", "fmus is already a module of Python; choose another name"),
+        ("my-law", "my-law is not a name for a component; use letters, digits and underscores"),
+        ("2nd", "2nd is not a name for a component"),
+        ("lambda", "lambda is not a name for a component"),
+        ("_own", "_own is not a name for a component"),
+    ],
+)
+def test_names_that_no_module_can_have_are_refused(tmp_path, name, why):
+    path = write(tmp_path, name=name)
+    with pytest.raises(ValueError, match=f"{name}.py: {why}"):
+        source_of_script(path)
+
+
+@pytest.mark.parametrize(("stem", "name"), [("own_lag", "OwnLag"), ("ownLag", "OwnLag")])
+def test_source_has_name_page_and_root(tmp_path, monkeypatch, stem, name):
+    monkeypatch.setattr(sys, "path", [*sys.path])
+    monkeypatch.delitem(sys.modules, stem, raising=False)
+    source = source_of_script(write(tmp_path, name=stem))
+    assert (source.name, source.modules, source.root) == (name, (stem,), tmp_path.resolve())
+    assert source.page == (
+        f"# {name}\n\nA first-order lag, T dx/dt = u - x, solved exactly.\n\nIts page."
+    )
+    assert source_of("AuvPlant").root is None
+
+
+#: Mistakes: what is changed, and what is said.
+MISTAKES = {
+    "field": (
+        ('u: Annotated[float, Variable("m", "Set point")]', "u: float"),
+        "own_lag.py:27: Inputs.u has no unit and no description; write u: Annotated[float, ",
+    ),
+    "class": (
+        ("state: State, inputs: Inputs", "state: State"),
+        "own_lag.py:24: Inputs is there, but no hook takes inputs",
+    ),
+    "hook": (("h: float", "dt: float"), "own_lag.py:53: own_lag.advance takes dt, which is not"),
+    "missing": (("def begin", "def _begin"), "own_lag.py: own_lag has no begin"),
+    "import": (
+        ("from math", "from maths"),
+        "own_lag.py:8: ModuleNotFoundError: No module named 'maths'",
+    ),
+    "module": (("__version__ =", "__version__ = 1 / 0 #"), "own_lag.py:14: ZeroDivisionError: div"),
+    "syntax": (("x = state.x", "x = = state.x"), "own_lag.py:57: SyntaxError: invalid syntax"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_mistakes_are_told_with_file_and_line(tmp_path, monkeypatch, mistake):
+    change, why = MISTAKES[mistake]
+    write(tmp_path, change)
+    monkeypatch.chdir(tmp_path)
+    status, said = built("own_lag.py", "--out", tmp_path)
+    assert status == 2
+    assert said.startswith(why)
+    assert "\n" not in said
+
+
+def test_a_mistake_in_a_module_beside_is_told_with_its_line(tmp_path):
+    path = write(tmp_path, ("from math import expm1", "from beside import expm1"))
+    (tmp_path / "beside.py").write_text("from math import expm1\n\n1 / 0\n")
+    status, said = built(path, "--out", tmp_path)
+    assert (status, said) == (2, f"{tmp_path}/beside.py:3: ZeroDivisionError: division by zero")
+
+
+def test_what_is_outside_the_language_is_told_when_it_is_to_become_c(tmp_path, monkeypatch):
+    write(tmp_path, ("x = state.x -", "x = state.x ** 2 -"))
+    monkeypatch.chdir(tmp_path)
+    status, said = built("own_lag.py", "--kind", "native", "--out", tmp_path)
+    why = "own_lag.py:57: the operator Pow is not in the language of equations; write a product"
+    assert (status, said[: len(why)]) == (2, why)
+    assert built("own_lag.py", "--out", tmp_path) == (0, "")
+
+
+@pytest.mark.parametrize("options", [[], ["--fmi", "3"]])
+def test_a_slave_of_pythonfmu_runs_only_in_python(tmp_path, options):
+    path = tmp_path / "own_slave.py"
+    path.write_text(SLAVE)
+    assert built(path, "--kind", "native", *options, "--out", tmp_path) == (
+        2,
+        f"{path}: a slave of PythonFMU runs only in Python; use --kind python, or write it as a "
+        "component (auv-fmu new component)",
+    )
+
+
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_modules_beside_go_into_both_kinds_and_both_give_the_same_numbers(tmp_path):
+    path = write(tmp_path, ("from math import expm1", "from beside import expm1"))
+    (tmp_path / "beside.py").write_text("from math import expm1\n\n__all__ = ('expm1',)\n")
+    tables = []
+    for kind in ("python", "native"):
+        (tmp_path / kind).mkdir()
+        assert built(path, "--kind", kind, "--out", tmp_path / kind) == (0, "")
+        fmu = str(tmp_path / kind / "OwnLag.fmu")
+        assert fmpy.read_model_description(fmu).description.startswith("A first-order lag")
+        tables.append(
+            fmpy.simulate_fmu(fmu, stop_time=2.0, output_interval=0.1, start_values={"u": 3.0})
+        )
+    assert tables[0].tobytes() == tables[1].tobytes()
+
+
+def test_a_folder_of_two_modules_is_a_component(tmp_path):
+    """As those of the bundle are."""
+    text = (Path(__file__).parents[2] / "fmu/first_order_lag/ports.py").read_text()
+    folder = tmp_path / "first_order_lag"
+    folder.mkdir()
+    (folder / "ports.py").write_text(text.replace("fmus.first_order_lag", "first_order_lag"))
+    for name in ("__init__.py", "behaviour.py", "page.md"):
+        source = Path(__file__).parents[2] / "fmu/first_order_lag" / name
+        (folder / name).write_text(source.read_text())
+    assert built(folder, "--out", tmp_path) == (0, "")
+    assert (tmp_path / "FirstOrderLag.fmu").is_file()
+
+
+def test_main_says_what_cannot_be_built(tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(sys, "argv", ["build", str(tmp_path / "no.py"), "--out", str(tmp_path)])
+    assert main() == 2
+    assert capsys.readouterr().err == f"{tmp_path}/no.py: no such Python file\n"

@@ -1,0 +1,214 @@
+"""Components to begin with are good ones, in both kinds, and are built again when they change."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fmpy
+import pytest
+from fmpy.validation import validate_fmu
+
+from fmus.compilers import machines_compiler
+from fmus.kinds import NATIVE, PYTHON
+from fmus.native.language import foreign
+from orchestrator.commands.main import main
+from orchestrator.machine.errors import InputError
+from orchestrator.runs import own_components
+from orchestrator.runs.own_components import (
+    LIKENESSES,
+    build_own,
+    changes,
+    new_component,
+    new_controller,
+)
+from support.own import write
+
+
+@pytest.fixture(params=LIKENESSES)
+def made(request, tmp_path) -> Path:
+    """The script of a component to begin with."""
+    script, *_ = new_component("tiny_thing", tmp_path / "tiny", request.param)
+    return script
+
+
+def test_files_bear_the_name_and_no_other(made: Path):
+    assert {path.name for path in made.parent.iterdir() if path.name[0] != "."} == {
+        "tiny_thing.py", "test_tiny_thing.py", "tiny_thing.toml", "README.md",
+    }  # fmt: skip
+    for path in made.parent.glob("*.*"):
+        assert "own_" not in path.read_text()
+        assert "OwnComponent" not in path.read_text()
+
+
+def test_its_tests_pass(made: Path):
+    process = subprocess.run(
+        [sys.executable, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider", str(made.parent)],
+        cwd=made.parent, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert process.returncode == 0, process.stdout
+
+
+def test_it_is_in_the_language(made: Path):
+    assert foreign(made) == []
+
+
+def test_no_line_is_longer_than_those_of_the_house(made: Path):
+    for path in made.parent.glob("*.py"):
+        assert max(map(len, path.read_text().splitlines())) <= 100
+
+
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_both_kinds_give_the_same_numbers(made: Path, tmp_path: Path):
+    tables = []
+    for kind in (PYTHON, NATIVE):
+        fmu = build_own(made, tmp_path / kind, kind=kind)
+        assert fmu.name == "TinyThing.fmu"
+        assert validate_fmu(str(fmu)) == []
+        tables.append(
+            fmpy.simulate_fmu(
+                str(fmu), stop_time=5.0, step_size=0.1, output_interval=0.1,
+                start_values={
+                    variable.name: 0.3
+                    for variable in fmpy.read_model_description(fmu).modelVariables
+                    if variable.causality == "input"
+                },
+            )
+        )  # fmt: skip
+    assert tables[0].tobytes() == tables[1].tobytes()
+    assert len(tables[0]) == 51
+
+
+def test_its_scenario_runs(made: Path, capsys):
+    assert main(["build", str(made)]) == 0
+    scenario = made.with_suffix(".toml")
+    assert main(["check", str(scenario)]) == 0
+    assert main(["run", str(scenario), "--out", str(made.parent / "results")]) == 0
+    assert (made.parent / "results/result.csv").is_file()
+    assert "tiny_thing: t = " in capsys.readouterr().err
+
+
+def test_its_check_finds_nothing(made: Path, capsys):
+    assert main(["check", str(made)]) == 0
+    assert capsys.readouterr().out == f"{made}: no problems found\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("my-law", "'my-law': not a name for a component; use letters, digits and underscores"),
+        ("json", "'json': json is already a module of Python; choose another name"),
+    ],
+)
+def test_names_that_cannot_be_are_refused(tmp_path, name, why):
+    with pytest.raises(InputError, match=why):
+        new_component(name, tmp_path / "it")
+    with pytest.raises(InputError, match=why.replace("component", "controller")):
+        new_controller(name, tmp_path / "it")
+
+
+def test_a_folder_that_is_not_empty_is_left_alone(tmp_path):
+    (tmp_path / "mine").touch()
+    with pytest.raises(InputError, match="is not empty; choose a new or empty folder"):
+        new_component("own_thing", tmp_path)
+
+
+def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "component", "WaterTank", "--like", "plant"]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "WaterTank/water_tank.py",
+        "WaterTank/test_water_tank.py",
+        "WaterTank/water_tank.toml",
+        "WaterTank/README.md",
+        "edit WaterTank/water_tank.py, then test, build and run it:",
+        "  pytest WaterTank/test_water_tank.py",
+        "  auv-fmu build WaterTank/water_tank.py",
+        f"  auv-fmu run WaterTank/water_tank.toml --out WaterTank{os.sep}results",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["build", "none.py"], "none.py: no such Python file"),
+        (["build", "."], "has neither"),
+        (["build", "--watch"], "--watch is for your own component: name its script"),
+        (["check", "none.py"], "none.py: no such Python file"),
+        (
+            ["build", "own_lag.py", "--kind", "native", "--loader", "plain"],
+            "own_lag.py: --loader is for --kind python: the other kind loads no Python",
+        ),
+        (
+            ["build", "own_lag.py", "--fmi", "3"],
+            "own_lag.py: --platforms and --fmi 3 need --kind native",
+        ),
+        (
+            ["build", "slave.py", "--kind", "native"],
+            "use --kind python, or write it as",
+        ),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_line(tmp_path, monkeypatch, capsys, arguments, why):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path)
+    (tmp_path / "slave.py").write_text("class Own:\n    pass\n")
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert why in said
+
+
+def test_check_lists_problems(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, ("x = state.x -", "x = state.x ** 2 -"))
+    assert main(["check", "own_lag.py"]) == 2
+    assert capsys.readouterr().out == (
+        "problem: own_lag.py:57: the operator Pow is not in the language of equations; write a "
+        "product, x * x, or math.pow\n"
+    )
+
+
+def test_changes_are_seen_in_the_script_and_beside_it(tmp_path, monkeypatch):
+    monkeypatch.setattr(own_components, "_INTERVAL", 0.01)
+    script = write(tmp_path)
+    (tmp_path / "package").mkdir()
+    seen = changes(script)
+    next(seen)
+    for path in (script, tmp_path / "beside.py", tmp_path / "package/in.py"):
+        path.write_text(f"x = '{path.name}'\n")
+        next(seen)
+    (tmp_path / "beside.py").unlink()
+    next(seen)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has no SIGINT for one process")
+def test_watch_builds_again_until_the_user_ends_it(tmp_path):
+    script = write(tmp_path)
+    with subprocess.Popen(
+        [sys.executable, "-P", "-m", "orchestrator", "build", "own_lag.py", "--watch"],
+        cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    ) as process:  # fmt: skip
+        assert process.stdout is not None and process.stderr is not None
+        assert process.stdout.readline().startswith("OwnLag.fmu, ")
+        first = (tmp_path / "OwnLag.fmu").read_bytes()
+        write(tmp_path, ("] = 0.5", "] = 0.7"))
+        assert process.stdout.readline().startswith("OwnLag.fmu, ")
+        assert (tmp_path / "OwnLag.fmu").read_bytes() != first
+        script.write_text("def begin(\n")
+        assert process.stderr.readline().startswith("auv-fmu: own_lag.py:1: ")
+        time.sleep(0.3)
+        process.send_signal(signal.SIGINT)
+        assert process.wait() == 130
+        assert process.stderr.read() == "auv-fmu: interrupted\n"
+
+
+def test_a_folder_is_built_in_itself(tmp_path):
+    folder = tmp_path / "own_lag"
+    folder.mkdir()
+    write(folder)
+    assert build_own(folder) == folder / "OwnLag.fmu"
