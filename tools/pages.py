@@ -45,6 +45,7 @@ from orchestrator.studies.study_file import FigureTable, StudyFile, read_study
 from orchestrator.vehicle.indices import INDICES, Index
 from orchestrator.vehicle.proof import stated
 from parts.command_line import command_line
+from parts.examples import examples
 from parts.gallery import PICTURES, figures, gallery, picture, seen
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -60,6 +61,7 @@ def files() -> dict[Path, str]:
         "gallery.md": gallery(),
         "reference/command-line.md": {"commands": command_line()},
         "reference/components/README.md": {"components": bundle()},
+        "reference/examples.md": examples(),
         "explanation/ready-studies.md": {
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },

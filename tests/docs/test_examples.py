@@ -29,12 +29,13 @@ from support.markdown import DOCS, blocks
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
-ACCURACY, BATCH, EVENTS, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE = (
+ACCURACY, BATCH, EVENTS, EXAMPLES, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE = (
     DOCS / f"{name}.md"
     for name in (
         "explanation/accuracy",
         "explanation/batch",
         "how-to/events",
+        "reference/examples",
         "how-to/change-parameters",
         "how-to/python",
         "reference/scenario-files",
@@ -109,6 +110,17 @@ def test_tests_of_one_fmu_pass_as_the_page_says(native, workplace):
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
     [said] = blocks(TEST_ONE, "text")
     assert said.text.strip() in ended.stdout
+
+
+def test_example_of_a_component_is_built_verified_and_run(workplace):
+    Path("examples").symlink_to(DOCS.parent / "examples")
+    for command in blocks(EXAMPLES, "sh")[0].text.splitlines():
+        program, *arguments = command.split()
+        assert program == "auv-fmu" and main(arguments) == 0
+    [code] = blocks(EXAMPLES, "python")
+    python = [sys.executable, "-c", code.text]
+    ended = subprocess.run(python, capture_output=True, text=True, check=True)
+    assert f"It prints {ended.stdout.strip()}," in EXAMPLES.read_text(encoding="utf-8")
 
 
 def test_tests_that_the_page_names_are_there():
