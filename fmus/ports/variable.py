@@ -29,7 +29,7 @@ class Variable:
     """What a field says of its ports besides name, type and start value.
 
     Attributes:
-        unit: of a float, as :mod:`fmus.ports.units` reads it; "1" for none.
+        unit: of a float, as :mod:`fmus.ports.units` reads it; "1" for none, "" if it is not known.
         description: one line.
         minimum, maximum: inclusive bounds of an input or a parameter.
         tunable: of a parameter: whether it may change during a run.
@@ -238,7 +238,7 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
         variability,
         kind,
         ": ".join(filter(None, (said.description, part.label))),
-        said.unit if kind == "Real" else None,
+        (said.unit or None) if kind == "Real" else None,
         start,
         minimum,
         maximum,

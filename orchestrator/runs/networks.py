@@ -258,13 +258,13 @@ _CLASSES = '''\
 class Inputs(NamedTuple):
     """What the network sees."""
 
-    {inputs}: Annotated[Vector, {n}, Variable("1", "Input of the network")]
+    {inputs}: Annotated[Vector, {n}, Variable("", "Input of the network")]
 
 
 class Outputs(NamedTuple):
     """What it answers."""
 
-    {outputs}: Annotated[Vector, {m}, Variable("1", "Output of the network")]
+    {outputs}: Annotated[Vector, {m}, Variable("", "Output of the network")]
 
 
 def begin(inputs: Inputs) -> Outputs:

@@ -12,7 +12,7 @@ from fmus.script import script_in, source_of_script
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 #: The names of all examples.
-NAMES = sorted(path.stem for path in EXAMPLES.glob("*/*.py"))
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*/*.py") if path.stem == path.parent.name)
 
 
 def source(name: str) -> Source:
