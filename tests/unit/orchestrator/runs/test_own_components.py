@@ -119,16 +119,16 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path):
 
 def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert main(["new", "component", "WaterTank", "--like", "plant"]) == 0
+    assert main(["new", "component", "RainBarrel", "--like", "plant"]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "WaterTank/water_tank.py",
-        "WaterTank/test_water_tank.py",
-        "WaterTank/water_tank.toml",
-        "WaterTank/README.md",
-        "edit WaterTank/water_tank.py, then test, build and run it:",
-        "  pytest WaterTank/test_water_tank.py",
-        "  auv-fmu build WaterTank/water_tank.py",
-        f"  auv-fmu run WaterTank/water_tank.toml --out WaterTank{os.sep}results",
+        "RainBarrel/rain_barrel.py",
+        "RainBarrel/test_rain_barrel.py",
+        "RainBarrel/rain_barrel.toml",
+        "RainBarrel/README.md",
+        "edit RainBarrel/rain_barrel.py, then test, build and run it:",
+        "  pytest RainBarrel/test_rain_barrel.py",
+        "  auv-fmu build RainBarrel/rain_barrel.py",
+        f"  auv-fmu run RainBarrel/rain_barrel.toml --out RainBarrel{os.sep}results",
     ]
 
 
