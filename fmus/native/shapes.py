@@ -23,6 +23,8 @@ _TAKEN = frozenset(
         # of C++, which some compile these sources with, and macros of some compilers
         "bool", "catch", "delete", "friend", "linux", "namespace", "new", "operator", "private",
         "protected", "public", "template", "this", "throw", "unix", "using", "virtual",
+        # macros and types of the headers
+        "EOF", "Error", "HUGE_VAL", "INFINITY", "INT_MAX", "INT_MIN", "M_PI", "NAN", "NULL",
         # what functions call or are given
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
         "cosh", "error", "exp", "expm1", "fabs", "floor", "fmod", "isfinite", "isinf", "isnan",

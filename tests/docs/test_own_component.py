@@ -78,7 +78,9 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
                 if "policy.onnx" in line:
                     network(folder / "policy.onnx")
                 assert main(shlex.split(line)[1:]) == 0, line
+    # Others have components of this name, too.
     sys.path[:] = before
+    sys.modules.pop("pid")
     return folder, said.getvalue()
 
 

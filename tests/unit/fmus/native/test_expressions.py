@@ -278,7 +278,7 @@ CONSTRUCTS = {
     ),
     "names of C": (
         "def f(double: float, error: int, int_: float) -> float:\n"
-        "    switch, sin = double / int_, 1.0\n    register = switch + sin\n"
+        "    switch, sin, NAN = double / int_, 1.0, 0.5\n    register = switch + sin * NAN\n"
         "    return register * error\n"
     ),
 }  # fmt: skip
