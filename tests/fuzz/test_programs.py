@@ -10,26 +10,19 @@ from pathlib import Path
 import pytest
 
 from fmus.compilers import machines_compiler
-from fuzz.programs import BATCH, Program, same, tried
+from fuzz.programs import Program, same, tried
 from support.hosts import GCC
 from support.language import TOO_LARGE, Answer
 
 #: Seeds of CI: those of the night come after them.
-FEW, MORE = range(40), range(1000, 1100)
+FEW = range(40)
 
 needs_compiler = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
 
 @needs_compiler
 def test_programs_do_the_same_in_both_languages():
-    assert list(tried(FEW, (str(machines_compiler()), "-O0"))) == []
-
-
-@needs_compiler
-@pytest.mark.slow
-@pytest.mark.parametrize("start", MORE[::BATCH])
-def test_more_programs_do_the_same_in_both_languages(start: int):
-    assert list(tried(range(start, start + BATCH), (str(machines_compiler()), "-O2"))) == []
+    assert list(tried(FEW, (str(machines_compiler()), "-O2"))) == []
 
 
 @pytest.mark.slow
@@ -43,11 +36,11 @@ def test_sanitizers_find_nothing_in_them():
         "--seed",
         "2000",
         "--runs",
-        "100",
+        "25",
     ]
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
     process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert process.stdout == "40 programs, 0 of them differ\n", process.stderr
+    assert process.stdout == "25 programs, 0 of them differ\n", process.stderr
 
 
 def test_a_seed_is_a_program_and_one_that_differs_would_be_seen():

@@ -324,7 +324,7 @@ def test_python_and_c_agree_bit_for_bit(
     types = sizes_of(both.functions[function])
 
     @given(st.tuples(*(KINDS[shape.word] for shape in types)))
-    @settings(max_examples=60, deadline=None)
+    @settings(max_examples=40, deadline=None)
     def agree(numbers: tuple[float, ...]) -> None:
         python, c = both.python(function, numbers), both.c(function, numbers)
         if c.error == TOO_LARGE:
