@@ -30,13 +30,13 @@ from fmus.native.shapes import (
     Shape,
     Structure,
     has_no_size,
-    hints_of,
     in_c,
     matrix,
     shape_of,
     structure,
     vector,
 )
+from fmus.ports.groups import hints_of
 
 #: Functions that never raise, and arithmetic.h's for the others.
 _PLAIN: dict[Any, str] = {
@@ -193,7 +193,7 @@ class Calls(Operators):
             rows = [self._as_row(given, part) for part in parts]
         if len({row.shape for row in rows}) != 1:
             raise self.fail(node, "a Matrix of rows of different lengths")
-        return self.literal(matrix(len(rows), len(arrays_parts(rows[0]))), rows)
+        return self.literal(matrix(len(rows), *arrays.sizes(rows[0].shape)), rows)
 
     def _array_of(self, node: ast.AST, made: Any, codes: Sequence[Code]) -> Structure:
         if made is tuple:
@@ -246,19 +246,18 @@ class Calls(Operators):
         self.program.defined(shape)
         inner.made.returns = shape
         lines += laid_out(f"elements.v[place++] = {element.text};", " " * 8)
-        given = [f"{s.name} {in_c(n)}" for n, s in inner.made.arguments.items()]
-        given += ["Error *error"] if inner.made.raises else []
-        head = f"static {shape.name} {inner.made.name}({', '.join(given) or 'void'}) {{"
-        inner.made.text = "\n".join(
-            [*laid_out(head, ""), f"    {shape.name} elements;", "    int place = 0;", *lines,
-             "    }", "    return elements;", "}"]
-        )  # fmt: skip
+        begin = [
+            *laid_out(inner.made.head, ""),
+            f"    {shape.name} elements;",
+            "    int place = 0;",
+        ]
+        inner.made.text = "\n".join([*begin, *lines, "    }", "    return elements;", "}"])
         self.program.functions[inner.made.name] = inner.made
         return self.calling(inner.made, [in_c(name) for name in captured])
 
     def _comprehended(self, node: ast.AST, made: Any, element: Code, n: int) -> Structure:
         if made is Matrix:
-            return matrix(n, len(arrays_parts(element)))
+            return matrix(n, *arrays.sizes(element.shape))
         if made is tuple:
             return structure([element.shape] * n)
         return self._array_of(node, Vector, [element] * n)
@@ -370,9 +369,3 @@ class Calls(Operators):
         if [code.shape for code in codes] != list(wanted):
             raise self.fail(node, f"arguments that do not match {ast.unparse(node.func)}")
         return [code.text for code in codes]
-
-
-def arrays_parts(code: Code) -> Sequence[Any]:
-    """The elements of a vector."""
-    assert isinstance(code.shape, Structure)
-    return code.shape.parts

@@ -7,7 +7,7 @@ import inspect
 import math
 import re
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from functools import cache
 from itertools import count
@@ -102,6 +102,19 @@ class Expressions:
         if not isinstance(code.shape, Structure):
             raise self.fail(node, "a number is taken apart")
         return [Code(f"{code.text}{suffix}", part) for suffix, part in code.shape.parts]
+
+    def taken_apart(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
+        """The names in a target, each with its part of a value."""
+        if isinstance(target, ast.Name):
+            if target.id != "_":
+                yield target.id, code
+            return
+        assert isinstance(target, ast.Tuple)
+        parts = self.parts(target, code)
+        if len(parts) != len(target.elts):
+            raise self.fail(target, f"{len(target.elts)} names for {len(parts)} values")
+        for one, part in zip(target.elts, parts):
+            yield from self.taken_apart(one, part)
 
     def known(self, node: ast.expr) -> Any:
         """What a name of a module stands for; None: it is a local one, or an expression."""
@@ -241,6 +254,12 @@ class Expressions:
         return Code(text, parts[0][1])
 
     def _slice(self, node: ast.Subscript, places: ast.Slice, code: Code) -> Code:
+        parts = self._sliced(node, places, code)
+        made = vector(len(parts)) if arrays.is_array(code.shape) else None
+        return self.literal(made or structure([part.shape for part in parts]), parts)
+
+    def _sliced(self, node: ast.Subscript, places: ast.Slice, code: Code) -> list[Code]:
+        """The elements of a constant slice."""
         bounds = [places.lower, places.upper, places.step]
         numbers = [None if bound is None else _constant_of(bound) for bound in bounds]
         known = all(n is not None or bound is None for n, bound in zip(numbers, bounds))
@@ -251,8 +270,7 @@ class Expressions:
         parts = self.parts(node, code)[slice(*numbers)]
         if not parts:
             raise self.fail(node, "a slice without elements")
-        made = vector(len(parts)) if arrays.is_array(code.shape) else None
-        return self.literal(made or structure([part.shape for part in parts]), parts)
+        return parts
 
     # Tuples
 
@@ -279,17 +297,10 @@ class Expressions:
 
     def _starred(self, node: ast.expr) -> list[Code]:
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
-            self._slice(node, node.slice, code := self.code(node.value))
-            places = range(len(self.parts(node, code)))[self._range(node.slice)]
-            return [self.parts(node, code)[place] for place in places]
+            return self._sliced(node, node.slice, self.code(node.value))
         if not is_dotted_name(node):
             raise self.fail(node, "a star before something that has no name")
         return self.parts(node, self.code(node))
-
-    @staticmethod
-    def _range(places: ast.Slice) -> slice:
-        bounds = (places.lower, places.upper, places.step)
-        return slice(*(None if bound is None else _constant_of(bound) for bound in bounds))
 
     def _dict(self, node: ast.Dict, wanted: Shape | None) -> Code:
         if not isinstance(wanted, Structure):

@@ -23,6 +23,7 @@ from fmus.native.shapes import (
     TEXT,
     Shape,
     Structure,
+    declared,
     has_no_size,
     in_c,
     shape_of,
@@ -83,12 +84,7 @@ class _Translation:
         body = list(self._block(self._tree.body, INDENT, new=False))
         if self._in_c.assigned is not None and not self._returns_nothing:
             raise self._in_c.fail(self._tree, f"{self._tree.name} may end without a return")
-        arguments = [f"{_declared(shape)}{in_c(name)}" for name, shape in made.arguments.items()]
-        if made.raises:
-            arguments.append("Error *error")
-        returned = "void" if made.returns is None else made.returns.name
-        head = f"static {returned} {made.name}({', '.join(arguments) or 'void'}) {{"
-        lines = [*comment_of(ast.get_docstring(self._tree)), *laid_out(head, ""), *body, "}"]
+        lines = [*comment_of(ast.get_docstring(self._tree)), *laid_out(made.head, ""), *body, "}"]
         made.text = "\n".join(lines)
 
     # Blocks
@@ -136,9 +132,9 @@ class _Translation:
     def _hoisting(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
         """A statement with blocks, after the declarations of what is used after it."""
         inside = set(stored_names(node))
-        declared = set().union(*self._scopes)
+        before = set().union(*self._scopes)
         outside = Counter(loaded_names(self._tree)) - Counter(loaded_names(node))
-        wanted = {name for name in inside - declared if outside[name] > 0}
+        wanted = {name for name in inside - before if outside[name] > 0}
         always = always_stored(node)
         mine = sorted(wanted & always) if always is not None else []
         self._hoisted |= dict.fromkeys(mine)
@@ -148,7 +144,7 @@ class _Translation:
             shape = self._hoisted.pop(name)
             if shape is not None:
                 value = "{0}" if isinstance(shape, Structure) else "0"
-                yield [f"{indent}{_declared(shape)}{in_c(name)} = {value};"]
+                yield [f"{indent}{declared(shape)}{in_c(name)} = {value};"]
         yield lines
 
     def _compound(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
@@ -241,8 +237,8 @@ class _Translation:
 
     def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         if isinstance(target, ast.Name):
-            declared = any(target.id in scope for scope in self._scopes)
-            wanted = self._in_c.local.get(target.id) if declared else None
+            is_old = any(target.id in scope for scope in self._scopes)
+            wanted = self._in_c.local.get(target.id) if is_old else None
             yield self._stored(target, [(target.id, self._in_c.code(value, wanted))])
         elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
             if len(target.elts) != len(value.elts) or _has_star(value):
@@ -267,10 +263,10 @@ class _Translation:
         for i, (_, value) in enumerate(pairs):
             code, name = self._in_c.code(value), self._in_c.unused(f"next_{i}")
             self._in_c.program.defined(code.shape)
-            yield f"const {_declared(code.shape)}{name} = {code.text};"
+            yield f"const {declared(code.shape)}{name} = {code.text};"
             codes.append(Code(name, code.shape))
         for (one, _), code in zip(pairs, codes):
-            for alike in _alike(list(self._taken_apart(one, code))):
+            for alike in _alike(list(self._in_c.taken_apart(one, code))):
                 yield self._stored(target, alike)
 
     def _taken_apart_in(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
@@ -278,9 +274,9 @@ class _Translation:
         if not is_dotted_name(value):
             name = self._name_of_all(target, value)
             self._in_c.program.defined(code.shape)
-            yield f"const {_declared(code.shape)}{in_c(name)} = {code.text};"
+            yield f"const {declared(code.shape)}{in_c(name)} = {code.text};"
             code = Code(in_c(name), code.shape)
-        for alike in _alike(list(self._taken_apart(target, code))):
+        for alike in _alike(list(self._in_c.taken_apart(target, code))):
             yield self._stored(target, alike)
 
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
@@ -291,18 +287,6 @@ class _Translation:
         called = {n.id for n in ast.walk(self._tree) if isinstance(n, ast.Name)}
         taken = name in self._in_c.local or name in called
         return self._in_c.unused(f"{name}_{first}" if taken else name.lstrip("_"))
-
-    def _taken_apart(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
-        if isinstance(target, ast.Name):
-            if target.id != "_":
-                yield target.id, code
-            return
-        assert isinstance(target, ast.Tuple)
-        parts = self._in_c.parts(target, code)
-        if len(parts) != len(target.elts):
-            raise self._in_c.fail(target, f"{len(target.elts)} names for {len(parts)} values")
-        for one, part in zip(target.elts, parts):
-            yield from self._taken_apart(one, part)
 
     def _stored(self, node: ast.AST, values: list[tuple[str, Code]]) -> str:
         """The assignment of values of one type, to names that are new or not."""
@@ -326,7 +310,7 @@ class _Translation:
             self._scopes[-1].add(name)
             self._in_c.local[name] = self._in_c.program.defined(code.shape)
         changes = any(self._assigned[name] > 1 for name, _ in values)
-        return f"{'' if changes else 'const '}{_declared(shape)}{', '.join(stores)};"
+        return f"{'' if changes else 'const '}{declared(shape)}{', '.join(stores)};"
 
     def _other(self, name: str, code: Code) -> str:
         before = self._in_c.local[name]
@@ -379,11 +363,6 @@ def _zero(shape: Shape) -> str:
 
 def _has_star(node: ast.Tuple) -> bool:
     return any(isinstance(element, ast.Starred) for element in node.elts)
-
-
-def _declared(shape: Shape) -> str:
-    """A type before a name."""
-    return shape.name if shape.name.endswith("*") else f"{shape.name} "
 
 
 def _alike(values: list[tuple[str, Code]]) -> Iterator[list[tuple[str, Code]]]:

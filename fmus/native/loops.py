@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from fmus.native.expressions import Code, Expressions, is_dotted_name
@@ -112,7 +111,7 @@ class _Items:
             if called is enumerate:
                 first, second = target.elts
                 bound, count = self.taken(second, iterable.args[0], place)
-                return [*self._bound(first, place), *bound], count
+                return [*self._within.taken_apart(first, place), *bound], count
             if len(target.elts) != len(iterable.args):
                 raise self._within.fail(target, "another number of names than zip has parts")
             pairs = [self.taken(t, i, place) for t, i in zip(target.elts, iterable.args)]
@@ -123,19 +122,7 @@ class _Items:
                 iterable, "a loop over something other than a range, vector or tuple of one type"
             )
         item = Code(f"{code.text}.v[{place.text}]", code.shape.parts[0][1])
-        return list(self._bound(target, item)), len(code.shape.parts)
-
-    def _bound(self, target: ast.expr, code: Code) -> Iterator[tuple[str, Code]]:
-        if isinstance(target, ast.Name):
-            if target.id != "_":
-                yield target.id, code
-            return
-        assert isinstance(target, ast.Tuple)
-        parts = self._within.parts(target, code)
-        if len(parts) != len(target.elts):
-            raise self._within.fail(target, f"{len(target.elts)} names for {len(parts)} values")
-        for one, part in zip(target.elts, parts):
-            yield from self._bound(one, part)
+        return list(self._within.taken_apart(target, item)), len(code.shape.parts)
 
     def _named(self, node: ast.expr, code: Code) -> Code:
         """The same, in a variable if it is no name, or if the body changes what it is made of."""

@@ -19,14 +19,16 @@ from fmus.native.shapes import (
     Scalar,
     Shape,
     declaration,
+    declared,
     has_no_size,
-    hints_of,
+    in_c,
     inner_structures,
     matrix,
     shape_of,
     structure,
     vector,
 )
+from fmus.ports.groups import hints_of
 
 #: What all components share in C.
 RUNTIME = Path(__file__).parent / "runtime"
@@ -54,6 +56,14 @@ class Function:
     returns: Shape | None
     raises: bool = False
     text: str = ""
+
+    @property
+    def head(self) -> str:
+        """Its first line, with the open brace."""
+        given = [f"{declared(shape)}{in_c(name)}" for name, shape in self.arguments.items()]
+        given += ["Error *error"] if self.raises else []
+        returned = self.returns.name if self.returns else "void"
+        return f"static {returned} {self.name}({', '.join(given) or 'void'}) {{"
 
     def call(self, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
@@ -133,9 +143,8 @@ class Program:
         name = c_name(function.__module__, function.__name__)
         if unsized:
             name = "_".join([name, *(shape.name for shape in arguments.values())])
-        known = returns is None or returns is type(None) or not has_no_size(returns)
-        nothing = returns in (None, type(None))
-        shape = self.shape(returns) if known and not nothing else None
+        is_open = returns in (None, type(None)) or has_no_size(returns)
+        shape = None if is_open else self.shape(returns)
         made = Function(self.name(key, name), arguments, shape)
         self._translate(self, function, made)
         self.functions[key] = made
@@ -147,9 +156,9 @@ class Program:
             self.defined(returns)
             raises = "DIV(" in body or "PLACE(" in body
             made = Function(name, arguments, returns, raises)
-            given = [f"{self.defined(shape).name} {a}" for a, shape in arguments.items()]
-            given += ["Error *error"] if made.raises else []
-            made.text = f"static {returns.name} {name}({', '.join(given)}) {{\n{body}\n}}"
+            for shape in arguments.values():
+                self.defined(shape)
+            made.text = f"{made.head}\n{body}\n}}"
             self.functions[name] = made
         return self.functions[name]
 

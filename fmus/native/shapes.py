@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
-from typing import Annotated, Any, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, Union, get_args, get_origin
 
 from auv_fmu import vectors
 from auv_fmu.arrays import Matrix, Vector
+from fmus.ports.groups import hints_of
 
 #: Names that the C of equations has for itself, besides the functions of arithmetic.h.
 _TAKEN = frozenset(
@@ -100,11 +101,6 @@ def in_c(name: str) -> str:
     return f"{name}_" if name in _TAKEN else name
 
 
-def hints_of(owner: Any) -> dict[str, Any]:
-    """Types of the fields of a class, or of the arguments of a function, with what is noted."""
-    return get_type_hints(owner, include_extras=True)
-
-
 def shape_of(hint: Any) -> Shape:
     """What a type is in C.
 
@@ -162,26 +158,17 @@ def structure(items: list[Shape], name: str | None = None) -> Structure:
     return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
 
 
-def count_numbers(shape: Shape) -> int:
-    """How many numbers a shape holds.
-
-    Raises:
-        TypeError: some of them are not doubles.
-
-    """
-    if isinstance(shape, Structure):
-        return sum(count_numbers(part) for _, part in shape.parts)
-    if shape != DOUBLE:
-        raise TypeError(f"{shape.name} among numbers")
-    return 1
-
-
 def inner_structures(shape: Shape) -> Iterator[Structure]:
     """The structures that a structure needs, and itself after them."""
     if isinstance(shape, Structure):
         for _, part in shape.parts:
             yield from inner_structures(part)
         yield shape
+
+
+def declared(shape: Shape) -> str:
+    """A type before a name."""
+    return shape.name if shape.name.endswith("*") else f"{shape.name} "
 
 
 def declaration(shape: Structure) -> str:

@@ -90,12 +90,7 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         "from, and with its tests, a scenario that runs it, and a README.",
         "new component water_tank --like plant",
     )
-    component.add_argument(
-        "name", metavar="NAME", help="name of the component, for example WaterTank or water_tank"
-    )
-    component.add_argument(
-        "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
-    )
+    _add_place(component, "component", "WaterTank or water_tank")
     component.add_argument(
         "--like",
         choices=LIKENESSES,
@@ -120,12 +115,7 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         "Create a folder with a controller, a scenario that runs it, and a README.",
         "new controller my_law --base hardened",
     )
-    controller.add_argument(
-        "name", metavar="NAME", help="name of the controller, for example MyLaw or my_law"
-    )
-    controller.add_argument(
-        "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
-    )
+    _add_place(controller, "controller", "MyLaw or my_law")
     controller.add_argument(
         "--base",
         choices=CONTROLLER_BASES,
@@ -135,6 +125,14 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         f"{CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)
+
+
+def _add_place(parser: argparse.ArgumentParser, what: str, examples: str) -> None:
+    """Declare name and folder of what is new."""
+    parser.add_argument("name", metavar="NAME", help=f"name of the {what}, for example {examples}")
+    parser.add_argument(
+        "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
+    )
 
 
 def add_gains(parser: argparse.ArgumentParser) -> None:

@@ -83,14 +83,11 @@ def read_network(path: Path) -> Network:
         raise InputError(f"{path}: no such file")
     try:
         network = readers[path.suffix](path)
+        _check(network)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
     except Exception as error:
         raise InputError(f"{path}: cannot be read: {reason(error)}") from None
-    try:
-        _check(network)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     return network
 
 

@@ -12,14 +12,15 @@ from enum import IntEnum
 from math import isnan
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import Any, get_type_hints
+from typing import Any
 
 from auv_fmu.arrays import Matrix, Vector
 from fmus.compilers import SAME_NUMBERS
 from fmus.native.functions import function_in_c
 from fmus.native.language import CONSTANTS, MATHEMATICS
 from fmus.native.program import RUNTIME, Function, Program
-from fmus.native.shapes import DOUBLE, Shape, Structure, hints_of, shape_of
+from fmus.native.shapes import DOUBLE, Shape, Structure, shape_of
+from fmus.ports.groups import hints_of
 from fmus.ports.port import Refusal
 
 #: As FMUs are compiled.
@@ -62,11 +63,6 @@ class Answer:
     def bits(self) -> tuple[str, ...]:
         """The numbers by their bits, but for NaN, of which there is one."""
         return tuple("nan" if isnan(x) else float(x).hex() for x in self.numbers)
-
-    @property
-    def kind(self) -> str:
-        """What has been raised, without its text: of two errors C may meet the other one first."""
-        return "raised" if self.error else ""
 
 
 def module_of(text: str, folder: Path, name: str = "own") -> ModuleType:
@@ -207,6 +203,6 @@ def _flat(value: Any) -> list[float]:
 
 def sizes_of(function: FunctionType) -> list[Any]:
     """The types of all numbers that a function takes."""
-    hints = get_type_hints(function, include_extras=True)
+    hints = hints_of(function)
     hints.pop("return")
     return [part for hint in hints.values() for _, part in _leaves(shape_of(hint), "")]
