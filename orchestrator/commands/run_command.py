@@ -24,7 +24,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import describe, say, show
 from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
-from orchestrator.runs.preparation import prepare, with_companion
+from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.result import summary
 from orchestrator.runs.run import run_into
@@ -34,8 +34,8 @@ def add_run(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu run`."""
     describe(
         parser,
-        "Run a scenario, a scenario file, an SSP or an FMU, and write its table, metrics and "
-        "figures. FMUs that are missing are built first.",
+        "Run a scenario, a scenario file, an SSP or an FMU, and write its table, metrics and the "
+        "figures of its vehicles. FMUs that are missing are built first.",
         "run fig4 --stop-time 20 --set plant.noise.std=0",
     )
     add_system(parser)
@@ -63,7 +63,7 @@ def _run(options: argparse.Namespace) -> int:
     for note in findings.notes:
         say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
-    draw = None if files.no_figures else _drawing()
+    draw = None if files.no_figures or not _has_vehicle(runs[0]) else _drawing()
     # Until all is written: a user who stops a run several times wants to know where its rows are.
     with held_interrupts(_answer, is_last=True):
         finished = run_into(folder, runs, files, options.command, say, draw)
@@ -75,6 +75,11 @@ def _run(options: argparse.Namespace) -> int:
         if finished[0].folder != folder:
             say(f"{folder} still holds the earlier, complete result")
     return max(status(run.name, run.ending) for run in finished)
+
+
+def _has_vehicle(prepared: Prepared) -> bool:
+    """Whether there is a vehicle, which all figures show."""
+    return any(loop.vehicle in prepared.system.components for loop in prepared.loops)
 
 
 def _drawing() -> Callable[..., list[str]]:

@@ -227,6 +227,7 @@ print(sorted(sys.modules.keys() & {*unwanted.split(",")}), file=sys.stderr)
     ("arguments", "unwanted"),
     [
         ("run fig4 --kind native --no-figures --stop-time 0.1", "matplotlib"),
+        ("run PdController.fmu --stop-time 0.1", "matplotlib"),
         ("check fig4", "matplotlib"),
         ("check PdController.fmu", "matplotlib,pydantic"),
         ("check study.toml", "matplotlib"),
