@@ -17,6 +17,7 @@ from pathlib import Path
 from shutil import rmtree
 from stat import S_ISDIR
 from tempfile import TemporaryDirectory, gettempdir
+from threading import RLock
 from typing import Any
 from uuid import uuid4
 
@@ -27,6 +28,9 @@ _SEAL = "sha256"
 
 #: How the name of a process's temporary folder begins, and the file that proves it to be one.
 _PREFIX, _MARKER = "auvfmu-", ".auv-fmu.json"
+
+#: Held while that folder is made: threads must not make one each, but a signal may ask for it.
+_MAKING = RLock()
 
 
 def sealed(content: Mapping[str, Any]) -> str:
@@ -117,7 +121,8 @@ def hold_lock(path: Path, wait: bool = False) -> Iterator[None]:
 
 def process_folder() -> Path:
     """The folder for what is not needed after this process; it goes when the process ends."""
-    return Path(_process_folder().name)
+    with _MAKING:
+        return Path(_process_folder().name)
 
 
 @cache

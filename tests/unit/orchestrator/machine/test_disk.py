@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier
 
 import pytest
 
@@ -67,4 +69,24 @@ def test_temporary_folders_of_killed_processes_go_with_the_next(tmp_path: Path, 
     assert ended(forked(work)) == -signal.SIGKILL
     [second] = tmp_path.iterdir()
     assert second != first
+    assert Path(own.name).is_dir()
+
+
+def test_threads_share_one_temporary_folder(tmp_path: Path, monkeypatch):
+    own = disk._process_folder()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+
+    def work() -> None:
+        disk._process_folder.cache_clear()
+        together = Barrier(8)
+
+        def ask(_: int) -> Path:
+            together.wait()
+            return process_folder()
+
+        with ThreadPoolExecutor(8) as pool:
+            assert len({*pool.map(ask, range(8))}) == 1
+        assert len([*tmp_path.iterdir()]) == 1
+
+    assert ended(forked(work)) == 0
     assert Path(own.name).is_dir()
