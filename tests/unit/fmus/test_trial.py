@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import bdb
 from functools import partial
 from math import exp
+from pathlib import Path
+from types import FrameType
 
 import numpy as np
 import pytest
@@ -92,3 +95,19 @@ def test_what_a_component_raises_goes_on_to_the_caller(lag, place):
     with pytest.raises(IndexError) as caught:
         run(own, **ONCE)
     assert caught.traceback[-1].path.name == "own_lag.py"
+
+
+def test_a_debugger_stops_in_each_step_and_sees_the_values(lag):
+    own, seen = lag(), []
+
+    class Debugger(bdb.Bdb):
+        def user_line(self, frame: FrameType) -> None:
+            if self.break_here(frame):
+                seen.append((frame.f_locals["state"].x, frame.f_locals["h"]))
+            self.set_continue()
+
+    lines = Path(own.__file__).read_text().splitlines()
+    debugger = Debugger()
+    debugger.set_break(own.__file__, 1 + lines.index("    return State(x), Outputs(x)"))
+    result = debugger.runcall(run, own, **ONCE)
+    assert seen == [(x, 0.25) for x in result["x"][:-1]]
