@@ -36,6 +36,7 @@ from fmus.native.shapes import (
     structure,
     vector,
 )
+from fmus.native.variables import names_in
 from fmus.ports.groups import hints_of
 
 #: Functions that never raise, and arithmetic.h's for the others.
@@ -78,7 +79,8 @@ class Calls(Operators):
             function, captured = self.functions[local]
             codes = self._arguments(node, list(function.arguments)[: -len(captured) or None])
             given = self._fitted(node, codes, list(function.arguments.values())[: len(codes)])
-            return self.calling(function, [*given, *map(in_c, captured)])
+            names = [ast.copy_location(ast.Name(name, ast.Load()), node) for name in captured]
+            return self.calling(function, [*given, *(self.code(name).text for name in names)])
         called = self.known(node.func)
         if called is None and isinstance(node.func, ast.Attribute):
             return self._method(node, node.func)
@@ -97,11 +99,13 @@ class Calls(Operators):
         """A function of Python's own; None: it is none of them."""
         if not isinstance(called, (type, BuiltinFunctionType)):
             return None
-        if called in (min, max):
-            return self._extreme(node, called.__name__)
+        if called in (min, max, *_PLAIN, *_RAISING, *_OF_ONE):
+            self.check_plain(node, called.__name__)
         arguments = 1 + (called in _TWO)
         if called in (*_PLAIN, *_RAISING, *_OF_ONE) and len(node.args) != arguments:
             raise self.fail(node, f"{called.__name__} with {len(node.args)} arguments")
+        if called in (min, max):
+            return self._extreme(node, called.__name__)
         if called in _PLAIN or called in _RAISING:
             texts = [self.number(argument).argument for argument in node.args]
             self.made.raises |= called in _RAISING
@@ -227,6 +231,8 @@ class Calls(Operators):
             raise self.fail(node, "an expression with more than one for, or with an if")
         inner, captured = self.inside(node, f"each{next(self.numbers)}")
         target = {n.id for n in ast.walk(first.target) if isinstance(n, ast.Name)}
+        for name in sorted(target & names_in(first.iter)):
+            raise self.fail(node, f"{name} is also what it runs over: rename it before the in")
         inner.names |= target
         loop = loop_over(inner, first.target, first.iter, set())
         if loop.turns is None or loop.turns < 1:
@@ -287,6 +293,7 @@ class Calls(Operators):
         assert isinstance(shape, Structure)
         if method.attr == "sum" and len(arrays.sizes(shape)) != 1:
             raise self.fail(node, f"{shape.word} has no method sum")
+        self.check_plain(node, method.attr)
         function = arrays.METHODS[method.attr](self.program, shape)
         _, *wanted = function.arguments.values()
         if len(node.args) != len(wanted):
@@ -333,7 +340,7 @@ class Calls(Operators):
         if wanted == DOUBLE and type(value) is int:
             raise self.fail(node, f"the default value of {name} is an int: write {value}.0")
         if isinstance(value, (float, int)):
-            return Code(number_in_c(value), wanted)
+            return Code(self.written(node, value), wanted)
         text, shape = self.program.constant(made.__module__, f"{made.__name__}_{name}", value)
         if shape != wanted:
             raise self.fail(node, f"the default value of {name} is {shape.word}")

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from fmus.native import arrays
+from fmus.native.layout import quoted
 from fmus.native.program import Function, Program, Untranslatable, number_in_c
 from fmus.native.shapes import (
     BOOLEAN,
@@ -170,6 +171,14 @@ class Expressions:
             raise self.fail(node, f"{what} that is {code.shape.word}, not an int")
         return code
 
+    def check_plain(self, node: ast.Call, word: str) -> None:
+        """Check that a call has arguments by their places only."""
+        if node.keywords:
+            raise self.fail(node, f"{word} with {node.keywords[0].arg or '**'}=")
+        for argument in node.args:
+            if isinstance(argument, ast.Starred):
+                raise self.fail(node, f"{word} with a star")
+
     def calling(self, function: Function, arguments: Sequence[str]) -> Code:
         """A call; what returns nothing is a statement."""
         self.made.raises |= function.raises
@@ -180,10 +189,16 @@ class Expressions:
     def _constant(self, node: ast.Constant, wanted: Shape | None) -> Code:
         value: Any = node.value
         if isinstance(value, str):
-            return Code(f'"{value}"', TEXT)
-        if type(value) is float:
-            return Code(number_in_c(value), DOUBLE)
-        return Code(str(int(value)), BOOLEAN if type(value) is bool else INTEGER)
+            return Code(quoted(value), TEXT)
+        shapes: dict[type, Shape] = {float: DOUBLE, bool: BOOLEAN, int: INTEGER}
+        return Code(self.written(node, value), shapes[type(value)])
+
+    def written(self, node: ast.AST, value: float) -> str:
+        """A number in C."""
+        try:
+            return number_in_c(value)
+        except Untranslatable as error:
+            raise self.fail(node, str(error)) from None
 
     def _name(self, node: ast.Name, wanted: Shape | None) -> Code:
         if node.id not in self.names:
@@ -228,7 +243,7 @@ class Expressions:
     def _subscript(self, node: ast.Subscript, wanted: Shape | None) -> Code:
         code = self.code(node.value)
         if isinstance(node.slice, ast.Slice):
-            return self._slice(node, node.slice, code)
+            return self._cut(node, node.slice, code)
         for place in node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]:
             code = self._element(node, place, code)
         return code
@@ -253,7 +268,7 @@ class Expressions:
         text = f"{code.within(POSTFIX)}.v[PLACE({where.argument}, {len(parts)})]"
         return Code(text, parts[0][1])
 
-    def _slice(self, node: ast.Subscript, places: ast.Slice, code: Code) -> Code:
+    def _cut(self, node: ast.Subscript, places: ast.Slice, code: Code) -> Code:
         parts = self._sliced(node, places, code)
         made = vector(len(parts)) if arrays.is_array(code.shape) else None
         return self.literal(made or structure([part.shape for part in parts]), parts)
@@ -289,13 +304,13 @@ class Expressions:
         codes: list[Code] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                codes += self._starred(node.value)
+                codes += self._unpacked(node.value)
             else:
                 wanted = shapes[len(codes)] if len(codes) < len(shapes) else None
                 codes.append(self.fitting(node, wanted))
         return codes
 
-    def _starred(self, node: ast.expr) -> list[Code]:
+    def _unpacked(self, node: ast.expr) -> list[Code]:
         if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
             return self._sliced(node, node.slice, self.code(node.value))
         if not is_dotted_name(node):

@@ -13,12 +13,13 @@ from types import FunctionType
 from typing import Any
 
 from fmus.native.calls import Calls
-from fmus.native.expressions import WHOLE, Code, is_dotted_name
+from fmus.native.expressions import AND, OR, WHOLE, Code, is_dotted_name
 from fmus.native.language import foreign
-from fmus.native.layout import INDENT, annotated, comment_of, comments_of, laid_out
+from fmus.native.layout import INDENT, annotated, comment_of, comments_of, laid_out, quoted
 from fmus.native.loops import loop_over
 from fmus.native.program import Function, Program, Untranslatable
 from fmus.native.shapes import (
+    BOOLEAN,
     DOUBLE,
     TEXT,
     Shape,
@@ -56,7 +57,7 @@ def function_in_c(program: Program, function: FunctionType, made: Function) -> N
 
     """
     path = str(inspect.getsourcefile(function))
-    [tree] = [
+    *_, tree = [
         node
         for node in _checked(path).body
         if isinstance(node, ast.FunctionDef) and node.name == function.__name__
@@ -161,7 +162,10 @@ class _Translation:
             yield [f"{indent}}}"]
             return
         if isinstance(node, ast.While):
-            yield laid_out(f"while ({self._in_c.condition(node.test).text}) {{", indent)
+            # What it counts may be wrong after an error, and never reach its end.
+            self._made.raises = True
+            condition = self._in_c.condition(node.test).within(AND)
+            yield laid_out(f"while (!error->raised && {condition}) {{", indent)
             before, bound = self._in_c.assigned, []
         else:
             changed = set(stored_names(*node.body))
@@ -183,7 +187,7 @@ class _Translation:
         yield list(self._block(node.body, inner))
         self._scopes.pop()
         self._in_c.assigned = before
-        if self._made.raises:
+        if self._made.raises and isinstance(node, ast.For):
             yield [f"{inner}if (error->raised) break;"]
         yield [f"{indent}}}"]
 
@@ -339,15 +343,18 @@ class _Translation:
                 arguments.append(argument)
             else:
                 form += str(ast.literal_eval(part)).replace("%", "%%")
-        quoted = '"' + form.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n") + '"'
-        return f"raise_error({', '.join(['error', quoted, *arguments])});"
+        return f"raise_error({', '.join(['error', quoted(form), *arguments])});"
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[str, str]:
         """A value in a text: its directive for printf, and the argument."""
         code = self._in_c.code(part.value)
+        if part.conversion not in (-1, ord("s")):
+            raise self._in_c.fail(part.value, f"!{chr(part.conversion)} in a text: leave it out")
         how = "".join(ast.literal_eval(x) for x in getattr(part.format_spec, "values", ()))
         if code.shape == TEXT and not how:
             return "%s", code.text
+        if code.shape == BOOLEAN and not how:
+            return "%s", f'{code.within(OR)} ? "True" : "False"'
         if code.shape in WHOLE and how in ("", "d"):
             return "%d", code.text
         if code.shape in (DOUBLE, *WHOLE) and _FORMAT.fullmatch(how):

@@ -30,6 +30,12 @@ def laid_out(text: str, indent: str) -> list[str]:
     return [line.translate(_BACK) for line in _lines(protected, indent)]
 
 
+def quoted(text: str) -> str:
+    """A text in C."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{escaped}"'
+
+
 def _lines(text: str, indent: str) -> list[str]:
     if len(indent) + len(text) <= LINE_WIDTH:
         return [indent + text]

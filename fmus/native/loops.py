@@ -45,9 +45,10 @@ def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed
         assert isinstance(iterable, ast.Call)
         return _range(within, target, iterable)
     before: list[str] = []
-    first = next((n.id for n in ast.walk(target) if isinstance(n, ast.Name)), "x")
-    items = _Items(within, before, changed, first.lstrip("_") or "x")
-    place = Code(within.unused(f"{first.lstrip('_') or 'x'}_at"), INTEGER)
+    names = (n.id.lstrip("_") for n in ast.walk(target) if isinstance(n, ast.Name))
+    first = next(filter(None, names), "x")
+    items = _Items(within, before, changed, first)
+    place = Code(within.unused(f"{first}_at"), INTEGER)
     bound, count = items.taken(target, iterable, place)
     head = f"for (int {place.text} = 0; {place.text} < {count}; {place.text}++) {{"
     return Loop(before, head, bound, count)
@@ -60,7 +61,7 @@ def _called(within: Expressions, node: ast.expr) -> object:
 def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
     if not isinstance(target, ast.Name):
         raise within.fail(target, "more than one name for the numbers of a range")
-    arguments = [within.integer(argument, "a bound of a range") for argument in call.args]
+    arguments = [_bound(within, argument) for argument in call.args]
     if len(arguments) == 1:
         arguments = [Code("0", INTEGER), *arguments]
     first, stop, step = [*arguments, Code("1", INTEGER)][:3]
@@ -87,6 +88,14 @@ def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
     return Loop(before, head, [(target.id, Code(name, INTEGER))], known)
 
 
+def _bound(within: Expressions, node: ast.expr) -> Code:
+    """A bound of a range; a constant of a module is the number that it stands for."""
+    value = within.known(node)
+    if type(value) is int:
+        return Code(within.written(node, value), INTEGER)
+    return within.integer(node, "a bound of a range")
+
+
 def _number(text: str) -> int | None:
     return int(text) if text.removeprefix("-").isdecimal() else None
 
@@ -106,8 +115,13 @@ class _Items:
         called = _called(self._within, iterable)
         if called is zip or called is enumerate:
             assert isinstance(iterable, ast.Call)
-            if not isinstance(target, ast.Tuple) or iterable.keywords:
+            self._within.check_plain(iterable, called.__name__)
+            if called is enumerate and len(iterable.args) != 1:
+                raise self._within.fail(target, "enumerate with a start: add it to the count")
+            if not isinstance(target, ast.Tuple):
                 raise self._within.fail(target, f"{called.__name__} without a name for each part")
+            if called is enumerate and len(target.elts) != 2:
+                raise self._within.fail(target, "enumerate without two names")
             if called is enumerate:
                 first, second = target.elts
                 bound, count = self.taken(second, iterable.args[0], place)

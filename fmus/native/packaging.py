@@ -11,6 +11,7 @@ from fmus import documentation
 from fmus.compilers import Compiler, library
 from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
+from fmus.native.shapes import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
 from fmus.ports import description, description_fmi3
@@ -18,9 +19,6 @@ from fmus.ports.definition import Definition
 from fmus.ports.port import Port
 
 _FOLDER = Path(__file__).parent
-
-#: What is the same for all components.
-RUNTIME = _FOLDER / "runtime"
 
 #: The file to compile, by the version of FMI: it includes all others.
 MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import re
+import sys
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from math import isinf, isnan
-from pathlib import Path
 from types import FunctionType
 from typing import Any
 
@@ -16,7 +17,7 @@ from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
     INTEGER,
-    Scalar,
+    RUNTIME,
     Shape,
     declaration,
     declared,
@@ -29,9 +30,6 @@ from fmus.native.shapes import (
     vector,
 )
 from fmus.ports.groups import hints_of
-
-#: What all components share in C.
-RUNTIME = Path(__file__).parent / "runtime"
 
 
 class Untranslatable(Exception):
@@ -92,10 +90,12 @@ class Program:
         self.functions: dict[Hashable, Function] = {}
         self._begun: set[Hashable] = set()
         self._owners: dict[str, Hashable] = {}
+        self._words: set[str] = set()
 
     def name(self, owner: Hashable, name: str) -> str:
-        """A name in C that only its owner has."""
-        while name in _taken() or self._owners.setdefault(name, owner) != owner:
+        """A name in C that only its owner has, and no variable of a module met so far."""
+        taken = _taken() | self._words
+        while name in taken or self._owners.setdefault(name, owner) != owner:
             name += "_"
         return name
 
@@ -136,6 +136,7 @@ class Program:
         if key in self._begun:
             raise Untranslatable(f"{function.__name__} calls itself")
         self._begun.add(key)
+        self._words |= _words(function.__module__)
         arguments = {
             name: shapes[i] if has_no_size(hint) and i < len(shapes) else self.shape(hint)
             for i, (name, hint) in enumerate(hints.items())
@@ -171,6 +172,12 @@ def _taken() -> frozenset[str]:
     return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", code))
 
 
+@cache
+def _words(module: str) -> frozenset[str]:
+    """All names in the text of a module."""
+    return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", inspect.getsource(sys.modules[module])))
+
+
 def c_name(module: str, name: str) -> str:
     """The name of something in C, where names of several modules stand side by side."""
     return f"{module.rsplit('.', maxsplit=1)[-1]}_{name.lstrip('_')}"
@@ -193,11 +200,10 @@ def _shape_of_value(value: Any, name: str) -> Shape:
         return shape_of(type(value))
     if isinstance(value, tuple) and value:
         return structure([_shape_of_value(part, name) for part in value])
-    scalars: dict[type, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN}
-    if type(value) in scalars:
-        return scalars[type(value)]
+    if isinstance(value, float):
+        return DOUBLE  # numpy's floats, too
     if isinstance(value, int):
-        return INTEGER  # a member of an enumeration
+        return BOOLEAN if type(value) is bool else INTEGER
     raise Untranslatable(f"{name} is not a number, nor a tuple of numbers")
 
 
@@ -216,5 +222,7 @@ def number_in_c(value: float) -> str:
             return "NAN"
         if isinf(value):
             return "INFINITY" if value > 0.0 else "-INFINITY"
-        return repr(value)
+        return repr(float(value))
+    if not -(2**31) <= value < 2**31:
+        raise Untranslatable(f"{value} is an int of more than 32 bits: write {value}.0")
     return str(int(value))

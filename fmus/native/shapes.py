@@ -8,13 +8,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
+from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
 
 from auv_fmu import vectors
 from auv_fmu.arrays import Matrix, Vector
 from fmus.ports.groups import hints_of
 
-#: Names that the C of equations has for itself, besides the functions of arithmetic.h.
+#: What all components share in C.
+RUNTIME = Path(__file__).parent / "runtime"
+
+#: Names that C has for itself.
 _TAKEN = frozenset(
     (
         # keywords that Python lacks
@@ -24,8 +28,8 @@ _TAKEN = frozenset(
         # of C++, which some compile these sources with, and macros of some compilers
         "bool", "catch", "delete", "friend", "linux", "namespace", "new", "operator", "private",
         "protected", "public", "template", "this", "throw", "unix", "using", "virtual",
-        # macros and types of the headers
-        "EOF", "Error", "HUGE_VAL", "INFINITY", "INT_MAX", "INT_MIN", "M_PI", "NAN", "NULL",
+        # macros and types of the headers; longer ones in capitals are all taken
+        "EOF", "Error", "M_E", "NAN", "environ", "errno", "matherr", "stderr", "stdin", "stdout",
         # what functions call or are given
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
         "cosh", "error", "exp", "expm1", "fabs", "floor", "fmod", "isfinite", "isinf", "isnan",
@@ -96,9 +100,22 @@ _SCALARS: dict[Any, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN, str: 
 _NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
 
 
+#: Words in capitals: the headers of each system have macros of their own.
+_CAPITALS = re.compile(r"[A-Z][A-Z0-9_]{3,}")
+
+
+@cache
 def in_c(name: str) -> str:
     """The name of a variable or a member in C."""
-    return f"{name}_" if name in _TAKEN else name
+    is_taken = name in _TAKEN | _arithmetic() or _CAPITALS.fullmatch(name)
+    return f"{name}_" if is_taken else name
+
+
+@cache
+def _arithmetic() -> frozenset[str]:
+    """The functions of arithmetic.h, which equations call by macros."""
+    text = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
+    return frozenset(re.findall(r"^static [\w ]*?(\w+)\(", text, re.MULTILINE))
 
 
 def shape_of(hint: Any) -> Shape:

@@ -18,8 +18,8 @@ from auv_fmu.arrays import Matrix, Vector
 from fmus.compilers import SAME_NUMBERS
 from fmus.native.functions import function_in_c
 from fmus.native.language import CONSTANTS, MATHEMATICS
-from fmus.native.program import RUNTIME, Function, Program
-from fmus.native.shapes import DOUBLE, Shape, Structure, shape_of
+from fmus.native.program import Function, Program
+from fmus.native.shapes import DOUBLE, RUNTIME, Shape, Structure, shape_of
 from fmus.ports.groups import hints_of
 from fmus.ports.port import Refusal
 

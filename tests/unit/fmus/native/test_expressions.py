@@ -6,6 +6,7 @@ among them.
 
 from __future__ import annotations
 
+import re
 import shutil
 import sys
 from importlib.util import find_spec
@@ -18,7 +19,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmus.native.language import CONSTANTS, MATHEMATICS
-from support.language import HEAD, TOO_LARGE, Twins, module_of, sizes_of
+from fmus.native.program import Untranslatable
+from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 
@@ -66,6 +68,7 @@ A = Matrix(((2.0, -1.0, 0.5), (0.0, 1.5, -0.25)))
 POWERS = (1, 2, 4, 8)
 NESTED = ((1.0, 2.5), (-3.0, 0.125))
 START = Inner(0.5)
+N = 3
 '''
 
 #: A name for each construct, and a function that consists of little else.
@@ -271,6 +274,21 @@ CONSTRUCTS = {
         "    if x > 1.0:\n        raise Refusal(f\"100 % of {x:.3f} or {x:g} in {k}\")\n"
         "    if k > 1:\n        raise ValueError(\"no\")\n    return x\n"
     ),
+    "raise with a bool and texts": (
+        "def f(x: float, on: bool) -> float:\n"
+        "    def no(text: str) -> None:\n        raise Refusal(f\"{text}, {on}, {x > 2.0}\")\n"
+        "    if x > 1.0:\n        no('say \"hi\", 100 % \\\\')\n    return x\n"
+    ),
+    "while after an error in it": (
+        "def f(x: float) -> float:\n"
+        "    y = 0.0\n    while y < 3.0:\n        if x < 0.0:\n            y = 1.0 / (x - x)\n"
+        "            y = 0.0\n            continue\n        y += 1.0\n    return y\n"
+    ),
+    "while after an error before it": (
+        "def f(x: float) -> float:\n"
+        "    def halved(y: float) -> float:\n        while y > 5.0:\n            y *= 0.5\n"
+        "        return y\n    return halved(1.0 / x) if abs(x) > 1e-9 or x == 0.0 else x\n"
+    ),
     "ring buffer": (
         "def f(v: Annotated[Vector, 4], x: float, k: int) -> tuple[\n"
         "    float, Annotated[Vector, 4], int\n]:\n"
@@ -280,6 +298,15 @@ CONSTRUCTS = {
         "def f(double: float, error: int, int_: float) -> float:\n"
         "    switch, sin, NAN = double / int_, 1.0, 0.5\n    register = switch + sin * NAN\n"
         "    return register * error\n"
+    ),
+    "names of arithmetic.h": (
+        "def f(x: float, y: float, power: int) -> float:\n"
+        "    smaller, larger = min(x, y), max(x, y)\n    quotient, nearest = x / y, round(power)\n"
+        "    OVERFLOW = pow(smaller, power) if larger < 9.0 else quotient\n"
+        "    return OVERFLOW + nearest % 7\n"
+    ),
+    "range of a constant": (
+        "def f(x: float) -> Annotated[Vector, 3]:\n    return Vector(x * k for k in range(N))\n"
     ),
 }  # fmt: skip
 
@@ -331,6 +358,8 @@ def test_python_and_c_agree_bit_for_bit(
             # C has no room where Python goes on: it says so, and gives no other number.
             return
         assert bool(python.error) == bool(c.error)
+        if name.startswith("raise"):
+            assert python.error == c.error
         if command == "zig -O0" and name in OWN_OF_ZIG:
             assert python.numbers == pytest.approx(c.numbers, rel=1e-15, abs=0.0, nan_ok=True)
         else:
@@ -349,6 +378,58 @@ def test_an_integer_that_c_cannot_hold_is_refused(
     given_ = (2.0**31,) if name == "floor" else (2**31 - 1, 2**31 - 1)
     assert both.c(function, given_).error == TOO_LARGE
     assert not isnan(sum(given_))
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("y = float(sum(k * a for k, a in enumerate(v, 1)))", "GeneratorExp is not in"),
+        ("for k, a in enumerate(v, 1): y += k * a", "enumerate with a start"),
+        ("for k, a in enumerate(v, start=1): y += k * a", "enumerate with start="),
+        ("for a, b in zip(v, v, strict=True): y += a * b", "zip with strict="),
+        ("for k in enumerate(v): y += k[1]", "enumerate without a name for each part"),
+        ("y = max(y, v[1], key=abs)", "max with key="),
+        ("y = max(*v)", "max with a star"),
+        ("y = 1.0 * round(v[1], ndigits=1)", "round with ndigits="),
+        ("y = v.sum(axis=0)", "sum with axis="),
+        ("y = 1.0 * float(*v)", "float with a star"),
+        ("v = Vector(2.0 * v for v in v)", "v is also what it runs over"),
+        ("k = 3000000000", "3000000000 is an int of more than 32 bits: write 3000000000.0"),
+        ("k = LARGE", "3000000000 is an int of more than 32 bits"),
+        ("y += A[0:1, 2]", "Slice has no counterpart"),
+        ('raise Refusal(f"{y!r}")', "!r in a text"),
+        (
+            "for k in range(3):\n        def g(a: float) -> float:\n            return a * k\n"
+            "    y = g(y)",
+            "k may have no value here",
+        ),
+    ],
+)  # fmt: skip
+def test_what_c_would_compute_otherwise_is_refused(tmp_path: Path, line: str, why: str):
+    function = f"def f(y: float, v: Annotated[Vector, 3]) -> float:\n    {line}\n    return y\n"
+    module = module_of(HEAD + SHARED + "\nLARGE = 3000000000\n\n" + function, tmp_path, "refused")
+    with pytest.raises(Untranslatable, match=re.escape(why)):
+        c_text({"f": module.f})
+
+
+def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
+    """In tank.py, `tank_level` and `tank_AREA` for the function `level` and the constant `AREA`."""
+    text = HEAD + (
+        "AREA = 2.0\n\n\n"
+        "def level(x: float) -> float:\n    return x / AREA\n\n\n"
+        "def f(x: float) -> float:\n    tank_AREA = 3.0 * AREA\n    tank_level = level(x)\n"
+        "    return tank_level + tank_AREA\n"
+    )
+    both = Twins(module_of(text, tmp_path, "tank"), tmp_path)
+    assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (7.5,)
+
+
+def test_numbers_of_numpy_are_constants(tmp_path: Path):
+    text = HEAD.replace("import math\n", "import math\n\nimport numpy as np\n") + (
+        "G = np.float64(2.0) * 1.5\n\n\ndef f(x: float) -> float:\n    return G * x\n"
+    )
+    both = Twins(module_of(text, tmp_path, "with_numpy"), tmp_path)
+    assert both.c("f", (3.0,)).numbers == (9.0,)
 
 
 def test_functions_are_files_of_one_folder(tmp_path: Path):
