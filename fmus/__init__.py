@@ -11,6 +11,9 @@ module                 what it states
 :mod:`.python`         the Python kind of FMU, on PythonFMU
 :mod:`.native`         the C kind of FMU, translated from the same text
 :mod:`.build`          the command that brings a folder of FMUs up to date
+:mod:`.script`         a user's own component: where it is, and its mistakes in words
+:mod:`.check`          the command that lists all mistakes in it
+:mod:`.trial`          its run as plain Python
 ====================== ======================================================================
 
 Every other folder is a component: its ports, its behaviour and its page.

@@ -92,27 +92,27 @@ def main() -> int:
     parser.add_argument("script", nargs="?", type=Path, help="a component; default: all")
     options = parser.parse_args()
     try:
+        kind = _kind(options)
         if options.script is not None:
-            return _build_own(options)
-        build(options.out, _kind(options))
+            return _build_own(options.script, options.out, kind)
+        build(options.out, kind)
     except (OSError, ValueError) as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)
         return 2
     return 0
 
 
-def _build_own(options: argparse.Namespace) -> int:
+def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind) -> int:
     """Build the FMU of the user's component, or say in a line where it has a mistake."""
-    path = options.script
     try:
         path = script_in(path)
         if is_component(path):
-            kind, source = _kind(options), source_of_script(path)
+            source = source_of_script(path)
             # Before PythonFMU imports a copy, in which mistakes would be elsewhere.
             source.definition  # noqa: B018
-            kind.write(source, options.out / f"{source.name}.fmu")
-        elif options.kind == PYTHON:
-            build_script(path, options.out, options.loader)
+            kind.write(source, folder / f"{source.name}.fmu")
+        elif isinstance(kind, PythonKind):
+            build_script(path, folder, kind.loader)
         else:
             raise ValueError(
                 f"{path}: a slave of PythonFMU runs only in Python; use --kind {PYTHON}, or write "

@@ -45,7 +45,7 @@ def run(
         module: of the component.
         parameters: by the names of their ports; others have their default values.
         inputs: for each step, at its beginning; those that are not named keep their values.
-        stop_time: end of the run [s].
+        stop_time: end of the run [s], or the nearest end of a step.
         step: length of a communication step [s].
         start_time: begin of the run [s].
 
@@ -148,4 +148,5 @@ def _meant(port: Port, value: Any) -> Any:
 
 def _flat(value: Any) -> list[Any]:
     """The numbers of a vector or a matrix, row by row."""
-    return [x for part in value for x in _flat(part)] if isinstance(value, tuple) else [value]
+    is_group = isinstance(value, (tuple, list))
+    return [x for part in value for x in _flat(part)] if is_group else [value]

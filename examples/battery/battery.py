@@ -6,8 +6,7 @@
 
 The voltage of the source is a table over the charge, between whose points it is interpolated. `R0`
 gives the jump at a change of current, the pairs a faster and a slower relaxation after it. See
-G. L. Plett, Battery Management Systems. The table is typical of such a cell, and not measured on
-any.
+G. L. Plett, Battery Management Systems. The table is typical of such a cell, but not measured.
 
 The charge is counted exactly for a held current, and the pairs are solved exactly. A cell that is
 empty gives no current, and a full one cannot be charged: `i` is 0 then. The voltage depends on the
@@ -58,7 +57,7 @@ class Outputs(NamedTuple):
 
     voltage: Annotated[float, Variable("V", "Voltage of the terminals")]
     i: Annotated[float, Variable("A", "Current that it delivers")]
-    charge: Annotated[float, Variable("1", "Charge as a part of the capacity", feedthrough=())]
+    charge: Annotated[float, Variable("1", "Charge as a fraction of the capacity", feedthrough=())]
     empty: Annotated[bool, Variable("1", "It cannot deliver", feedthrough=())]
 
 

@@ -10,8 +10,9 @@ of an internal step, and a smaller `h_max` gives a more exact one.
 This is the model BouncingBall of the Reference FMUs of the Modelica Association, with the same
 names and values. With `h_max` = 0.001 s it gives their published result bit for bit.
 
-Look at `h` and `v`. Each bounce reaches about `e` * `e` of the height of the last one, and after
-2.6 s the ball rests. Try another `e` during the run.
+Look at `h` and `v`, with `h_max` = 0.001 s: each bounce reaches about `e` * `e` of the height of
+the one before, and after 2.6 s the ball rests. With the default `h_max` it never does: gravity adds
+0.2 m/s in a step, so it always rebounds faster than `v_min`. Try another `e` during the run.
 """
 
 from __future__ import annotations

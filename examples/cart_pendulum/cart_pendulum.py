@@ -1,4 +1,4 @@
-"""A pendulum on a cart, which is at home upside down in courses of control.
+"""A pendulum on a cart, the standard unstable plant of control courses.
 
     (M + m) p'' + m l cos(a) a'' = u - c p' + m l sin(a) a'^2
     m l cos(a) p'' + m l^2 a''   = m g l sin(a)

@@ -4,7 +4,7 @@
     J dw/dt = k i - b w - load               torque on the shaft
     d(angle)/dt = w
 
-With k in V.s/rad and N.m/A it is the same number: the electrical power k w i is the mechanical
+In V.s/rad and in N.m/A, k is the same number: the electrical power k w i is the mechanical
 power. Such a motor is in every textbook of control; see Franklin, Powell and Emami-Naeini, Feedback
 Control of Dynamic Systems. The equations are stepped by the Runge-Kutta method of fourth order.
 

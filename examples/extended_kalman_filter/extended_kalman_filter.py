@@ -1,8 +1,8 @@
 """An extended Kalman filter that tracks a target by radar, from its range and bearing.
 
-    x' = F x,  P' = F P F' + Q                          prediction
-    S = H P' H' + R,  e = z - g(x')                     innovation, H = dg/dx at x'
-    x = x' + P'H' S^-1 e,  P = P' - P'H' S^-1 H P'      correction
+    x_ = F x,  P_ = F P F' + Q                          prediction
+    S = H P_ H' + R,  e = z - g(x_)                     innovation, H = dg/dx at x_
+    x = x_ + P_ H' S^-1 e,  P = P_ - P_ H' S^-1 H P_    correction
 
 The radar is at the origin. The state is the target's position and velocity in the plane, and what
 is measured is g(x) = (sqrt(px^2 + py^2), atan2(py, px)). A filter for such a curved g takes its
@@ -21,8 +21,7 @@ from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector, solve
-from fmus.ports.port import Refusal
-from fmus.ports.variable import POSITIVE, Variable
+from fmus.ports.variable import POSITIVE, Refusal, Variable
 
 _XY = ("x", "y")
 GUESS = Vector((700.0, 700.0))  #: [m]

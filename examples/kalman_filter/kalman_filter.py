@@ -1,16 +1,17 @@
 """A Kalman filter that estimates position and velocity from noisy positions.
 
-    x' = F x,          P' = F P F' + Q                  prediction
-    K  = P' H' (H P' H' + r^2)^-1                       gain
-    x  = x' + K (z - H x'),  P = (I - K H) P'           correction
+    x_ = F x,  P_ = F P F' + Q                              prediction
+    K  = P_ H' (H P_ H' + r^2)^-1                           gain
+    x  = x_ + K (z - H x_),  P = L P_ L' + K r^2 K'         correction, L = I - K H
 
 The state x is position and velocity. Between two measurements, h seconds apart, the acceleration is
 taken for white noise of the density `q`, and `r` is the standard deviation of a measurement. This
 is the usual model of a target that manoeuvres a little; see Bar-Shalom, Li and Kirubarajan,
 Estimation with Applications to Tracking and Navigation.
 
-A larger `q` makes the filter faster, and its estimate less smooth. Only the ratio of `q` and the
-square of `r` decides about the gain.
+A larger `q` makes the filter faster, and its estimate less smooth. Once the start is
+forgotten, only the ratio of `q` to the square of `r` determines the gain. The correction of P has
+the form of Joseph, which keeps P positive whatever is rounded.
 
 With the default values the target rests at 1 m, and the estimate goes there from 0. Look at `p`
 and at `std_p`, which tells how good the filter believes it to be.
@@ -80,7 +81,8 @@ def advance(
     x, P = F @ state.x, F @ state.P @ F.T + Q
     K = P @ H.T / ((H @ P @ H.T)[0, 0] + parameters.r * parameters.r)
     x += K @ (Vector((inputs.z,)) - H @ x)
-    return _seen(x, (IDENTITY - K @ H) @ P)
+    L = IDENTITY - K @ H
+    return _seen(x, L @ P @ L.T + K @ K.T * (parameters.r * parameters.r))
 
 
 def _seen(x: Annotated[Vector, 2], P: Annotated[Matrix, 2, 2]) -> tuple[State, Outputs]:

@@ -3,9 +3,9 @@
     T dx/dt = u(t - delay) - x,  y = x + noise
 
 The dead time is a line of 50 cells. At the end of each fiftieth of the delay the oldest cell takes
-the present input, and what it held leaves the line. So the delay is exact within one cell, whatever
-the steps are. Nothing is moved: only the position of the oldest cell goes around. The lag is solved
-exactly for the value that leaves the line.
+the present input, and what it held leaves the line. So the delay is exact within one cell, or
+within a step if that is longer. Nothing is moved: only the position of the oldest cell goes around.
+The lag is solved exactly for the value that leaves the line.
 
 `measured` adds the noise: a component asks for standard normal numbers by the argument `n`, and
 `seed` says where they start. The same seed gives the same noise in each run.
@@ -61,7 +61,7 @@ class Outputs(NamedTuple):
 def begin(parameters: Parameters) -> tuple[State, Outputs]:
     """State and outputs at the start."""
     start = parameters.start
-    return State(Vector(start for _ in range(50)), 0, 0.0, start), Outputs(start, start)
+    return State(Vector(start for _ in range(CELLS)), 0, 0.0, start), Outputs(start, start)
 
 
 def advance(

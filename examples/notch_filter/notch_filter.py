@@ -11,8 +11,8 @@ see Oppenheim and Schafer, Discrete-Time Signal Processing. With t = tan(w0 h / 
 It runs in the transposed direct form II, which needs two numbers of memory. `Q` is the frequency
 divided by the width of the notch: a larger one is narrower, and takes longer to settle.
 
-With the default values a step goes through it: the filter answers with a ring, and then passes the
-constant unchanged. Connect a sine of `f0` to see it vanish.
+With the default values a step goes through it: the filter rings, and then passes the constant
+unchanged. Connect a sine of `f0` to see it vanish.
 """
 
 from __future__ import annotations
@@ -20,8 +20,7 @@ from __future__ import annotations
 from math import pi, tan
 from typing import Annotated, NamedTuple
 
-from fmus.ports.port import Refusal
-from fmus.ports.variable import POSITIVE, Variable
+from fmus.ports.variable import POSITIVE, Refusal, Variable
 
 
 class Parameters(NamedTuple):

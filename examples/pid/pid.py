@@ -13,16 +13,15 @@ While the actuator is at a limit, u - v is not zero, and leads the integral back
 seconds. Without it the integral would wind up, and the controller would react late after the set
 point has been reached.
 
-With the default values nothing answers, so `u` rises to its limit and `integral` stops rising.
-Connect `y` to a plant such as DcMotor or WaterTank.
+With the default values nothing responds to `u`, so it rises to its limit and `integral` stops
+rising. Connect `y` to a plant such as DcMotor or WaterTank.
 """
 
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from fmus.ports.port import Refusal
-from fmus.ports.variable import POSITIVE, Variable
+from fmus.ports.variable import POSITIVE, Refusal, Variable
 
 
 class Parameters(NamedTuple):

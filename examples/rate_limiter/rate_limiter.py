@@ -7,10 +7,10 @@ The second line is the play operator, the usual model of backlash: the output re
 crosses the gap, and is then pushed by one of its sides. See G. Tao and P. V. Kokotovic, Adaptive
 Control of Systems with Actuator and Sensor Nonlinearities, 1996.
 
-So `y` depends on where `x` came from, not only on where it is. Backlash makes a loop with an
-integral hunt: it circles around its set point.
+So `y` depends on where `x` came from, not only on where it is. Backlash makes a loop with
+integral action hunt: it oscillates around its set point.
 
-With the default values the motor runs to 1, and the output follows half the gap later. Connect a
+With the default values the motor runs to 1, and the output follows half a gap behind. Connect a
 sine, and plot `y` over `u`: the loop is as wide as the gap.
 """
 

@@ -4,7 +4,8 @@
 
 A current is positive where it flows into a pin. The resistor has no memory: there is no class
 `State`, and the currents depend on the voltages directly. Because `begin` takes the inputs, the
-description of the FMU says so, and a host can solve a circuit of such components.
+description of the FMU says so. Its outputs change only in a step, so in a ring of resistors one
+value arrives a step late.
 
 This is the component Resistor of PythonFMU's example `demoslave.py`, with the same names and
 values. Only their local variables are outputs here.

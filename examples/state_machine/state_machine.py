@@ -8,7 +8,7 @@ that is pressed at any time except red is remembered. Pedestrians may walk while
 
 A mode is a member of an `IntEnum`. As a parameter it is a text, such as RED; as an output it is its
 number. A mode changes at the end of a communication step, so a step should be short compared with
-the times. By how much it ends late counts for the next mode, so that no error adds up.
+the times. The time by which it ends late counts towards the next mode, so no error adds up.
 
 With the default values the button is held, and the light repeats itself every 22 s. Look at `mode`,
 `walk` and `cycles`.

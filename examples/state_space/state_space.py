@@ -12,7 +12,7 @@ This is the model StateSpace of the Reference FMUs of the Modelica Association, 
 and values, except that its sizes are fixed. With `h_max` = 0.001 s it gives their published result.
 
 With the default values all matrices are the identity: each state grows like exp(t). Look at `y`;
-then set A to (0, 1, 0), (-1, 0, 0), (0, 0, -1) for an oscillator beside a decay.
+then set A to (0, 1, 0), (-1, 0, 0), (0, 0, -1) for an oscillator and a decay.
 """
 
 from __future__ import annotations

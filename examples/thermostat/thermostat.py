@@ -2,12 +2,12 @@
 
     capacity dT/dt = heater - loss (T - outdoor)
 
-The heater is switched on where the temperature falls below the set point by half the band, and off
-where it exceeds it by as much. This hysteresis is what keeps a switch from chattering. Between two
+The heater is switched on when the temperature falls below the set point by half the band, and off
+when it exceeds it by as much. This hysteresis is what keeps a switch from chattering. Between two
 switches the equation is solved exactly for held inputs. The switch acts at the end of a
-communication step, so the band is exceeded by what a step changes.
+communication step, so the temperature leaves the band by at most its change in one step.
 
-The temperature circles within the band, and the times of heating and cooling follow from the
+The temperature cycles within the band, and the times of heating and cooling follow from the
 solution: the room cools through the band in
 
     capacity / loss * log((upper - outdoor) / (lower - outdoor))

@@ -144,10 +144,15 @@ METHODS: dict[str, Callable[[Program, Structure], Function]] = {
 }
 
 
+def extreme_of_two(word: str, shape: Shape) -> str:
+    """The function of arithmetic.h for min or max of two numbers."""
+    return f"{'smaller' if word == 'min' else 'larger'}{'' if shape == DOUBLE else '_integer'}"
+
+
 def extreme(program: Program, shape: Structure, word: str) -> Function:
     """What finds the smallest or the largest element of a tuple of numbers."""
     part = shape.parts[0][1]
-    function = f"{'smaller' if word == 'min' else 'larger'}{'' if part == DOUBLE else '_integer'}"
+    function = extreme_of_two(word, part)
     body = (
         f"    {part.name} found = a.v[0];\n"
         f"    for (int i = 1; i < {len(shape.parts)}; i++) found = {function}(found, a.v[i]);\n"

@@ -165,7 +165,7 @@ class Calls(Operators):
         for argument, code in zip(node.args, codes):
             if code.shape not in NUMBERS:
                 raise self.fail(argument, f"{word} of {code.shape.word}")
-        function = f"{'smaller' if word == 'min' else 'larger'}{'' if is_float else '_integer'}"
+        function = arrays.extreme_of_two(word, kind)
         text = codes[0].text
         for code in codes[1:]:
             text = f"{function}({text}, {code.text})"

@@ -28,6 +28,7 @@ from fmus.native.shapes import (
     structure,
     vector,
 )
+from fmus.ports.groups import is_class
 
 #: How tightly the operators of C bind.
 TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, POSTFIX = range(9)
@@ -124,7 +125,7 @@ class Expressions:
             return self.scope.get(node.id, builtins.get(node.id))
         if isinstance(node, ast.Attribute):
             owner = self.known(node.value)
-            if isinstance(owner, ModuleType) or _is_enumeration(owner):
+            if isinstance(owner, ModuleType) or is_class(owner, IntEnum):
                 return getattr(owner, node.attr, None)
         return None
 
@@ -228,7 +229,7 @@ class Expressions:
 
     def _attribute(self, node: ast.Attribute, wanted: Shape | None) -> Code:
         owner = self.known(node.value)
-        if isinstance(owner, ModuleType) or _is_enumeration(owner):
+        if isinstance(owner, ModuleType) or is_class(owner, IntEnum):
             return self._module_constant(node)
         code = self.code(node.value)
         if node.attr == "T" and arrays.is_array(code.shape) and len(arrays.sizes(code.shape)) == 2:
@@ -337,10 +338,6 @@ class Expressions:
         names = [suffix for suffix, _ in shape.parts]
         filled = [f"{name} = {text}" for name, text in zip(names, texts)]
         return Code(f"({shape.name}){{{', '.join(filled) or '0'}}}", shape)
-
-
-def _is_enumeration(value: Any) -> bool:
-    return isinstance(value, type) and issubclass(value, IntEnum)
 
 
 def _constant_of(node: ast.expr) -> Any:

@@ -16,14 +16,12 @@ from fmus.native.shapes import DOUBLE, Shape, Structure
 
 def count(shape: Shape) -> int:
     """How many numbers a shape holds."""
-    return sum(count(part) for _, part in shape.parts) if isinstance(shape, Structure) else 1
+    return sum(1 for _ in _scalars(shape))
 
 
 def has_only_doubles(shape: Shape) -> bool:
     """Whether a shape is laid out as an array of doubles."""
-    if isinstance(shape, Structure):
-        return all(has_only_doubles(part) for _, part in shape.parts)
-    return shape == DOUBLE
+    return all(scalar == DOUBLE for scalar in _scalars(shape))
 
 
 def _scalars(shape: Shape) -> Iterator[Shape]:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Union, get_args, get_origin
 
 from auv_fmu import vectors
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.groups import hints_of
+from fmus.ports.groups import hints_of, is_class
 
 #: What all components share in C.
 RUNTIME = Path(__file__).parent / "runtime"
@@ -139,7 +139,7 @@ def shape_of(hint: Any) -> Shape:
         return _SCALARS[hint]
     if get_origin(hint) is tuple and Ellipsis not in get_args(hint):
         return structure([shape_of(part) for part in get_args(hint)], _NAMES.get(hint))
-    if isinstance(hint, type) and issubclass(hint, IntEnum):
+    if is_class(hint, IntEnum):
         return INTEGER
     if isinstance(hint, type) and hasattr(hint, "__annotations__"):
         parts = [(f".{in_c(name)}", shape_of(part)) for name, part in hints_of(hint).items()]

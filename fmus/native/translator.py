@@ -185,13 +185,6 @@ def _defined(name: str, arguments: str, body: list[str]) -> str:
     returns, _, name = name.rpartition(" ")
     text = " ".join(body)
     names = [argument.rstrip("[]").split()[-1].lstrip("*") for argument in arguments.split(", ")]
-    unused = [f"(void){n};" for n in names if n != "error" and not _uses(text, n)]
-    if "Error" in arguments and "error" not in text:
-        unused.append("(void)error;")
+    unused = [f"(void){n};" for n in names if not re.search(rf"\b{n}\b", text)]
     lines = [line for part in (*unused, *body) for line in laid_out(part, "    ")]
     return "\n".join([*laid_out(f"static {returns} model_{name}({arguments}) {{", ""), *lines, "}"])
-
-
-def _uses(text: str, name: str) -> bool:
-    separated = "".join(c if c.isalnum() or c == "_" else " " for c in text)
-    return name in separated.split()

@@ -6,10 +6,13 @@ module                   what it states
 :mod:`.quantities`       what passes through groups of ports: members and their units
 :mod:`.port`             one port: its declaration and what values it takes
 :mod:`.groups`           flat values of ports from groups, and groups from flat values
+:mod:`.units`            units and what they are in SI units
+:mod:`.variable`         a field of a class as a port, or as a group of them
+:mod:`.definition`       all that the modules of a component say of it
 :mod:`.behaviour`        what a component's behaviour may say: the hooks of both kinds
 :mod:`.vehicle`          parameters of (2) and (3), and the reference
 :mod:`.controllers`      what the controllers have in common
-:mod:`.description`      modelDescription.xml of FMI 2.0, what all versions share, SI units
+:mod:`.description`      modelDescription.xml of FMI 2.0, and what all versions share
 :mod:`.description_fmi3` what a host reads of FMI 3.0: description, build, terminals
 ======================== =================================================================
 

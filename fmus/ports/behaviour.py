@@ -205,7 +205,8 @@ def read_behaviour(module: ModuleType) -> Behaviour:
             raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
-    groups = get_type_hints(said["Outputs"])
+    outputs = said["Outputs"]
+    groups = get_type_hints(outputs)
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
     for name, found in hints.items():
         known = (*HOOKS[name], *noisy)
@@ -216,7 +217,6 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         why = f"takes {len(noisy)} groups of outputs, not one"
         raise Misdeclared(f"{where}.measured {why}", "measured")
     derived = hints["derive"]["return"] if "derive" in hooks else None
-    outputs = said["Outputs"]
     returned = [tuple, types.get("state"), *([derived] if derived else []), outputs]
     is_stateless = "state" not in types and hints["begin"]["return"] is outputs
     for name in ("begin", "advance"):
@@ -232,7 +232,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         Nothing if is_stateless else returned[1],
         derived,
         types.get("inputs", Nothing),
-        said["Outputs"],
+        outputs,
         types.get("parameters", Nothing),
         is_stateless,
         "".join(noisy),

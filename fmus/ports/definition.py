@@ -9,9 +9,9 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from fmus.ports.behaviour import Behaviour, read_behaviour
-from fmus.ports.groups import Field, Nothing, ParameterSet
+from fmus.ports.groups import Field, Nothing, ParameterSet, ports_in
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port
-from fmus.ports.variable import declared, ports_in
+from fmus.ports.variable import declared
 
 
 class Origin(NamedTuple):
@@ -91,16 +91,13 @@ _CLASSES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter"}
 
 def _of_one_module(name: str, module: ModuleType) -> Definition:
     said = read_behaviour(module)
-    inputs, outputs, parameters = (_class(said, module, cls) for cls in _CLASSES)
+    made = {cls: _class(said, module, cls) for cls in _CLASSES}
     taken = said.arguments("begin")
-    direct = (*(inputs._fields if "inputs" in taken else ()), *([TIME.name] * ("t" in taken)))
-    fields = {
-        "Inputs": declared(inputs, "input"),
-        "Outputs": declared(outputs, "output", direct),
-        "Parameters": declared(parameters, "parameter"),
-    }
+    inputs = made["Inputs"]._fields if "inputs" in taken else ()
+    direct = (*inputs, *([TIME.name] * ("t" in taken)))
+    fields = {cls: declared(made[cls], causality, direct) for cls, causality in _CLASSES.items()}
     _hold_apart(fields)
-    own = ParameterSet(parameters, **fields["Parameters"])
+    own = ParameterSet(made["Parameters"], **fields["Parameters"])
     internal = (H_MAX,) if "n" in said.arguments("advance") else ()
     ports = (
         *(port for field in fields["Inputs"].values() for port in ports_in(field)),
@@ -109,7 +106,7 @@ def _of_one_module(name: str, module: ModuleType) -> Definition:
         *internal,
     )
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
-    origin = Origin(*(str(getattr(module, f"__{said}__", "")) for said in Origin._fields))
+    origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
     return Definition(name, summary, origin, ports, own, {}, said)
 
 

@@ -158,7 +158,7 @@ def unpacking(
         nothing = made()
         return lambda values: nothing
     names = [f"x{i}" for i in range(len(ports))]
-    ordered = [names[i] for i in sorted(range(len(ports)), key=lambda i: ports[i].type != "Real")]
+    ordered = [name for name, _ in sorted(zip(names, ports), key=lambda one: one[1].type != "Real")]
     found = iter(names)
     scope = {"made": made, **SCOPE}
     fields = {name: gathered(hint, found, scope) for name, hint in hints_of(made).items()}
@@ -256,6 +256,13 @@ def _compiled(body: str, argument: str, scope: dict[str, Any]) -> Callable[..., 
 Field = Union[Port, tuple[Port, ...], "ParameterSet[Any]"]
 
 
+def ports_in(field: Field) -> Sequence[Port]:
+    """The ports of a field."""
+    if isinstance(field, Port):
+        return (field,)
+    return field if isinstance(field, tuple) else field.ports
+
+
 class ParameterSet(Generic[T]):
     """Ports of the parameters that make one parameter set of the equations, field by field."""
 
@@ -272,12 +279,7 @@ class ParameterSet(Generic[T]):
 
         """
         sizes = _sizes(made)  # type: ignore[arg-type]
-        declared = {
-            name: 1
-            if isinstance(field, Port)
-            else len(field if isinstance(field, tuple) else field.ports)
-            for name, field in fields.items()
-        }
+        declared = {name: len(ports_in(field)) for name, field in fields.items()}
         if declared != sizes:
             raise TypeError(f"{made} has the fields {sizes}, its parameters are {declared}")
         self._made = made
@@ -285,8 +287,7 @@ class ParameterSet(Generic[T]):
         self._fields = fields
         for name, field in fields.items():
             if not isinstance(field, ParameterSet):
-                ports = (field,) if isinstance(field, Port) else field
-                _check_types(made, self._hints[name], ports)  # type: ignore[arg-type]
+                _check_types(made, self._hints[name], ports_in(field))  # type: ignore[arg-type]
 
     @property
     def ports(self) -> tuple[Port, ...]:

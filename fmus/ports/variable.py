@@ -12,16 +12,16 @@ gives the ports `u`, `y.x` and `y.z`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import IntEnum
 from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
 
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.groups import Field, ParameterSet
+from fmus.ports.groups import Field, ParameterSet, is_class
 from fmus.ports.port import POSITIVE, Misdeclared, Port, Refusal
 
-__all__ = ("POSITIVE", "Refusal", "Variable", "declared", "ports_in")
+__all__ = ("POSITIVE", "Refusal", "Variable", "declared")
 
 
 @dataclass(frozen=True)
@@ -113,13 +113,6 @@ def _declared(
     return fields
 
 
-def ports_in(field: Field) -> Sequence[Port]:
-    """The ports of a field."""
-    if isinstance(field, Port):
-        return (field,)
-    return field if isinstance(field, tuple) else field.ports
-
-
 def _wrong(place: tuple[str, ...], why: str) -> Misdeclared:
     return Misdeclared(f"{'.'.join(place)} {why}", *place)
 
@@ -198,7 +191,7 @@ def _shape(
             raise _wrong(place, "has elements of several types; write a NamedTuple")
         below, number = _shape(elements[0], (), place)
         return (len(get_args(hint)), *below), number
-    if hint in _TYPES or (isinstance(hint, type) and issubclass(hint, IntEnum)):
+    if hint in _TYPES or is_class(hint, IntEnum):
         return (), hint
     kinds = "float, int, bool, an IntEnum, a tuple of them, Vector, Matrix or a NamedTuple"
     raise _wrong(place, f"has the type {_word(hint)}; use {kinds}")

@@ -86,25 +86,26 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     )
     describe(
         component,
-        "Create a folder with a component in one Python file, which both kinds of FMU are made "
-        "from, and with its tests, a scenario that runs it, and a README.",
+        "Create a folder with a component in one Python file, from which both kinds of FMU are "
+        "built, and its tests, a scenario that runs it and a README.",
         "new component water_tank --like plant",
     )
     _add_place(component, "component", "WaterTank or water_tank")
-    component.add_argument(
+    start = component.add_mutually_exclusive_group()
+    start.add_argument(
         "--like",
         choices=LIKENESSES,
         default=LIKENESSES[0],
-        help="what it is at first: controller (PID with limits), plant (a tank), filter (low-pass "
-        f"of second order) or empty (the least there can be); default: {LIKENESSES[0]}",
+        help="what to start from: controller (PID with limits), plant (a tank), filter (low-pass "
+        f"of second order) or empty (the minimum); default: {LIKENESSES[0]}",
     )
-    component.add_argument(
+    start.add_argument(
         "--from",
         dest="network",
         type=Path,
         metavar="FILE",
-        help="compute the neural network of an .onnx or .npz file instead; it has dense layers and "
-        "tanh, relu or sigmoid",
+        help="start from the neural network in an .onnx or .npz file: dense layers with tanh, "
+        "relu, sigmoid or no activation",
     )
     component.set_defaults(action=_component)
     controller = kinds.add_parser(
@@ -131,7 +132,11 @@ def _add_place(parser: argparse.ArgumentParser, what: str, examples: str) -> Non
     """Declare name and folder of what is new."""
     parser.add_argument("name", metavar="NAME", help=f"name of the {what}, for example {examples}")
     parser.add_argument(
-        "folder", nargs="?", type=Path, metavar="DIR", help="folder to create; default: NAME/"
+        "folder",
+        nargs="?",
+        type=Path,
+        metavar="DIR",
+        help="folder to create; default: its name in lower case, as water_tank/",
     )
 
 
@@ -161,8 +166,7 @@ def _build(options: argparse.Namespace) -> int:
         force=options.force,
         hear=say,
     )
-    for path in written:
-        show(path)
+    show(*written)
     state = "built" if written else "up to date"
     show(f"{folder} is {state}, {_described(bundle.settings_of(folder))}")
     return OK
@@ -203,22 +207,22 @@ def _described(settings: Mapping[str, str]) -> str:
 
 
 def _controller(options: argparse.Namespace) -> int:
-    script, scenario, *others = new_controller(options.name, options.folder, options.base)
-    for path in (script, scenario, *others):
-        show(path)
-    show(f"edit {script}, then build and run it:")
-    show(f"  auv-fmu build {script}")
-    show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
-    return OK
+    files = new_controller(options.name, options.folder, options.base)
+    return _next_steps(files, scenario=files[1])
 
 
 def _component(options: argparse.Namespace) -> int:
     files = new_component(options.name, options.folder, options.like, options.network)
-    for path in files:
-        show(path)
-    script, test, scenario, _ = files
-    show(f"edit {script}, then test, build and run it:")
-    show(f"  pytest {test}")
+    return _next_steps(files, scenario=files[2], test=files[1])
+
+
+def _next_steps(files: list[Path], scenario: Path, test: Path | None = None) -> int:
+    """Say what was made, and what to do with it."""
+    show(*files)
+    script = files[0]
+    show(f"edit {script}, then {'test, ' if test else ''}build and run it:")
+    if test:
+        show(f"  pytest {test}")
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

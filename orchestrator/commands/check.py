@@ -40,8 +40,9 @@ def add_check(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu check`."""
     describe(
         parser,
-        "Validate an FMU, an SSP, a scenario, a study or your own component (NAME.py) without "
-        "running it, and list every problem. Exit status: 0 without problems, else 2.",
+        "Validate an FMU, an SSP, a scenario, a study or your own component (NAME.py or its "
+        "folder) without running it, and list every problem. Exit status: 0 without problems, "
+        "else 2.",
         "check my_scenario.toml",
     )
     parser.add_argument(
@@ -53,11 +54,12 @@ def add_check(parser: argparse.ArgumentParser) -> None:
 
 def _check(options: argparse.Namespace) -> int:
     findings = Findings()
-    look = _fmu if options.file.endswith(".fmu") else _system
-    if options.file.endswith(".py"):
+    if _is_own(Path(options.file)):
         look = _script
-    elif is_study(options.file):
-        look = _study
+    elif options.file.endswith(".fmu"):
+        look = _fmu
+    else:
+        look = _study if is_study(options.file) else _system
     to_know = look(options, findings)
     for kind, texts in (
         ("problem", findings.problems),
@@ -70,6 +72,12 @@ def _check(options: argparse.Namespace) -> int:
         return BAD_INPUT
     show(f"{options.file}: no problems found")
     return OK
+
+
+def _is_own(path: Path) -> bool:
+    """Whether a path is a script, or a folder with a component."""
+    names = (f"{path.resolve().name}.py", "behaviour.py")
+    return path.suffix == ".py" or any((path / name).is_file() for name in names)
 
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:

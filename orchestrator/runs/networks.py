@@ -10,11 +10,13 @@ import re
 import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from fmus.ports.port import FAULT, H_MAX, TIME
 from orchestrator.machine.errors import InputError, reason
 
 #: What a layer may do with each of its sums, by the names in files.
@@ -28,6 +30,9 @@ _OF_ONNX = {"Tanh": "tanh", "Relu": "relu", "Sigmoid": "sigmoid"}
 
 #: What changes nothing of a row of numbers.
 _PASSES = frozenset(("Identity", "Flatten", "Dropout", "Cast", "Reshape", "Squeeze", "Unsqueeze"))
+
+#: Ports that every component has, or any may have.
+_PORTS_OF_ALL = (FAULT.name, H_MAX.name, TIME.name)
 
 _WIDTH = 98
 
@@ -205,7 +210,8 @@ def component_text(name: str, network: Network, source: str) -> str:
     """
     sizes = [network.n_inputs, *(len(layer.W) for layer in network.layers)]
     used = {layer.activation for layer in network.layers} - {"none"}
-    imports = [f"from math import {names}" for names in [_mathematics(used)] if names]
+    names = sorted(_IMPORTS[word] for word in used & _IMPORTS.keys())
+    imports = [f"from math import {', '.join(names)}"] if names else []
     head = [
         f'"""{name}: a neural network of dense layers, {" - ".join(map(str, sizes))}.\n\n'
         f"Made from {source} by `auv-fmu new component --from`, with its weights written out.\n"
@@ -231,11 +237,8 @@ def component_text(name: str, network: Network, source: str) -> str:
 
 def _port(name: str, otherwise: str) -> str:
     word = re.sub(r"\W", "_", name)
-    return word if word.isidentifier() and not word.startswith("_") else otherwise
-
-
-def _mathematics(used: set[str]) -> str:
-    return ", ".join(sorted({"tanh": "tanh", "sigmoid": "exp"}[w] for w in used - {"relu"}))
+    can = word.isidentifier() and not word.startswith("_") and not iskeyword(word)
+    return word if can and word not in _PORTS_OF_ALL else otherwise
 
 
 def _constants(i: int, layer: Dense) -> Iterator[str]:
@@ -275,14 +278,14 @@ def advance(inputs: Inputs) -> Outputs:
 
 _FUNCTIONS = {
     "relu": """def _relu(x: float) -> float:
-    return x if x > 0.0 else 0.0
-""",
+    return x if x > 0.0 else 0.0""",
     "sigmoid": """def _sigmoid(x: float) -> float:
     # Of two forms the one whose exp cannot be too large.
-    return 1.0 / (1.0 + exp(-x)) if x >= 0.0 else exp(x) / (1.0 + exp(x))
-""",
-    "tanh": "",
+    return 1.0 / (1.0 + exp(-x)) if x >= 0.0 else exp(x) / (1.0 + exp(x))""",
 }
+
+#: What they take from math.
+_IMPORTS = {"sigmoid": "exp", "tanh": "tanh"}
 
 _CALLS = {"tanh": "tanh", "relu": "_relu", "sigmoid": "_sigmoid"}
 

@@ -54,7 +54,7 @@ def new_controller(
 
     Args:
         name: of the controller, `MyLaw` or `my_law`.
-        folder: made if it does not exist; None: one with the name, in the current folder.
+        folder: made if it does not exist; None: one with the name of its module.
         base: one of :data:`CONTROLLER_BASES`.
 
     Returns:
@@ -71,7 +71,8 @@ def new_controller(
         "README.md": "controller/README.md",
     }
     texts = {target: _template(file) for target, file in contents.items()}
-    files = _write(Path(name), folder, texts, {_CLASS: class_name, _MODULE: module})
+    names = {_CLASS: class_name, _MODULE: module}
+    files = _write(folder or Path(module), texts, names)
     return [*files, build_own(files[0])]
 
 
@@ -85,7 +86,7 @@ def new_component(
 
     Args:
         name: of the component, `WaterTank` or `water_tank`.
-        folder: made if it does not exist; None: one with the name, in the current folder.
+        folder: made if it does not exist; None: one with the name of its module.
         like: one of :data:`LIKENESSES`.
         network: file of a neural network that it computes instead.
 
@@ -116,18 +117,16 @@ def new_component(
         f"{module}.toml": _template(f"component/{like}.toml"),
         "README.md": _template("component/README.md"),
     }
-    return _write(Path(name), folder, texts, {**names, _SETTING: setting, _OUTPUT: output})
+    names |= {_SETTING: setting, _OUTPUT: output}
+    return _write(folder or Path(module), texts, names)
 
 
 def _template(file: str) -> str:
     return (_TEMPLATES / file).read_text(encoding="utf-8")
 
 
-def _write(
-    named: Path, folder: Path | None, texts: Mapping[str, str], names: Mapping[str, str]
-) -> list[Path]:
+def _write(folder: Path, texts: Mapping[str, str], names: Mapping[str, str]) -> list[Path]:
     """Write texts into a new folder, with other names in them."""
-    folder = named if folder is None else folder
     if folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty; choose a new or empty folder")
     with replace_files(folder, texts) as unfinished:
@@ -150,7 +149,7 @@ def _names(name: str, what: str) -> tuple[str, str]:
             f"{name!r}: not a name for a {what}; use letters, digits and underscores, a "
             "letter first"
         )
-    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+    module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     words = [word for word in module.split("_") if word]
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
     if keyword.iskeyword(module) or keyword.iskeyword(class_name) or find_spec(module):

@@ -1,7 +1,7 @@
 """Each construct of the language gives the same bits in Python and in C.
 
-Numbers come from everywhere: overflow, underflow, division by zero and domain errors are
-among them.
+Numbers of every magnitude: overflow, underflow, division by zero and domain errors are among
+them.
 """
 
 from __future__ import annotations

@@ -8,9 +8,9 @@ from typing import Annotated, Any, NamedTuple
 import pytest
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.groups import ParameterSet
+from fmus.ports.groups import ParameterSet, ports_in
 from fmus.ports.port import Misdeclared, Port
-from fmus.ports.variable import POSITIVE, Variable, declared, ports_in
+from fmus.ports.variable import POSITIVE, Variable, declared
 
 
 class Mode(IntEnum):

@@ -121,15 +121,26 @@ def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["new", "component", "RainBarrel", "--like", "plant"]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "RainBarrel/rain_barrel.py",
-        "RainBarrel/test_rain_barrel.py",
-        "RainBarrel/rain_barrel.toml",
-        "RainBarrel/README.md",
-        "edit RainBarrel/rain_barrel.py, then test, build and run it:",
-        "  pytest RainBarrel/test_rain_barrel.py",
-        "  auv-fmu build RainBarrel/rain_barrel.py",
-        f"  auv-fmu run RainBarrel/rain_barrel.toml --out RainBarrel{os.sep}results",
+        "rain_barrel/rain_barrel.py",
+        "rain_barrel/test_rain_barrel.py",
+        "rain_barrel/rain_barrel.toml",
+        "rain_barrel/README.md",
+        "edit rain_barrel/rain_barrel.py, then test, build and run it:",
+        "  pytest rain_barrel/test_rain_barrel.py",
+        "  auv-fmu build rain_barrel/rain_barrel.py",
+        f"  auv-fmu run rain_barrel/rain_barrel.toml --out rain_barrel{os.sep}results",
     ]
+
+
+@pytest.mark.parametrize("name", ["RainBarrel", "rain_barrel", "PIDController"])
+def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
+    monkeypatch.chdir(tmp_path)
+    folder = "pid_controller" if name == "PIDController" else "rain_barrel"
+    assert main(["new", "component", name]) == 0
+    assert main(["check", folder]) == 0
+    assert main(["build", folder]) == 0
+    built = "PidController" if name == "PIDController" else "RainBarrel"
+    assert [path.stem for path in Path(folder).glob("*.fmu")] == [built]
 
 
 @pytest.mark.parametrize(
@@ -141,11 +152,15 @@ def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
         (["check", "none.py"], "none.py: no such Python file"),
         (
             ["build", "own_lag.py", "--kind", "native", "--loader", "plain"],
-            "own_lag.py: --loader is for --kind python: the other kind loads no Python",
+            "cannot build the FMUs: --loader is for --kind python: the other kind loads no Python",
         ),
         (
             ["build", "own_lag.py", "--fmi", "3"],
-            "own_lag.py: --platforms and --fmi 3 need --kind native",
+            "cannot build the FMUs: --platforms and --fmi 3 need --kind native",
+        ),
+        (
+            ["build", "slave.py", "--fmi", "3"],
+            "cannot build the FMUs: --platforms and --fmi 3 need --kind native",
         ),
         (
             ["build", "slave.py", "--kind", "native"],
