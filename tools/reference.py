@@ -224,11 +224,11 @@ def write_examples(root: Path) -> list[Path]:
     """
     written = []
     with TemporaryDirectory() as temporary:
-        for script in sorted(EXAMPLES.glob("*/*.py")):
+        for folder in sorted(path.parent for path in EXAMPLES.glob(f"*/{REFERENCE}")):
             # This kind can be built everywhere.
-            fmu = build_own(script, Path(temporary), kind=PYTHON)
-            folder = root / EXAMPLES.name / script.stem / REFERENCE
-            written += write_component_reference(fmu, folder, example_span(script.stem))
+            fmu = build_own(folder, Path(temporary), kind=PYTHON)
+            target = root / EXAMPLES.name / folder.name / REFERENCE
+            written += write_component_reference(fmu, target, example_span(folder.name))
     return written
 
 

@@ -212,6 +212,13 @@ def test_kalman_filter_is_least_squares_over_all_measurements() -> None:
     assert [seen["p"][-1], seen["v"][-1]] == pytest.approx(found[-2:], abs=1e-9)
 
 
+@pytest.mark.parametrize("r", [1e-9, 0.5, 1e3])
+def test_kalman_filter_keeps_its_covariance_positive(r: float) -> None:
+    """Also for a target that does not manoeuvre, measured nearly without error."""
+    seen = run(load("kalman_filter"), {"q": 0.0, "r": r}, stop_time=100.0, step=0.1)
+    assert min(seen["std_p"]) > 0.0 and min(seen["std_v"]) > 0.0
+
+
 def _radar(x: Any) -> Any:
     return np.array([np.sqrt(x[0] ** 2 + x[1] ** 2), np.arctan2(x[1], x[0])])
 

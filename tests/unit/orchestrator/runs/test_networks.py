@@ -12,7 +12,7 @@ import pytest
 
 from fmus.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.networks import ACTIVATIONS, component_text, read_network
+from orchestrator.runs.networks import ACTIVATIONS, Network, component_text, read_network
 from support.language import Twins, module_of
 
 SIZES = (4, 8, 5, 2)
@@ -149,3 +149,9 @@ def test_files_that_cannot_be_read_are_refused(tmp_path: Path):
     (tmp_path / "policy.npz").write_bytes(b"nothing")
     with pytest.raises(InputError, match=r"policy\.npz: cannot be read: "):
         read_network(tmp_path / "policy.npz")
+
+
+@pytest.mark.parametrize("name", ["in", "time", "fault", "h_max", "_x", "7"])
+def test_names_that_ports_cannot_have_are_replaced(name: str):
+    network = Network([], name, name)
+    assert (network.input_port, network.output_port) == ("x", "y")
