@@ -36,7 +36,7 @@ from fmus.native.shapes import (
     structure,
     vector,
 )
-from fmus.native.variables import names_in
+from fmus.native.variables import free_names, names_in
 from fmus.ports.groups import hints_of
 
 #: Functions that never raise, and arithmetic.h's for the others.
@@ -79,8 +79,7 @@ class Calls(Operators):
             function, captured = self.functions[local]
             codes = self._arguments(node, list(function.arguments)[: -len(captured) or None])
             given = self._fitted(node, codes, list(function.arguments.values())[: len(codes)])
-            names = [ast.copy_location(ast.Name(name, ast.Load()), node) for name in captured]
-            return self.calling(function, [*given, *(self.code(name).text for name in names)])
+            return self.calling(function, [*given, *self._values(node, captured)])
         called = self.known(node.func)
         if called is None and isinstance(node.func, ast.Attribute):
             return self._method(node, node.func)
@@ -234,6 +233,7 @@ class Calls(Operators):
         for name in sorted(target & names_in(first.iter)):
             raise self.fail(node, f"{name} is also what it runs over: rename it before the in")
         inner.names |= target
+        elements, place = inner.unused("elements"), inner.unused("place")
         loop = loop_over(inner, first.target, first.iter, set())
         if loop.turns is None or loop.turns < 1:
             raise self.fail(node, "a number of elements that is not a constant above 0")
@@ -251,15 +251,15 @@ class Calls(Operators):
         shape = self._comprehended(node, made, element, loop.turns)
         self.program.defined(shape)
         inner.made.returns = shape
-        lines += laid_out(f"elements.v[place++] = {element.text};", " " * 8)
+        lines += laid_out(f"{elements}.v[{place}++] = {element.text};", " " * 8)
         begin = [
             *laid_out(inner.made.head, ""),
-            f"    {shape.name} elements;",
-            "    int place = 0;",
+            f"    {shape.name} {elements};",
+            f"    int {place} = 0;",
         ]
-        inner.made.text = "\n".join([*begin, *lines, "    }", "    return elements;", "}"])
+        inner.made.text = "\n".join([*begin, *lines, "    }", f"    return {elements};", "}"])
         self.program.functions[inner.made.name] = inner.made
-        return self.calling(inner.made, [in_c(name) for name in captured])
+        return self.calling(inner.made, self._values(node, captured))
 
     def _comprehended(self, node: ast.AST, made: Any, element: Code, n: int) -> Structure:
         if made is Matrix:
@@ -268,12 +268,20 @@ class Calls(Operators):
             return structure([element.shape] * n)
         return self._array_of(node, Vector, [element] * n)
 
+    def _values(self, node: ast.AST, captured: Sequence[str]) -> list[str]:
+        """Names that a function within this one captures, as its arguments."""
+        names = (ast.copy_location(ast.Name(name, ast.Load()), node) for name in captured)
+        return [self.code(name).text for name in names]
+
     def inside(self, node: ast.AST, word: str) -> tuple[Calls, list[str]]:
         """What translates a function within this one, and the names that it captures."""
-        used = [n.id for n in ast.walk(node) if isinstance(n, ast.Name)]
+        used = free_names(node)
         for name in used:
             used += self.functions.get(name, (None, []))[1]
-        captured = [n for n in dict.fromkeys(used) if n in self.names and n in self.local]
+        captured = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
+        for name in captured:
+            if name not in self.local:
+                raise self.fail(node, f"{name} may have no value here")
         name = self.program.name((self.made.name, word), f"{self.made.name}_{word}")
         made = Function(name, {n: self.local[n] for n in captured}, None)
         inner = type(self)(self.program, self.path, self.scope, made, set(captured))

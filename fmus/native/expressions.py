@@ -33,6 +33,9 @@ from fmus.ports.groups import is_class
 #: How tightly the operators of C bind.
 TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, POSTFIX = range(9)
 
+#: How a text begins that says where it is about.
+_PLACED = re.compile(r".+:\d+: ")
+
 WHOLE = (INTEGER, BOOLEAN)
 NUMBERS = (DOUBLE, *WHOLE)
 
@@ -140,7 +143,12 @@ class Expressions:
         if not hasattr(self, name):
             raise self.fail(node, f"{type(node).__name__} has no counterpart in C here")
         method: Callable[[Any, Shape | None], Code] = getattr(self, name)
-        return method(node, wanted)
+        try:
+            return method(node, wanted)
+        except (Untranslatable, TypeError) as error:
+            if _PLACED.match(str(error)):
+                raise
+            raise self.fail(node, str(error)) from None
 
     def fitting(self, node: ast.expr, wanted: Shape | None) -> Code:
         """An expression of exactly this shape."""

@@ -24,6 +24,7 @@ from fmus.native.shapes import (
     TEXT,
     Shape,
     Structure,
+    closed,
     declared,
     has_no_size,
     in_c,
@@ -41,7 +42,7 @@ def _checked(path: str) -> ast.Module:
     """The tree of a module that is in the language."""
     for one in foreign(Path(path)):
         raise Untranslatable(one)
-    return ast.parse(Path(path).read_text(encoding="utf-8"))
+    return ast.parse(Path(path).read_bytes())
 
 
 def function_in_c(program: Program, function: FunctionType, made: Function) -> None:
@@ -98,7 +99,7 @@ class _Translation:
             about = comments_of(self._in_c.path).get(statement.end_lineno or 0)
             simple = not isinstance(statement, (ast.If, ast.While, ast.For, ast.FunctionDef))
             if about and lines and simple:
-                lines = annotated(lines, f"/* {about} */", indent)
+                lines = annotated(lines, f"/* {closed(about)} */", indent)
             yield from lines
         if new:
             self._scopes.pop()
@@ -193,10 +194,9 @@ class _Translation:
 
     def _local_function(self, node: ast.FunctionDef) -> None:
         """A function within this one, as a function of its own that gets what it captures."""
-        body = ast.Module(node.body, [])
-        inner, captured = self._in_c.inside(body, node.name)
-        own = {argument.arg for argument in node.args.args}
-        captured = [name for name in captured if name not in own]
+        if self._assigned[node.name] > 1:
+            raise self._in_c.fail(node, f"{node.name} is given a value twice: use two names")
+        inner, captured = self._in_c.inside(node, node.name)
         for name in captured:
             if self._assigned[name] > (name not in self._made.arguments):
                 raise self._in_c.fail(node, f"{name}, which {node.name} uses, is changed")
@@ -236,8 +236,7 @@ class _Translation:
         else:
             target = ast.Name(ast.unparse(node.target), ast.Load(), lineno=node.lineno)
             changed = ast.BinOp(target, node.op, node.value, lineno=node.lineno)
-            code = self._in_c.fitting(changed, self._in_c.code(target).shape)
-            yield f"{in_c(target.id)} = {code.text};"
+            yield self._stored(node, [(target.id, self._in_c.code(changed))])
 
     def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         if isinstance(target, ast.Name):
@@ -275,7 +274,8 @@ class _Translation:
 
     def _taken_apart_in(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         code = self._in_c.code(value)
-        if not is_dotted_name(value):
+        # A part that depends on what is given a value here is read before.
+        if not is_dotted_name(value) or names_in(target) & names_in(value):
             name = self._name_of_all(target, value)
             self._in_c.program.defined(code.shape)
             yield f"const {declared(code.shape)}{in_c(name)} = {code.text};"
@@ -321,6 +321,8 @@ class _Translation:
         if before == DOUBLE and code.shape in WHOLE:
             better = f"{code.text}.0" if code.text.isdecimal() else f"float({code.text})"
             return f"{name} is a float and gets an int: write {better}"
+        if before in WHOLE and code.shape == DOUBLE:
+            return f"{name} is {before.word} and gets a float: begin with a float, such as 0.0"
         return f"{name} is {before.word} and gets {code.shape.word}: use another name"
 
     def _note(self, name: str) -> None:

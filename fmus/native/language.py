@@ -46,6 +46,18 @@ INSTEAD = {
     "a raise without a text": "write raise Refusal(\"...\")",
     "a while that changes nothing in its condition": "write for _ in range(most): and break",
     "more names than one for a value": "write one assignment a line",
+    "a name twice in one assignment": "use _ for what is not needed",
+    "the operator BitAnd": "write and, or arithmetic such as k % 8",
+    "the operator BitOr": "write or, or arithmetic",
+    "the operator LShift": "write a product",
+    "the operator RShift": "write // of a power of two",
+    "the operator UAdd": "leave it out",
+    "the name pow": "write math.pow",
+    "the name reversed": "write range(n - 1, -1, -1)",
+    "the name divmod": "write // and %",
+    "the name str": "texts are for raise Refusal(f\"...\") only",
+    "AnnAssign": "give it a value",
+    "Return": "write an if around the rest",
     "the name sum": "write v.sum() of a Vector: Python's sum rounds differently from 3.12 on",
     "the name hypot": "write sqrt(x * x + y * y): Python's hypot has an algorithm of its own",
     "the name print": "use a debugger, or an output",
@@ -97,7 +109,7 @@ _COLLECTIONS = frozenset(("Matrix", "Vector", "tuple"))
 def foreign(path: Path) -> list[str]:
     """What is outside the language in a module: one line each that an editor can jump to."""
     try:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = ast.parse(path.read_bytes())
     except SyntaxError as error:
         return [f"{path}:{error.lineno}: {error.msg}"]
     return [
@@ -107,7 +119,10 @@ def foreign(path: Path) -> list[str]:
 
 
 def _advice(what: str) -> str:
-    return f"; {INSTEAD[what]}" if what in INSTEAD else ""
+    if what.startswith("the module "):
+        return f"; write from {what.rsplit(maxsplit=1)[-1]} import ..."
+    known = what.replace("the name math.", "the name ")
+    return f"; {INSTEAD[known]}" if known in INSTEAD else ""
 
 
 _Found = Iterator["tuple[int, str]"]
@@ -115,11 +130,12 @@ _Found = Iterator["tuple[int, str]"]
 
 def _module(tree: ast.Module, path: Path) -> _Found:
     known = set(_known(tree, path))
+    modules = set(_modules(tree, path))
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
             if f"{path.stem}.{node.name}" not in OUTSIDE:
                 yield from _function(node)
-                yield from _names(node, known)
+                yield from _names(node, known, modules)
         elif isinstance(node, ast.ClassDef):
             yield from _class(node)
         elif not isinstance(node, _MODULE_LEVEL) and not _is_text(node):
@@ -158,11 +174,20 @@ def _known(tree: ast.Module, path: Path) -> Iterator[str]:
                 yield from names_in.values()
 
 
+def _modules(tree: ast.Module, path: Path) -> Iterator[str]:
+    """Names of whole modules, from which functions must be imported one by one."""
+    for node in tree.body:
+        for alias in node.names if isinstance(node, ast.Import) else ():
+            package = alias.name.split(".")[0]
+            if package in (*_PACKAGES, "math") or _lies_beside(path, package):
+                yield alias.asname or package
+
+
 def _lies_beside(path: Path, module: str) -> bool:
     return path.with_name(f"{module}.py").is_file() or path.with_name(module).is_dir()
 
 
-def _names(function: ast.FunctionDef, known: set[str]) -> _Found:
+def _names(function: ast.FunctionDef, known: set[str], modules: set[str]) -> _Found:
     local = set(known)
     used: list[ast.Name] = []
     for node in ast.walk(function):
@@ -174,7 +199,7 @@ def _names(function: ast.FunctionDef, known: set[str]) -> _Found:
         used += _used(statement)
     for name in used:
         if name.id not in local:
-            yield name.lineno, f"the name {name.id}"
+            yield name.lineno, f"the {'module' if name.id in modules else 'name'} {name.id}"
 
 
 def _used(node: ast.AST) -> Iterator[ast.Name]:
@@ -246,6 +271,9 @@ def _compound(node: ast.If | ast.While | ast.For | ast.FunctionDef) -> _Found:
 
 def _target(node: ast.expr) -> _Found:
     if isinstance(node, ast.Tuple):
+        names = [n.id for n in ast.walk(node) if isinstance(n, ast.Name) and n.id != "_"]
+        if len(names) != len(set(names)):
+            yield node.lineno, "a name twice in one assignment"
         for element in node.elts:
             yield from _target(element)
     elif not isinstance(node, ast.Name):

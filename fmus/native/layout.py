@@ -33,6 +33,8 @@ def laid_out(text: str, indent: str) -> list[str]:
 def quoted(text: str) -> str:
     """A text in C."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    # Two question marks may begin a trigraph.
+    escaped = escaped.replace("?", "\\?") if "??" in escaped else escaped
     return f'"{escaped}"'
 
 
@@ -101,7 +103,7 @@ def _split(text: str) -> list[str]:
 @cache
 def comments_of(path: str) -> dict[int, str]:
     """The comments of a file after code, by line."""
-    text = Path(path).read_text(encoding="utf-8")
+    text = Path(path).read_text(encoding="utf-8-sig")
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
     return {
         token.start[0]: token.string.lstrip("#: ")

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from fmus.native.expressions import Code, Expressions, is_dotted_name
 from fmus.native.shapes import INTEGER, Structure, in_c
+from fmus.native.variables import names_in
 
 
 class Loop(NamedTuple):
@@ -39,7 +40,7 @@ def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed
         Untranslatable: it is nothing that a loop can run over.
 
     """
-    for name in sorted({n.id for n in ast.walk(target) if isinstance(n, ast.Name)} & changed):
+    for name in sorted(names_in(target) & changed - {"_"}):
         raise within.fail(target, f"{name} is the loop's own and cannot be changed in it")
     if _called(within, iterable) is range:
         assert isinstance(iterable, ast.Call)
@@ -76,16 +77,15 @@ def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
         stop = Code(end, INTEGER)
     sign = "<" if numbers[2] > 0 else ">"
     known = None if None in numbers else len(range(*numbers))  # type: ignore[arg-type]
-    if known is None and abs(numbers[2]) > 1:
+    if abs(numbers[2]) > 1 and (numbers[1] is None or abs(numbers[1] + numbers[2]) >= 2**31):
         # The counter may pass the largest int.
         at = within.unused(f"{name}_at")
-        head = (
-            f"for (long long {at} = {first.text}; {at} {sign} {stop.text}; {at} += {step.text}) {{"
-        )
-        return Loop(before, head, [(target.id, Code(f"(int){at}", INTEGER))], None)
+        kind, counter = "long long", Code(f"(int){at}", INTEGER)
+    else:
+        at, kind, counter = name, "int", Code(name, INTEGER)
     change = {1: "++", -1: "--"}.get(numbers[2], f" += {step.text}")
-    head = f"for (int {name} = {first.text}; {name} {sign} {stop.text}; {name}{change}) {{"
-    return Loop(before, head, [(target.id, Code(name, INTEGER))], known)
+    head = f"for ({kind} {at} = {first.text}; {at} {sign} {stop.text}; {at}{change}) {{"
+    return Loop(before, head, [] if name == "_" else [(target.id, counter)], known)
 
 
 def _bound(within: Expressions, node: ast.expr) -> Code:

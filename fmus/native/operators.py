@@ -79,7 +79,7 @@ class Operators(Expressions):
         operation = arrays.binary(self.program, node.op, left.shape, right.shape)
         if operation is None:
             sign = _sign_of(node.op)
-            raise self.fail(node, f"there is no {left.shape.word} {sign} {right.shape.word}")
+            raise self.fail(node, f"{left.shape.word} {sign} {right.shape.word} is not defined")
         operands = [self.number(x, c).text if c.shape in NUMBERS else c.text
                     for x, c in ((node.left, left), (node.right, right))]  # fmt: skip
         return self.calling(operation.function, operands[::-1] if operation.swapped else operands)
@@ -102,16 +102,17 @@ class Operators(Expressions):
             return Code(f"!{operand.within(UNARY)}", BOOLEAN, UNARY)
         if isinstance(node.op, ast.UAdd):
             raise self.fail(node, "the operator +")
+        if isinstance(node.operand, ast.Constant) and type(node.operand.value) is int:
+            return Code(self.written(node, -node.operand.value), INTEGER, UNARY)
         operand = self.code(node.operand)
         if arrays.is_array(operand.shape):
             return self.calling(arrays.negative(self.program, operand.shape), [operand.text])
-        if operand.shape in WHOLE and not isinstance(node.operand, ast.Constant):
+        if operand.shape in WHOLE:
             self.made.raises = True
             return Code(f"NEG({operand.argument})", INTEGER)
         if operand.shape not in NUMBERS:
             raise self.fail(node, f"{operand.shape.word} where a number is wanted")
-        shape = INTEGER if operand.shape in WHOLE else DOUBLE
-        return Code(f"-{operand.within(POSTFIX)}", shape, UNARY)
+        return Code(f"-{operand.within(POSTFIX)}", DOUBLE, UNARY)
 
     def condition(self, node: ast.expr) -> Code:
         """An expression as a truth value."""

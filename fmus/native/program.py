@@ -17,8 +17,8 @@ from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
     INTEGER,
-    RUNTIME,
     Shape,
+    Structure,
     declaration,
     declared,
     has_no_size,
@@ -28,6 +28,7 @@ from fmus.native.shapes import (
     shape_of,
     structure,
     vector,
+    words_of_runtime,
 )
 from fmus.ports.groups import hints_of
 
@@ -94,7 +95,7 @@ class Program:
 
     def name(self, owner: Hashable, name: str) -> str:
         """A name in C that only its owner has, and no variable of a module met so far."""
-        taken = _taken() | self._words
+        taken = words_of_runtime() | self._words
         while name in taken or self._owners.setdefault(name, owner) != owner:
             name += "_"
         return name
@@ -108,15 +109,16 @@ class Program:
         for part in inner_structures(shape):
             text = declaration(part)
             if self.structures.setdefault(part.name, text) != text:
-                raise Untranslatable(f"two structures have the name {part.name}")
+                raise Untranslatable(f"two classes have the name {part.name}: rename one")
         return shape
 
     def constant(self, module: str, name: str, value: Any) -> tuple[str, Shape]:
         """The name in C and the shape of what stands in a module: numbers, or tuples of them."""
-        value = _evened(value)
         shape = self.defined(_shape_of_value(value, name))
-        given = self.name(("constant", module, name), c_name(module, name))
-        self.constants.setdefault(given, f"static const {shape.name} {given} = {_literal(value)};")
+        literal = _literal(value, shape, name)
+        # Another module, or an enumeration, may have one of this name and another value.
+        given = self.name(("constant", shape, literal), c_name(module, name))
+        self.constants.setdefault(given, f"static const {shape.name} {given} = {literal};")
         return given, shape
 
     def function(self, function: FunctionType, shapes: Sequence[Shape] = ()) -> Function:
@@ -165,14 +167,6 @@ class Program:
 
 
 @cache
-def _taken() -> frozenset[str]:
-    """Names of the runtime, which equations cannot have for their functions and constants."""
-    texts = [path.read_text(encoding="utf-8") for path in sorted(RUNTIME.glob("*.[ch]"))]
-    code = re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
-    return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", code))
-
-
-@cache
 def _words(module: str) -> frozenset[str]:
     """All names in the text of a module."""
     return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", inspect.getsource(sys.modules[module])))
@@ -181,14 +175,6 @@ def _words(module: str) -> frozenset[str]:
 def c_name(module: str, name: str) -> str:
     """The name of something in C, where names of several modules stand side by side."""
     return f"{module.rsplit('.', maxsplit=1)[-1]}_{name.lstrip('_')}"
-
-
-def _evened(value: Any) -> Any:
-    """A constant, in which ints beside floats in a tuple are floats, as they are in arithmetic."""
-    if type(value) is tuple:
-        kinds = set(map(type, value))
-        return tuple(map(float, value)) if kinds == {int, float} else tuple(map(_evened, value))
-    return value
 
 
 def _shape_of_value(value: Any, name: str) -> Shape:
@@ -207,11 +193,16 @@ def _shape_of_value(value: Any, name: str) -> Shape:
     raise Untranslatable(f"{name} is not a number, nor a tuple of numbers")
 
 
-def _literal(value: Any) -> str:
-    if isinstance(value, tuple):
-        parts = ", ".join(map(_literal, value))
-        is_record = hasattr(value, "_fields") or len({type(part) for part in value}) > 1
-        return f"{{{parts}}}" if is_record else f"{{{{{parts}}}}}"
+def _literal(value: Any, shape: Shape, name: str) -> str:
+    if isinstance(shape, Structure):
+        names = getattr(value, "_fields", range(len(value)))
+        parts = ", ".join(
+            _literal(one, part, f"{name}.{field}")
+            for one, (_, part), field in zip(value, shape.parts, names)
+        )
+        return f"{{{{{parts}}}}}" if shape.is_array else f"{{{parts}}}"
+    if shape == DOUBLE and isinstance(value, int):
+        raise Untranslatable(f"{name} is an int where a float is wanted: write {value}.0")
     return number_in_c(value)
 
 

@@ -100,15 +100,24 @@ _SCALARS: dict[Any, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN, str: 
 _NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
 
 
-#: Words in capitals: the headers of each system have macros of their own.
-_CAPITALS = re.compile(r"[A-Z][A-Z0-9_]{3,}")
+#: Words in capitals, for the headers of each system have macros of their own; structures' names.
+_PATTERNS = re.compile(r"[A-Z][A-Z0-9_]{3,}|(Vector|Matrix|int|double)\d*x?\d+\w*")
 
 
 @cache
 def in_c(name: str) -> str:
     """The name of a variable or a member in C."""
-    is_taken = name in _TAKEN | _arithmetic() or _CAPITALS.fullmatch(name)
+    stem = name.rstrip("_")
+    is_taken = stem in _TAKEN | _arithmetic() or _PATTERNS.fullmatch(stem)
     return f"{name}_" if is_taken else name
+
+
+@cache
+def words_of_runtime() -> frozenset[str]:
+    """All names in the runtime, which functions, constants and structures cannot have."""
+    texts = [path.read_text(encoding="utf-8") for path in sorted(RUNTIME.glob("*.[ch]"))]
+    code = re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
+    return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", code))
 
 
 @cache
@@ -143,7 +152,8 @@ def shape_of(hint: Any) -> Shape:
         return INTEGER
     if isinstance(hint, type) and hasattr(hint, "__annotations__"):
         parts = [(f".{in_c(name)}", shape_of(part)) for name, part in hints_of(hint).items()]
-        return Structure(in_c(hint.__name__), tuple(parts), hint)
+        name = in_c(hint.__name__)
+        return Structure(f"{name}_" if name in words_of_runtime() else name, tuple(parts), hint)
     name = hint.__name__ if isinstance(hint, type) else hint
     raise TypeError(f"{name} is not a type in the language of equations")
 
@@ -171,8 +181,14 @@ def structure(items: list[Shape], name: str | None = None) -> Structure:
         first = items[0]
         own = f"Vector{len(items)}" if first == DOUBLE else f"{first.name}x{len(items)}"
         return Structure(name or own, tuple((f".v[{i}]", item) for i, item in enumerate(items)))
-    joined = "_".join(item.name for item in items) or "Empty"
+    joined = "_".join(map(_name_of, items)) or "Empty"
     return Structure(name or joined, tuple((f".m{i}", item) for i, item in enumerate(items)))
+
+
+def _name_of(item: Shape) -> str:
+    """The name of a part of a tuple: a tuple within it ends with a mark of its own."""
+    is_tuple = isinstance(item, Structure) and item.made is None and not item.is_array
+    return f"{item.name}_" if is_tuple else item.name
 
 
 def inner_structures(shape: Shape) -> Iterator[Structure]:
@@ -212,4 +228,9 @@ def _comments(made: Any) -> dict[str, str]:
 
 def strip_sphinx_marks(text: str) -> str:
     """Take the marks that Sphinx reads out of a text."""
-    return re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text).replace("*/", "* /")
+    return closed(re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text))
+
+
+def closed(text: str) -> str:
+    """A text that does not end the comment it stands in."""
+    return text.replace("*/", "* /")

@@ -10,7 +10,7 @@ from fmus.native.flat import Passage, count, passage
 from fmus.native.functions import function_in_c
 from fmus.native.layout import LINE_WIDTH, laid_out
 from fmus.native.program import Function, Program
-from fmus.native.shapes import Structure, in_c
+from fmus.native.shapes import Structure, closed, in_c
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 
@@ -43,7 +43,7 @@ def translated(definition: Definition) -> str:
     glue = _glue(program, definition.behaviour)
     citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     sections = [
-        _HEAD.format(title=definition.summary, citation=citation),
+        _HEAD.format(title=closed(definition.summary), citation=closed(citation)),
         *program.structures.values(),
         *program.constants.values(),
         *(function.text for function in program.functions.values()),

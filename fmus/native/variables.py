@@ -28,6 +28,27 @@ def loaded_names(*nodes: ast.AST) -> list[str]:
                     and isinstance(n.target, ast.Name)]  # fmt: skip
 
 
+def free_names(*nodes: ast.AST) -> list[str]:
+    """Names that are used in code and belong to what is around it, in the order of their use."""
+    found: list[str] = []
+    for node in nodes:
+        if isinstance(node, ast.Name):
+            found += [node.id] if isinstance(node.ctx, ast.Load) else []
+        elif isinstance(node, ast.FunctionDef):
+            own = {argument.arg for argument in node.args.args} | set(stored_names(node))
+            found += [name for name in free_names(*node.body) if name not in own]
+        elif isinstance(node, ast.GeneratorExp):
+            first, *others = node.generators
+            own = {name for one in node.generators for name in names_in(one.target)}
+            inner = free_names(node.elt, *(one.iter for one in others))
+            found += [*free_names(first.iter), *(name for name in inner if name not in own)]
+        elif isinstance(node, ast.AnnAssign):
+            found += free_names(*filter(None, [node.value]))
+        else:
+            found += free_names(*ast.iter_child_nodes(node))
+    return found
+
+
 def always_stored(node: ast.stmt) -> set[str] | None:
     """Names that a statement gives a value on every way through it; None: none leads through."""
     if isinstance(node, (ast.Return, ast.Raise, ast.Break, ast.Continue)):

@@ -233,7 +233,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         derived,
         types.get("inputs", Nothing),
         outputs,
-        types.get("parameters", Nothing),
+        next((found["parameters"] for found in hints.values() if "parameters" in found), Nothing),
         is_stateless,
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,

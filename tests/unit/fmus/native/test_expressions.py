@@ -67,8 +67,18 @@ XS, YS = Vector((-2.0, -0.5, 1.0, 4.0)), Vector((3.0, -1.0, 0.5, 0.25))
 A = Matrix(((2.0, -1.0, 0.5), (0.0, 1.5, -0.25)))
 POWERS = (1, 2, 4, 8)
 NESTED = ((1.0, 2.5), (-3.0, 0.125))
+class File(NamedTuple):
+    """A record whose name C has."""
+
+    a: float
+    b: float
+
+
 START = Inner(0.5)
 N = 3
+TABLE = ((1, 50.0), (2, 10.0), (0, 30.0))
+RAGGED = Vector((1.0, 2.0)), Vector((3.0, 4.0, 5.0))
+MIXED, PAIR = (0, 1.5), (1, 2)
 '''
 
 #: A name for each construct, and a function that consists of little else.
@@ -294,6 +304,44 @@ CONSTRUCTS = {
         "    float, Annotated[Vector, 4], int\n]:\n"
         "    at = k % 4\n    return v[at], v.replaced(at, x), (at + 1) % 4\n"
     ),
+    "taken apart by a part of itself": (
+        "def f(k: int, x: float) -> tuple[int, float]:\n"
+        "    mode = k % 3\n    mode, dwell = TABLE[mode]\n"
+        "    for _ in range(2):\n        for _ in range(2):\n            mode, y = TABLE[mode]\n"
+        "            dwell += x * y\n    return mode, dwell\n"
+    ),
+    "one variable in a loop and an expression": (
+        "def f(v: Annotated[Vector, 3], x: float) -> Annotated[Vector, 3]:\n"
+        "    total = 0.0\n    for a in v:\n        total += a\n"
+        "    w = Vector(x * a for a in v)\n    for i in range(3):\n        total -= i\n"
+        "    return w * total + Vector(i / x for i in range(3))\n"
+    ),
+    "names of an expression's own": (
+        "def f(elements: float, x: float) -> Annotated[Vector, 3]:\n"
+        "    place = 2.0\n    v = Vector(x * place for place in range(3))\n"
+        "    return v + Vector(elements * place / k for k in range(1, 4))\n"
+    ),
+    "local function with names of its own": (
+        "def f(x: float, k: int) -> float:\n"
+        "    s = 2.0 * x\n"
+        "    def g(a: float) -> float:\n        s = 0\n        for i in range(3):\n"
+        "            s += i\n        x = a * s\n        return x\n"
+        "    for i in range(2):\n        s += g(x) * i\n    s *= 2.0\n    return s - g(s) * k\n"
+    ),
+    "range up to the largest int": (
+        "def f(x: float) -> float:\n"
+        "    for i in range(2147483000, 2147483647, 100):\n        x += i\n"
+        "    for i in range(-2147483000, -2147483648, -500):\n        x += i\n    return x\n"
+    ),
+    "tuples of different parts": (
+        "def f(x: float) -> tuple[float, float]:\n"
+        "    (xs, ys), (a, b) = RAGGED, MIXED\n"
+        "    return xs.sum() * x + ys[2], -MIXED[0] * x + -PAIR[0] * 1.0 + a - b\n"
+    ),
+    "tuples in tuples": (
+        "def f(x: float, k: int) -> float:\n"
+        "    a, b = (x, k, 2.0 * x), ((x, k), 0.5)\n    return a[2] * b[1] + b[0][0] - a[1]\n"
+    ),
     "names of C": (
         "def f(double: float, error: int, int_: float) -> float:\n"
         "    switch, sin, NAN = double / int_, 1.0, 0.5\n    register = switch + sin * NAN\n"
@@ -304,6 +352,10 @@ CONSTRUCTS = {
         "    smaller, larger = min(x, y), max(x, y)\n    quotient, nearest = x / y, round(power)\n"
         "    OVERFLOW = pow(smaller, power) if larger < 9.0 else quotient\n"
         "    return OVERFLOW + nearest % 7\n"
+    ),
+    "names that end alike": (
+        "def f(error: float, error_: float, Vector3: float) -> Annotated[Vector, 3]:\n"
+        "    choice = File(error, error_)\n    return Vector((choice.a, choice.b, Vector3))\n"
     ),
     "range of a constant": (
         "def f(x: float) -> Annotated[Vector, 3]:\n    return Vector(x * k for k in range(N))\n"
@@ -398,6 +450,20 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("k = LARGE", "3000000000 is an int of more than 32 bits"),
         ("y += A[0:1, 2]", "Slice has no counterpart"),
         ('raise Refusal(f"{y!r}")', "!r in a text"),
+        ("y, y = 1.0, y", "a name twice in one assignment"),
+        ("y = v + Vector((1.0, 2.0))", "a Vector of 3 + a Vector of 2 is not defined"),
+        ("k = 0\n    k += 0.5", "k is an int and gets a float: begin with a float"),
+        ("y = ZERO.a", "ZERO.a is an int where a float is wanted: write 0.0"),
+        ("y = (0, 1.5)[int(y)]", "a computed subscript of something other than a tuple of parts"),
+        (
+            "def g(a: float) -> float:\n        return a\n"
+            "    def g(a: float) -> float:\n        return 2.0 * a\n    y = g(y)",
+            "g is given a value twice",
+        ),
+        (
+            "def g(a: float) -> float:\n        return N * a\n    N = 4.0\n    y = g(y) + N",
+            "N may have no value here",
+        ),
         (
             "for k in range(3):\n        def g(a: float) -> float:\n            return a * k\n"
             "    y = g(y)",
@@ -407,7 +473,8 @@ def test_an_integer_that_c_cannot_hold_is_refused(
 )  # fmt: skip
 def test_what_c_would_compute_otherwise_is_refused(tmp_path: Path, line: str, why: str):
     function = f"def f(y: float, v: Annotated[Vector, 3]) -> float:\n    {line}\n    return y\n"
-    module = module_of(HEAD + SHARED + "\nLARGE = 3000000000\n\n" + function, tmp_path, "refused")
+    constants = "\nLARGE, ZERO = 3000000000, Inner(0)\n\n"
+    module = module_of(HEAD + SHARED + constants + function, tmp_path, "refused")
     with pytest.raises(Untranslatable, match=re.escape(why)):
         c_text({"f": module.f})
 
@@ -422,6 +489,38 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
     )
     both = Twins(module_of(text, tmp_path, "tank"), tmp_path)
     assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (7.5,)
+
+
+def test_constants_of_one_name_keep_their_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """One is imported and defined anew, one imported by another name, one like a member."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "gains.py").write_text(
+        "from __future__ import annotations\n\nGAIN = 2.0\nOTHER = 3.0\n\n\n"
+        "def gained(x: float) -> float:\n    return x * GAIN * OTHER\n"
+    )
+    text = (
+        HEAD
+        + SHARED
+        + (
+            "from gains import GAIN, OTHER as K, gained\n\n"
+            "GAIN = 10.0 * GAIN\nOTHER = 7.0\nMode_HEAT, Record_v = 40, 5.0\n\n\n"
+            "def f(x: float) -> float:\n"
+            "    return gained(x) + GAIN + 100.0 * K + OTHER + Mode.HEAT + Mode_HEAT + Record_v\n"
+        )
+    )
+    both = Twins(module_of(text, tmp_path, "with_gains"), tmp_path)
+    sys.modules.pop("gains")
+    assert both.c("f", (1.0,)).numbers == both.python("f", (1.0,)).numbers == (380.0,)
+
+
+def test_comments_stay_comments(tmp_path: Path):
+    text = HEAD + (
+        "def f(x: float) -> float:\n"
+        '    """Twice */ x."""\n'
+        "    y = x  # a */ b ??/\n    y += x  # see a */ y = 5.0; /* b\n    return y\n"
+    )
+    both = Twins(module_of(text, tmp_path, "commented"), tmp_path)
+    assert both.c("f", (3.0,)).numbers == (6.0,)
 
 
 def test_numbers_of_numpy_are_constants(tmp_path: Path):
