@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from operator import itemgetter
 from pathlib import Path
 
@@ -130,7 +130,7 @@ _Found = Iterator["tuple[int, str]"]
 
 def _module(tree: ast.Module, path: Path) -> _Found:
     known = set(_known(tree, path))
-    modules = set(_modules(tree, path))
+    modules = dict(_modules(tree, path))
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
             if f"{path.stem}.{node.name}" not in OUTSIDE:
@@ -174,20 +174,20 @@ def _known(tree: ast.Module, path: Path) -> Iterator[str]:
                 yield from names_in.values()
 
 
-def _modules(tree: ast.Module, path: Path) -> Iterator[str]:
-    """Names of whole modules, from which functions must be imported one by one."""
+def _modules(tree: ast.Module, path: Path) -> Iterator[tuple[str, str]]:
+    """Names here of whole modules, from which functions must be imported one by one."""
     for node in tree.body:
         for alias in node.names if isinstance(node, ast.Import) else ():
             package = alias.name.split(".")[0]
             if package in (*_PACKAGES, "math") or _lies_beside(path, package):
-                yield alias.asname or package
+                yield alias.asname or package, alias.name
 
 
 def _lies_beside(path: Path, module: str) -> bool:
     return path.with_name(f"{module}.py").is_file() or path.with_name(module).is_dir()
 
 
-def _names(function: ast.FunctionDef, known: set[str], modules: set[str]) -> _Found:
+def _names(function: ast.FunctionDef, known: set[str], modules: Mapping[str, str]) -> _Found:
     local = set(known)
     used: list[ast.Name] = []
     for node in ast.walk(function):
@@ -199,7 +199,8 @@ def _names(function: ast.FunctionDef, known: set[str], modules: set[str]) -> _Fo
         used += _used(statement)
     for name in used:
         if name.id not in local:
-            yield name.lineno, f"the {'module' if name.id in modules else 'name'} {name.id}"
+            module = modules.get(name.id)
+            yield name.lineno, f"the module {module}" if module else f"the name {name.id}"
 
 
 def _used(node: ast.AST) -> Iterator[ast.Name]:

@@ -18,6 +18,9 @@ from fmus.ports.groups import hints_of, is_class
 #: What all components share in C.
 RUNTIME = Path(__file__).parent / "runtime"
 
+#: A vector or matrix may be copied to the stack, which has 1 MB in Windows.
+_MOST_NUMBERS = 65_536
+
 #: Names that C has for itself.
 _TAKEN = frozenset(
     (
@@ -165,14 +168,21 @@ def has_no_size(hint: Any) -> bool:
 
 def vector(n: int) -> Structure:
     """The shape of a vector."""
+    _check_size(f"a Vector of {n}", n)
     return Structure(f"Vector{n}", tuple((f".v[{i}]", DOUBLE) for i in range(n)), Vector)
 
 
 def matrix(rows: int, columns: int) -> Structure:
     """The shape of a matrix."""
+    _check_size(f"a Matrix of {rows} rows of {columns}", rows * columns)
     row = vector(columns)
     parts = tuple((f".v[{i}]", row) for i in range(rows))
     return Structure(f"Matrix{rows}x{columns}", parts, Matrix)
+
+
+def _check_size(what: str, n: int) -> None:
+    if n > _MOST_NUMBERS:
+        raise TypeError(f"{what} is too large for C, which takes at most {_MOST_NUMBERS} numbers")
 
 
 def structure(items: list[Shape], name: str | None = None) -> Structure:

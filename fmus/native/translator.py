@@ -8,9 +8,9 @@ from textwrap import wrap
 
 from fmus.native.flat import Passage, count, passage
 from fmus.native.functions import function_in_c
-from fmus.native.layout import LINE_WIDTH, laid_out
-from fmus.native.program import Function, Program
-from fmus.native.shapes import Structure, closed, in_c
+from fmus.native.layout import LINE_WIDTH, laid_out, quoted
+from fmus.native.program import Function, Program, Untranslatable
+from fmus.native.shapes import Structure, closed, in_c, shape_of
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 
@@ -22,6 +22,9 @@ _HEAD = """\
  */
 #include "arithmetic.h"
 """
+
+#: Some ten copies of a state lie on the stack in a step, which has 1 MB in Windows.
+_MOST_IN_STATE = 5_000
 
 _P, _S, _I = (
     "const model_parameters *parameters",
@@ -54,6 +57,9 @@ def translated(definition: Definition) -> str:
 
 def _glue(program: Program, said: Behaviour) -> str:
     """The functions `model_...`, in which the component finds all hooks, also those it has not."""
+    numbers = count(shape_of(said.state))
+    if numbers > _MOST_IN_STATE:
+        raise Untranslatable(f"a state of {numbers} numbers; C takes at most {_MOST_IN_STATE}")
     functions = {name: program.function(hook) for name, hook in said.hooks.items() if hook}
     passages = {
         what: passage(program, what, program.shape(hint), what == "state")
@@ -84,10 +90,10 @@ def _glue(program: Program, said: Behaviour) -> str:
         expected = [outputs.put("*expected", "expected", calls["expected"])]
     # A negative seed is the number 2^32 above it.
     seed = [f"return (unsigned int){calls.get('seed', 0)};"]
-    restarted = said.restarted.replace("{t:g}", "%g")
+    restarted = quoted(said.restarted.replace("%", "%%").replace("{t:g}", "%g"))
     parts = [
         f"enum {{ MODEL_EXPECTS = {int('expected' in calls)}, MODEL_DRAWS = {said.draws} }};\n"
-        f'#define MODEL_RESTARTED "{restarted}"',
+        f"#define MODEL_RESTARTED {restarted}",
         _defined(
             "void begin",
             f"{_P}, {_I}, double t, {_S}, {_O}, {_E}",

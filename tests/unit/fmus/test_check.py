@@ -49,6 +49,13 @@ def test_what_only_the_translation_finds_is_told(tmp_path, monkeypatch):
     assert line.startswith("own_lag.py:58: ")
 
 
+def test_a_state_too_large_for_the_stack_is_told(tmp_path, monkeypatch):
+    write(tmp_path, ("    x: float\n", f"    x: float\n    line: tuple[{'float, ' * 5000}]\n"))
+    monkeypatch.chdir(tmp_path)
+    first, *_ = mistakes("own_lag.py")[1]
+    assert first == "own_lag.py: a state of 5001 numbers; C takes at most 5000"
+
+
 def test_a_module_that_cannot_be_imported_is_told_beside_the_rest(tmp_path, monkeypatch):
     write(
         tmp_path,

@@ -447,6 +447,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = 1.0 * float(*v)", "float with a star"),
         ("v = Vector(2.0 * v for v in v)", "v is also what it runs over"),
         ("k = 3000000000", "3000000000 is an int of more than 32 bits: write 3000000000.0"),
+        ("y = Vector(0.0 for _ in range(70000)).sum()", "a Vector of 70000 is too large for C"),
         ("k = LARGE", "3000000000 is an int of more than 32 bits"),
         ("y += A[0:1, 2]", "Slice has no counterpart"),
         ('raise Refusal(f"{y!r}")', "!r in a text"),
