@@ -36,7 +36,7 @@ from fmus.native.shapes import (
     structure,
     vector,
 )
-from fmus.native.variables import free_names, names_in
+from fmus.native.variables import free_names, names_in, renamed
 from fmus.ports.groups import hints_of
 
 #: Functions that never raise, and arithmetic.h's for the others.
@@ -225,13 +225,13 @@ class Calls(Operators):
 
     def _comprehension(self, node: ast.GeneratorExp, made: Any) -> Code:
         """A vector of what an expression gives in a loop: a function of its own."""
-        first, *others = node.generators
-        if others or first.ifs:
+        if len(node.generators) > 1 or node.generators[0].ifs:
             raise self.fail(node, "an expression with more than one for, or with an if")
+        outer = {*free_names(node.generators[0].iter)} & names_in(node.generators[0].target)
+        node = renamed(node, {name: self.unused(f"{name}_in") for name in sorted(outer)})
+        [first] = node.generators
         inner, captured = self.inside(node, f"each{next(self.numbers)}")
-        target = {n.id for n in ast.walk(first.target) if isinstance(n, ast.Name)}
-        for name in sorted(target & names_in(first.iter)):
-            raise self.fail(node, f"{name} is also what it runs over: rename it before the in")
+        target = names_in(first.target)
         inner.names |= target
         elements, place = inner.unused("elements"), inner.unused("place")
         loop = loop_over(inner, first.target, first.iter, set())

@@ -63,7 +63,7 @@ def function_in_c(program: Program, function: FunctionType, made: Function) -> N
         for node in _checked(path).body
         if isinstance(node, ast.FunctionDef) and node.name == function.__name__
     ]
-    names = {*made.arguments, *stored_names(tree)}
+    names = {*made.arguments, *stored_names(*tree.body)}
     nothing = function.__annotations__.get("return") in (None, "None")
     _Translation(tree, Calls(program, path, function.__globals__, made, names), nothing).write()
 
@@ -74,7 +74,7 @@ class _Translation:
     def __init__(self, tree: ast.FunctionDef, in_c: Calls, returns_nothing: bool) -> None:
         self._tree, self._in_c, self._made = tree, in_c, in_c.made
         self._returns_nothing = returns_nothing
-        self._assigned = Counter(stored_names(tree))
+        self._assigned = Counter(stored_names(*tree.body))
         #: Names that are declared, block by block.
         self._scopes = [set(self._made.arguments)]
         #: Names that are given a value in a block and used after it, with their shapes.
@@ -206,7 +206,7 @@ class _Translation:
         nothing = isinstance(node.returns, ast.Constant) and node.returns.value is None
         made.returns = None if nothing else self._shape(node.returns)
         inner.local = dict(made.arguments)
-        inner.names = {*made.arguments, *stored_names(node)}
+        inner.names = {*made.arguments, *stored_names(*node.body)}
         if inner.assigned is not None:
             inner.assigned = set(made.arguments)
         inner.functions = dict(self._in_c.functions)

@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from copy import deepcopy
 
 
 def stored_names(*nodes: ast.AST) -> list[str]:
     """Names that are given a value, but not in functions and expressions of their own."""
     found: list[str] = []
     for node in nodes:
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.FunctionDef):
-                found.append(child.name)
-            elif isinstance(child, ast.Name) and isinstance(child.ctx, ast.Store):
-                found.append(child.id)
-            elif not isinstance(child, (ast.GeneratorExp, ast.arguments)):
-                found += stored_names(child)
-    return found + [n.id for n in nodes if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
+        if isinstance(node, ast.FunctionDef):
+            found.append(node.name)
+        elif isinstance(node, ast.Name):
+            found += [node.id] if isinstance(node.ctx, ast.Store) else []
+        elif not isinstance(node, ast.GeneratorExp):
+            found += stored_names(*ast.iter_child_nodes(node))
+    return found
 
 
 def loaded_names(*nodes: ast.AST) -> list[str]:
@@ -35,7 +35,7 @@ def free_names(*nodes: ast.AST) -> list[str]:
         if isinstance(node, ast.Name):
             found += [node.id] if isinstance(node.ctx, ast.Load) else []
         elif isinstance(node, ast.FunctionDef):
-            own = {argument.arg for argument in node.args.args} | set(stored_names(node))
+            own = {argument.arg for argument in node.args.args} | set(stored_names(*node.body))
             found += [name for name in free_names(*node.body) if name not in own]
         elif isinstance(node, ast.GeneratorExp):
             first, *others = node.generators
@@ -79,3 +79,13 @@ def both(one: set[str] | None, other: set[str] | None) -> set[str] | None:
 
 def names_in(node: ast.expr) -> set[str]:
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+
+
+def renamed(node: ast.GeneratorExp, names: Mapping[str, str]) -> ast.GeneratorExp:
+    """The same expression with other names of its own; what it runs over lies outside of it."""
+    made = deepcopy(node)
+    for part in ast.walk(made):
+        if isinstance(part, ast.Name):
+            part.id = names.get(part.id, part.id)
+    made.generators[0].iter = node.generators[0].iter
+    return made

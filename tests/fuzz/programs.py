@@ -54,7 +54,11 @@ XS = Vector((-2.0, -0.5, 0.0, 1.0, 4.0))
 YS = Vector((3.0, -1.0, 0.0, 0.5, 0.25))
 A = Matrix(((2.0, -1.0, 0.5), (0.0, 1.5, -0.25), (1.0, 0.0, 3.0)))
 PRIMES = (2, 3, 5, 7)
+TABLE = ((1, 50.0), (2, -0.5), (0, 1e3))
 '''
+
+#: Names that loops and expressions share, and local functions have beside those around them.
+_REUSED = ("a", "each", "one", "p")
 
 FLOAT, INT, BOOL, V3, V2, M33, M23, RECORD = (
     "float", "int", "bool", "Annotated[Vector, 3]", "Annotated[Vector, 2]",
@@ -124,6 +128,7 @@ class Program:
         self._random = Random(seed)
         self._name, self._count = name, 0
         self._lines: list[str] = []
+        self._open: set[str] = set()
 
     def text(self) -> str:
         """The function."""
@@ -148,7 +153,7 @@ class Program:
     def _block(self, known: Variables, indent: str, n: int, depth: int, loop: bool = False) -> None:
         self._add(indent, "pass")
         for _ in range(n):
-            choices = [self._assign, self._assign, self._assign, self._change, self._swap]
+            choices = [self._assign, self._assign, self._change, self._swap, self._table]
             if depth < 3:
                 choices += [self._if, self._for, self._while, self._local]
             self._random.choice(choices)(known, indent, depth)
@@ -179,6 +184,13 @@ class Program:
         if one != other:
             self._add(indent, f"{one}, {other} = {other}, {self._expression(hint, known, 2)}")
 
+    def _table(self, known: Variables, indent: str, depth: int) -> None:
+        """Take a row apart whose place is given a value by it."""
+        mode, value = ([n for n, h in known.items() if h == hint] for hint in (INT, FLOAT))
+        one, other = self._random.choice(mode), self._random.choice(value)
+        place = self._random.choice((one, f"({one} + int({other} > 0.0))"))
+        self._add(indent, f"{one}, {other} = TABLE[{place} % 3]")
+
     def _if(self, known: Variables, indent: str, depth: int) -> None:
         self._add(indent, f"if {self._expression(BOOL, known, 2)}:")
         inside = []
@@ -203,7 +215,10 @@ class Program:
 
     def _for(self, known: Variables, indent: str, depth: int) -> None:
         inside, name = dict(known), self._new(FLOAT)
-        kind = self._random.randrange(5)
+        free = [one for one in _REUSED if one not in self._open]
+        if free and self._random.random() < 0.5:
+            name = self._random.choice(free)
+        kind = self._random.randrange(6)
         if kind == 0:
             stop = self._random.choice(("3", "1, 4", "4, 0, -1", "0, 7, 3", f"{name}_n"))
             if stop == f"{name}_n":
@@ -220,11 +235,15 @@ class Program:
         elif kind == 3:
             self._add(indent, f"for {name}_k, {name} in enumerate({self._vector(known)}):")
             inside |= {f"{name}_k": INT, name: FLOAT}
-        else:
+        elif kind == 4:
             self._add(indent, f"for {name} in PRIMES:")
             inside[name] = INT
+        else:
+            self._add(indent, "for _ in range(2):")
         before = set(inside)
+        self._open.add(name)
         self._loop_body(inside, known, before, indent, depth)
+        self._open.remove(name)
 
     def _vector(self, known: Variables) -> str:
         names = [name for name, hint in known.items() if hint in (V3, V2)]
@@ -257,9 +276,16 @@ class Program:
         name = self._new(BOOL)
         own: Variables = {"p": FLOAT, "n": INT, "v": V3, "r": RECORD}
         hints = ", ".join(f"{argument}: {hint}" for argument, hint in own.items())
+        # It captures one name, and has others that are around it, too.
+        captured, shadow = f"{name}_c", self._random.choice([n for n in known if n not in own])
+        self._add(indent, f"{captured} = {self._expression(FLOAT, known, 1)}")
         self._add(indent, f"def {name}_f({hints}) -> float:")
-        self._add(indent, f"    q = {self._expression(FLOAT, own, 2)}")
-        self._add(indent, f"    return {self._expression(FLOAT, {**own, 'q': FLOAT}, 2)}")
+        own |= {captured: FLOAT}
+        self._add(indent, f"    {shadow} = {self._expression(FLOAT, own, 2)}")
+        own |= {shadow: FLOAT}
+        self._add(indent, f"    for each in v:\n{indent}        {shadow} += each * p")
+        self._add(indent, f"    return {self._expression(FLOAT, own, 2)}")
+        own = {argument: own[argument] for argument in ("p", "n", "v", "r")}
         given = ", ".join(self._expression(hint, known, 1) for hint in own.values())
         self._add(indent, f"{name} = {name}_f({given})")
         known[name] = FLOAT
