@@ -35,7 +35,7 @@ COMMANDS = {
 }
 
 #: Functions that zig has itself, and links without optimisation instead of the C library's. They
-#: are less exact, mostly in the last bit, for logarithms of the smallest numbers in the tenth digit.
+#: are less exact: in the last bit, and logarithms of the smallest numbers in the tenth digit.
 OWN_OF_ZIG = ("cos", "exp", "log", "log10", "log2", "sin", "tan")
 
 #: What the functions share.
