@@ -43,10 +43,13 @@ def mistakes(path: Path) -> list[str]:
             "and check its FMU"
         )
     found: dict[str, str] = {}
-    for text in _mistakes(script):
-        # One line of the script has one mistake: others follow from it.
-        place = _PLACE.match(text)
-        found.setdefault(place[1] if place else text, text)
+    try:
+        for text in _mistakes(script):
+            # One line of the script has one mistake: others follow from it.
+            place = _PLACE.match(text)
+            found.setdefault(place[1] if place else text, text)
+    except RecursionError as error:
+        found[""] = told(error, script)
     return sorted(found.values(), key=_order)
 
 

@@ -124,6 +124,8 @@ def told(error: BaseException, path: Path) -> str:
     elif isinstance(error, SyntaxError):
         place = f"{shown(error.filename or '', path)}:{error.lineno}"
         said = f"SyntaxError: {error.msg}"
+    elif isinstance(error, RecursionError) and not frames:
+        said = "an expression is too long: take it apart"
     elif frames and not _is_our_own(error):
         place, said = frames[-1], f"{type(error).__name__}: {text}"
     elif text.startswith((f"{path}:", f"{root}{os.sep}")):

@@ -269,9 +269,11 @@ class Expressions:
         if key is not None:
             raise self.fail(node, f"there is no element {ast.unparse(place)} here")
         if not isinstance(code.shape, Structure) or not code.shape.is_array:
-            raise self.fail(
-                node, "a computed subscript of something other than a tuple of parts of one type"
-            )
+            kinds = {part for _, part in parts}
+            what = "something other than a tuple of parts of one type"
+            if DOUBLE in kinds and kinds <= {*NUMBERS}:
+                what = "a tuple of ints and floats: write all of them as floats"
+            raise self.fail(node, f"a computed subscript of {what}")
         where = self.integer(place, "a subscript")
         self.made.raises = True
         text = f"{code.within(POSTFIX)}.v[PLACE({where.argument}, {len(parts)})]"

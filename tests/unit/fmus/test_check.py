@@ -56,6 +56,12 @@ def test_a_state_too_large_for_the_stack_is_told(tmp_path, monkeypatch):
     assert first == "own_lag.py: a state of 5001 numbers; C takes at most 5000"
 
 
+def test_an_expression_that_is_too_long_is_told(tmp_path, monkeypatch):
+    write(tmp_path, ("return State(x), ", f"x = {'x + ' * 3000}x\n    return State(x), "))
+    monkeypatch.chdir(tmp_path)
+    assert "own_lag.py: an expression is too long: take it apart" in mistakes("own_lag.py")[1]
+
+
 def test_a_module_that_cannot_be_imported_is_told_beside_the_rest(tmp_path, monkeypatch):
     write(
         tmp_path,

@@ -456,7 +456,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = v + Vector((1.0, 2.0))", "a Vector of 3 + a Vector of 2 is not defined"),
         ("k = 0\n    k += 0.5", "k is an int and gets a float: begin with a float"),
         ("y = ZERO.a", "ZERO.a is an int where a float is wanted: write 0.0"),
-        ("y = (0, 1.5)[int(y)]", "a computed subscript of something other than a tuple of parts"),
+        ("y = (0, 1.5)[int(y)]", "a tuple of ints and floats: write all of them as floats"),
         (
             "def g(a: float) -> float:\n        return a\n"
             "    def g(a: float) -> float:\n        return 2.0 * a\n    y = g(y)",
