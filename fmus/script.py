@@ -57,7 +57,7 @@ def is_component(path: Path) -> bool:
         return True
     try:
         tree = ast.parse(path.read_bytes())
-    except (SyntaxError, ValueError):
+    except (RecursionError, SyntaxError, ValueError):
         return True
     names = {name for node in tree.body for name in _defined(node)}
     return not names.isdisjoint(_FUNCTIONS)
