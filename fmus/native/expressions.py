@@ -271,7 +271,7 @@ class Expressions:
         if not isinstance(code.shape, Structure) or not code.shape.is_array:
             kinds = {part for _, part in parts}
             what = "something other than a tuple of parts of one type"
-            if DOUBLE in kinds and kinds <= {*NUMBERS}:
+            if kinds == {DOUBLE, INTEGER} and not getattr(code.shape, "made", None):
                 what = "a tuple of ints and floats: write all of them as floats"
             raise self.fail(node, f"a computed subscript of {what}")
         where = self.integer(place, "a subscript")
