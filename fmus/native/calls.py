@@ -18,11 +18,12 @@ from fmus.native.expressions import (
     WHOLE,
     Code,
     is_dotted_name,
+    is_fixed_name,
 )
 from fmus.native.layout import laid_out
 from fmus.native.loops import loop_over
 from fmus.native.operators import Operators
-from fmus.native.program import Function, number_in_c
+from fmus.native.program import Function, literal, number_in_c
 from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
@@ -76,9 +77,12 @@ class Calls(Operators):
     def _call(self, node: ast.Call, wanted: Shape | None) -> Code:
         local = node.func.id if isinstance(node.func, ast.Name) else ""
         if local in self.functions:
+            if self.assigned is not None and local not in self.assigned:
+                raise self.fail(node, f"{local} may have no value here")
             function, captured = self.functions[local]
-            codes = self._arguments(node, list(function.arguments)[: -len(captured) or None])
-            given = self._fitted(node, codes, list(function.arguments.values())[: len(codes)])
+            n = len(function.arguments) - len(captured)
+            codes = self._arguments(node, list(function.arguments)[:n])
+            given = self._fitted(node, codes, list(function.arguments.values())[:n])
             return self.calling(function, [*given, *self._values(node, captured)])
         called = self.known(node.func)
         if called is None and isinstance(node.func, ast.Attribute):
@@ -143,7 +147,7 @@ class Calls(Operators):
 
     def _length(self, node: ast.Call) -> Code:
         shape = self.code(node.args[0]).shape
-        if not isinstance(shape, Structure) or not is_dotted_name(node.args[0]):
+        if not isinstance(shape, Structure) or not is_fixed_name(node.args[0]):
             raise self.fail(node, "len of a number, or of something that has no name")
         return Code(str(len(shape.parts)), INTEGER)
 
@@ -158,7 +162,8 @@ class Calls(Operators):
             return self.calling(arrays.extreme(self.program, shape, word), [code.text])
         codes = [self.code(argument) for argument in node.args]
         is_float = any(code.shape == DOUBLE for code in codes)
-        kind = DOUBLE if is_float else INTEGER
+        is_bool = all(code.shape == BOOLEAN for code in codes)
+        kind = DOUBLE if is_float else BOOLEAN if is_bool else INTEGER
         codes = [self.fit(argument, code, DOUBLE) if is_float else code
                  for argument, code in zip(node.args, codes)]  # fmt: skip
         for argument, code in zip(node.args, codes):
@@ -227,7 +232,8 @@ class Calls(Operators):
         """A vector of what an expression gives in a loop: a function of its own."""
         if len(node.generators) > 1 or node.generators[0].ifs:
             raise self.fail(node, "an expression with more than one for, or with an if")
-        outer = {*free_names(node.generators[0].iter)} & names_in(node.generators[0].target)
+        around = {*free_names(node.generators[0].iter), *self._captured(node)}
+        outer = around & names_in(node.generators[0].target)
         node = renamed(node, {name: self.unused(f"{name}_in") for name in sorted(outer)})
         [first] = node.generators
         inner, captured = self.inside(node, f"each{next(self.numbers)}")
@@ -238,7 +244,7 @@ class Calls(Operators):
         if loop.turns is None or loop.turns < 1:
             raise self.fail(node, "a number of elements that is not a constant above 0")
         lines = [line for text in loop.before for line in laid_out(text, "    ")]
-        lines += laid_out(loop.head, "    ")
+        lines += laid_out(loop.head(may_raise=False), "    ")
         for name, code in loop.bound:
             inner.local[name] = code.shape
             if inner.assigned is not None:
@@ -275,19 +281,24 @@ class Calls(Operators):
 
     def inside(self, node: ast.AST, word: str) -> tuple[Calls, list[str]]:
         """What translates a function within this one, and the names that it captures."""
-        used = free_names(node)
-        for name in used:
-            used += self.functions.get(name, (None, []))[1]
+        used = [*free_names(node), *self._captured(node)]
         captured = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
         for name in captured:
             if name not in self.local:
                 raise self.fail(node, f"{name} may have no value here")
-        name = self.program.name((self.made.name, word), f"{self.made.name}_{word}")
+        owner = (self.made.name, word, type(node))
+        name = self.program.name(owner, f"{self.made.name}_{word}")
         made = Function(name, {n: self.local[n] for n in captured}, None)
         inner = type(self)(self.program, self.path, self.scope, made, set(captured))
-        inner.functions = self.functions
-        inner.assigned = None if self.assigned is None else self.assigned & set(captured)
+        if self.assigned is not None:
+            known = self.assigned & self.functions.keys()
+            inner.functions = {name: self.functions[name] for name in known}
+            inner.assigned = (self.assigned & set(captured)) | known
         return inner, captured
+
+    def _captured(self, node: ast.AST) -> list[str]:
+        """The names that functions within this one capture which are used in an expression."""
+        return [n for name in free_names(node) for n in self.functions.get(name, (None, []))[1]]
 
     # Methods, records and functions
 
@@ -329,9 +340,10 @@ class Calls(Operators):
         shape = shape_of(made)
         assert isinstance(shape, Structure)
         wanted = {suffix[1:]: part for suffix, part in shape.parts}
-        codes = dict(zip(wanted, self.elements(node.args, list(wanted.values()))))
-        if len(node.args) > len(wanted) or len(codes) < len(node.args):
-            raise self.fail(node, f"{len(node.args)} values for {len(wanted)} fields")
+        given = self.elements(node.args, list(wanted.values()))
+        if len(given) > len(wanted):
+            raise self.fail(node, f"{len(given)} values for {len(wanted)} fields")
+        codes = dict(zip(wanted, given))
         for keyword in node.keywords:
             name = in_c(str(keyword.arg))
             if name not in wanted or name in codes:
@@ -345,10 +357,8 @@ class Calls(Operators):
         return self.literal(shape, [codes[name] for name in wanted])
 
     def _default(self, node: ast.AST, made: Any, name: str, value: Any, wanted: Shape) -> Code:
-        if wanted == DOUBLE and type(value) is int:
-            raise self.fail(node, f"the default value of {name} is an int: write {value}.0")
-        if isinstance(value, (float, int)):
-            return Code(self.written(node, value), wanted)
+        if not isinstance(wanted, Structure):
+            return Code(literal(value, wanted, f"the default value of {name}"), wanted)
         text, shape = self.program.constant(made.__module__, f"{made.__name__}_{name}", value)
         if shape != wanted:
             raise self.fail(node, f"the default value of {name} is {shape.word}")
@@ -357,6 +367,8 @@ class Calls(Operators):
     def _function(self, node: ast.Call, called: FunctionType) -> Code:
         hints = hints_of(called)
         names = [name for name in hints if name != "return"]
+        if called.__code__.co_argcount != len(names):
+            raise self.fail(node, f"{ast.unparse(node.func)} is not made by def with types")
         given = self._arguments(node, names)
         if any(has_no_size(hints[name]) for name in names):
             # What has no size of its own has the one that is passed.
@@ -372,8 +384,10 @@ class Calls(Operators):
     def _arguments(self, node: ast.Call, names: Sequence[str]) -> list[ast.expr]:
         """The arguments in their order, those with a name after the others."""
         given = {str(keyword.arg): keyword.value for keyword in node.keywords}
-        rest = [] if any(isinstance(a, ast.Starred) for a in node.args) else names[len(node.args) :]
-        if set(given) != set(rest) and (given or rest):
+        is_starred = any(isinstance(a, ast.Starred) for a in node.args)
+        rest = [] if is_starred else names[len(node.args) :]
+        too_many = len(node.args) > len(names) and not is_starred
+        if too_many or (set(given) != set(rest) and (given or rest)):
             raise self.fail(node, f"arguments other than {', '.join(names)}")
         return [*node.args, *(given[name] for name in rest)]
 

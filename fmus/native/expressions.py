@@ -10,10 +10,12 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from functools import cache
+from importlib.util import resolve_name
 from itertools import count
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from auv_fmu.arrays import Matrix
 from fmus.native import arrays
 from fmus.native.layout import quoted
 from fmus.native.program import Function, Program, Untranslatable, number_in_c
@@ -21,6 +23,7 @@ from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
     INTEGER,
+    NOTHING,
     TEXT,
     Shape,
     Structure,
@@ -32,6 +35,9 @@ from fmus.ports.groups import is_class
 
 #: How tightly the operators of C bind.
 TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, POSTFIX = range(9)
+
+#: Compilers take brackets within brackets, but not any number of them.
+_DEEPEST = 200
 
 #: How a text begins that says where it is about.
 _PLACED = re.compile(r".+:\d+: ")
@@ -90,17 +96,27 @@ class Expressions:
         self.program, self.path, self.scope = program, path, scope
         self.numbers = count(1)
         self._made_up: set[str] = set()
+        self._depth = 0
 
     def unused(self, name: str) -> str:
         """A name for C only, which the function has not and gets now."""
         names = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
-        found = next(n for n in names if n not in self.names | self._made_up)
+        taken = self.names | self._made_up | self.program.taken
+        found = next(n for n in names if n not in taken)
         self._made_up.add(found)
+        self.program.words.add(found)
         return found
 
     def fail(self, node: ast.AST, what: str) -> Untranslatable:
         """What to raise, with the line."""
         return Untranslatable(f"{self.path}:{getattr(node, 'lineno', 0)}: {what}")
+
+    def placed(self, node: ast.AST, error: Exception) -> Exception:
+        """What to raise for an error: with the line, if it does not say one."""
+        if _PLACED.match(str(error)) or isinstance(error, RecursionError):
+            return error
+        ours = isinstance(error, (TypeError, Untranslatable))
+        return self.fail(node, str(error) if ours else f"{type(error).__name__}: {error}")
 
     def parts(self, node: ast.AST, code: Code) -> list[Code]:
         """The elements of a tuple that has a name."""
@@ -143,12 +159,15 @@ class Expressions:
         if not hasattr(self, name):
             raise self.fail(node, f"{type(node).__name__} has no counterpart in C here")
         method: Callable[[Any, Shape | None], Code] = getattr(self, name)
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise self.fail(node, f"an expression of {_DEEPEST} levels: take it apart")
         try:
             return method(node, wanted)
-        except (Untranslatable, TypeError) as error:
-            if _PLACED.match(str(error)):
-                raise
-            raise self.fail(node, str(error)) from None
+        except Exception as error:
+            raise self.placed(node, error) from None
+        finally:
+            self._depth -= 1
 
     def fitting(self, node: ast.expr, wanted: Shape | None) -> Code:
         """An expression of exactly this shape."""
@@ -191,7 +210,7 @@ class Expressions:
     def calling(self, function: Function, arguments: Sequence[str]) -> Code:
         """A call; what returns nothing is a statement."""
         self.made.raises |= function.raises
-        return Code(function.call(arguments), function.returns or INTEGER)
+        return Code(function.call(arguments), function.returns or NOTHING)
 
     # Names and constants
 
@@ -226,7 +245,7 @@ class Expressions:
         # It bears the name of the module that it stands in, wherever it was imported.
         is_dotted = isinstance(node, ast.Attribute) and self.known(node.value) is math
         module = "math" if is_dotted else _home(self.scope["__name__"], name)
-        if module == "math":
+        if module == "math" and type(value) is float:
             return Code(number_in_c(value), DOUBLE)
         if isinstance(value, IntEnum):
             module, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
@@ -242,7 +261,8 @@ class Expressions:
         code = self.code(node.value)
         if node.attr == "T" and arrays.is_array(code.shape) and len(arrays.sizes(code.shape)) == 2:
             return self.calling(arrays.transpose(self.program, code.shape), [code.text])
-        for suffix, part in code.shape.parts if isinstance(code.shape, Structure) else ():
+        has_fields = isinstance(code.shape, Structure) and hasattr(code.shape.made, "_fields")
+        for suffix, part in code.shape.parts if has_fields else ():  # type: ignore[union-attr]
             if suffix == f".{in_c(node.attr)}":
                 return Code(f"{code.within(POSTFIX)}{suffix}", part)
         raise self.fail(node, f"{node.attr} is not a field of {code.shape.word}")
@@ -253,13 +273,20 @@ class Expressions:
         code = self.code(node.value)
         if isinstance(node.slice, ast.Slice):
             return self._cut(node, node.slice, code)
-        for place in node.slice.elts if isinstance(node.slice, ast.Tuple) else [node.slice]:
+        if not isinstance(node.slice, ast.Tuple):
+            return self._element(node, node.slice, code)
+        if getattr(code.shape, "made", None) is not Matrix:
+            raise self.fail(node, f"two subscripts of {code.shape.word}")
+        for place in node.slice.elts:
             code = self._element(node, place, code)
         return code
 
     def _element(self, node: ast.Subscript, place: ast.expr, code: Code) -> Code:
         parts = code.shape.parts if isinstance(code.shape, Structure) else ()
         key = _constant_of(place)
+        has_fields = hasattr(getattr(code.shape, "made", None), "_fields")
+        if isinstance(key, float) or (isinstance(key, str) and has_fields):
+            raise self.fail(node, f"there is no element {ast.unparse(place)} here")
         key = in_c(key) if isinstance(key, str) else key
         if isinstance(key, int) and key < 0:
             key += len(parts)
@@ -280,6 +307,8 @@ class Expressions:
         return Code(text, parts[0][1])
 
     def _cut(self, node: ast.Subscript, places: ast.Slice, code: Code) -> Code:
+        if getattr(code.shape, "made", None) is Matrix:
+            raise self.fail(node, "a slice of a Matrix: write Matrix((A[0], A[1]))")
         parts = self._sliced(node, places, code)
         made = vector(len(parts)) if arrays.is_array(code.shape) else None
         return self.literal(made or structure([part.shape for part in parts]), parts)
@@ -301,7 +330,7 @@ class Expressions:
     # Tuples
 
     def _tuple(self, node: ast.Tuple, wanted: Shape | None) -> Code:
-        is_tuple = isinstance(wanted, Structure) and not arrays.is_array(wanted)
+        is_tuple = isinstance(wanted, Structure) and not wanted.made
         shapes = [part for _, part in wanted.parts] if is_tuple else []  # type: ignore[union-attr]
         codes = self.elements(node.elts, shapes)
         shape = wanted if shapes else structure([code.shape for code in codes])
@@ -315,10 +344,12 @@ class Expressions:
         codes: list[Code] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
-                codes += self._unpacked(node.value)
+                parts = self._unpacked(node.value)
+                wanted = [*shapes[len(codes) :], *[None] * len(parts)]
+                codes += [self.fit(node, *one) for one in zip(parts, wanted)]
             else:
-                wanted = shapes[len(codes)] if len(codes) < len(shapes) else None
-                codes.append(self.fitting(node, wanted))
+                wanted = [*shapes[len(codes) :], None]
+                codes.append(self.fitting(node, wanted[0]))
         return codes
 
     def _unpacked(self, node: ast.expr) -> list[Code]:
@@ -336,6 +367,8 @@ class Expressions:
         for suffix, _ in wanted.parts:
             if suffix[1:] not in given:
                 raise self.fail(node, f"{suffix[1:]} is missing in {wanted.word}")
+        if len(node.keys) != len(wanted.parts):
+            raise self.fail(node, f"{len(node.keys)} values for {len(wanted.parts)} keys")
         codes = [self.fitting(given[suffix[1:]], part) for suffix, part in wanted.parts]
         return self.literal(wanted, codes)
 
@@ -370,7 +403,11 @@ def _origins(module: ModuleType) -> dict[str, str]:
     imports = [
         n for n in ast.parse(inspect.getsource(module)).body if isinstance(n, ast.ImportFrom)
     ]
-    return {alias.name: str(node.module) for node in imports for alias in node.names}
+    return {
+        alias.name: resolve_name(f"{'.' * node.level}{node.module or ''}", module.__package__)
+        for node in imports
+        for alias in node.names
+    }
 
 
 def _initializer(code: Code) -> str:
@@ -386,3 +423,9 @@ def is_dotted_name(node: ast.expr) -> bool:
     return isinstance(node, (ast.Name, ast.Constant)) or (
         isinstance(node, ast.UnaryOp) and re.fullmatch(r"-[\d.]+", ast.unparse(node)) is not None
     )
+
+
+def is_fixed_name(node: ast.expr) -> bool:
+    """Whether an expression is a name, or a part of one at a place that is written out."""
+    places = [part.slice for part in ast.walk(node) if isinstance(part, ast.Subscript)]
+    return is_dotted_name(node) and all(_constant_of(place) is not None for place in places)

@@ -13,7 +13,7 @@ from types import FunctionType
 from typing import Any
 
 from fmus.native.calls import Calls
-from fmus.native.expressions import AND, OR, WHOLE, Code, is_dotted_name
+from fmus.native.expressions import AND, OR, WHOLE, Code, is_fixed_name
 from fmus.native.language import foreign
 from fmus.native.layout import INDENT, annotated, comment_of, comments_of, laid_out, quoted
 from fmus.native.loops import loop_over
@@ -21,6 +21,7 @@ from fmus.native.program import Function, Program, Untranslatable
 from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
+    NOTHING,
     TEXT,
     Shape,
     Structure,
@@ -34,7 +35,7 @@ from fmus.native.variables import always_stored, both, loaded_names, names_in, s
 from fmus.ports.port import Refusal
 
 #: How values in the text of a refusal may be written: as C writes them, too.
-_FORMAT = re.compile(r"[+ ]?0?\d*(?:\.\d+)?[efgEG]")
+_FORMAT = re.compile(r"[+ ]?(?:[1-9]\d*)?(?:\.\d+)?[efgEG]")
 
 
 @cache
@@ -58,11 +59,11 @@ def function_in_c(program: Program, function: FunctionType, made: Function) -> N
 
     """
     path = str(inspect.getsourcefile(function))
-    *_, tree = [
-        node
-        for node in _checked(path).body
-        if isinstance(node, ast.FunctionDef) and node.name == function.__name__
-    ]
+    line = function.__code__.co_firstlineno
+    found = [n for n in _checked(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line]
+    if not found:
+        raise Untranslatable(f"{path}:{line}: {function.__name__} is not made by def in a module")
+    [tree] = found
     names = {*made.arguments, *stored_names(*tree.body)}
     nothing = function.__annotations__.get("return") in (None, "None")
     _Translation(tree, Calls(program, path, function.__globals__, made, names), nothing).write()
@@ -108,6 +109,10 @@ class _Translation:
         if isinstance(node, (ast.If, ast.While, ast.For)):
             yield from self._hoisting(node, indent)
         elif isinstance(node, ast.Return) and node.value is not None:
+            if self._returns_nothing:
+                raise self._in_c.fail(
+                    node, f"{self._tree.name} returns a value, and its type is None"
+                )
             code = self._in_c.fitting(node.value, self._made.returns)
             if self._made.returns is None:
                 self._made.returns = code.shape
@@ -162,67 +167,77 @@ class _Translation:
             self._in_c.assigned = both(after_body, self._in_c.assigned)
             yield [f"{indent}}}"]
             return
+        yield from self._loop(node, indent)
+
+    def _loop(self, node: ast.While | ast.For, indent: str) -> Iterator[list[str]]:
+        before, bound = self._in_c.assigned, []
         if isinstance(node, ast.While):
-            # What it counts may be wrong after an error, and never reach its end.
-            self._made.raises = True
             condition = self._in_c.condition(node.test).within(AND)
-            yield laid_out(f"while (!error->raised && {condition}) {{", indent)
-            before, bound = self._in_c.assigned, []
         else:
             changed = set(stored_names(*node.body))
             loop = loop_over(self._in_c, node.target, node.iter, changed)
-            for name, _ in loop.bound:
+            bound = loop.bound
+            for name, _ in bound:
                 if any(name in scope for scope in self._scopes):
                     raise self._in_c.fail(node, f"{name} has a value already: rename it here")
             yield [line for text in loop.before for line in laid_out(text, indent)]
-            yield laid_out(loop.head, indent)
-            before, bound = self._in_c.assigned, loop.bound
+        # After an error the turns that it counts may be any number: it ends at once.
+        self._made.raises |= isinstance(node, ast.While) or loop.turns is None
         self._scopes.append(set())
+        body: list[str] = []
         for name, code in bound:
             if code.text == in_c(name):
                 self._scopes[-1].add(name)
                 self._in_c.local[name] = code.shape
                 self._note(name)
             elif name in set(loaded_names(*node.body)):
-                yield laid_out(self._stored(node, [(name, code)]), inner)
-        yield list(self._block(node.body, inner))
+                body += laid_out(self._stored(node, [(name, code)]), indent + INDENT)
+        body += self._block(node.body, indent + INDENT)
         self._scopes.pop()
         self._in_c.assigned = before
-        if self._made.raises and isinstance(node, ast.For):
-            yield [f"{inner}if (error->raised) break;"]
-        yield [f"{indent}}}"]
+        if isinstance(node, ast.While):
+            head = f"while (!error->raised && {condition}) {{"
+        else:
+            head = loop.head(may_raise=self._made.raises)
+        yield [*laid_out(head, indent), *body, f"{indent}}}"]
 
     def _local_function(self, node: ast.FunctionDef) -> None:
         """A function within this one, as a function of its own that gets what it captures."""
         if self._assigned[node.name] > 1:
             raise self._in_c.fail(node, f"{node.name} is given a value twice: use two names")
         inner, captured = self._in_c.inside(node, node.name)
+        own = {argument.arg for argument in node.args.args} | set(stored_names(*node.body))
         for name in captured:
+            if name in own:
+                raise self._in_c.fail(node, f"{name} has two meanings in {node.name}: rename one")
             if self._assigned[name] > (name not in self._made.arguments):
                 raise self._in_c.fail(node, f"{name}, which {node.name} uses, is changed")
         given: dict[str, Any] = {a.arg: self._shape(a.annotation) for a in node.args.args}
         made = inner.made
         made.arguments = {**given, **{name: self._in_c.local[name] for name in captured}}
         nothing = isinstance(node.returns, ast.Constant) and node.returns.value is None
-        made.returns = None if nothing else self._shape(node.returns)
+        made.returns = None if nothing else self._shape(node.returns, is_result=True)
         inner.local = dict(made.arguments)
         inner.names = {*made.arguments, *stored_names(*node.body)}
         if inner.assigned is not None:
-            inner.assigned = set(made.arguments)
-        inner.functions = dict(self._in_c.functions)
+            inner.assigned = set(made.arguments) | (inner.functions.keys() - inner.names)
+        hidden = inner.names & inner.functions.keys()
+        inner.functions = {n: f for n, f in inner.functions.items() if n not in hidden}
         _Translation(node, inner, nothing).write()
         self._in_c.program.functions[made.name] = made
         self._in_c.functions = {**self._in_c.functions, node.name: (made, captured)}
         self._note(node.name)
 
-    def _shape(self, annotation: ast.expr | None) -> Shape | None:
-        """The shape that an annotation names."""
+    def _shape(self, annotation: ast.expr | None, *, is_result: bool = False) -> Shape | None:
+        """The shape that an annotation names; None: a result of any size."""
         text = ast.unparse(annotation) if annotation else ""
-        hint: Any = eval(text, self._in_c.scope)
         try:
-            return None if has_no_size(hint) else self._in_c.program.defined(shape_of(hint))
-        except TypeError as error:
-            raise self._in_c.fail(annotation or self._tree, str(error)) from None
+            hint: Any = eval(text, self._in_c.scope)
+            if is_result and has_no_size(hint):
+                return None
+            return self._in_c.program.defined(shape_of(hint))
+        except Exception as error:
+            raise self._in_c.placed(annotation or self._tree, error) from None
 
     # Assignments
 
@@ -251,6 +266,9 @@ class _Translation:
             if names_in(target) & names_in(value):
                 yield from self._at_once(target, pairs)
             elif all(isinstance(one, ast.Name) for one, _ in pairs):
+                for one, other in pairs:
+                    if ast.unparse(one) == "_" and not is_fixed_name(other):
+                        yield f"(void)({self._in_c.code(other).text});"
                 codes = [(ast.unparse(one), self._in_c.code(other)) for one, other in pairs]
                 for alike in _alike([pair for pair in codes if pair[0] != "_"]):
                     yield self._stored(target, alike)
@@ -275,7 +293,7 @@ class _Translation:
     def _taken_apart_in(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
         code = self._in_c.code(value)
         # A part that depends on what is given a value here is read before.
-        if not is_dotted_name(value) or names_in(target) & names_in(value):
+        if not is_fixed_name(value) or names_in(target) & names_in(value):
             name = self._name_of_all(target, value)
             self._in_c.program.defined(code.shape)
             yield f"const {declared(code.shape)}{in_c(name)} = {code.text};"
@@ -310,11 +328,16 @@ class _Translation:
         if old:
             return "; ".join(stores) + ";"
         shape = values[0][1].shape
+        if shape == NOTHING:
+            raise self._in_c.fail(node, "what returns nothing is used as a value")
+        if shape == TEXT and len(values) > 1:
+            return " ".join(self._stored(node, [value]) for value in values)
         for name, code in values:
             self._scopes[-1].add(name)
             self._in_c.local[name] = self._in_c.program.defined(code.shape)
         changes = any(self._assigned[name] > 1 for name, _ in values)
-        return f"{'' if changes else 'const '}{declared(shape)}{', '.join(stores)};"
+        constant = "" if changes or shape == TEXT else "const "
+        return f"{constant}{declared(shape)}{', '.join(stores)};"
 
     def _other(self, name: str, code: Code) -> str:
         before = self._in_c.local[name]
@@ -352,6 +375,8 @@ class _Translation:
         code = self._in_c.code(part.value)
         if part.conversion not in (-1, ord("s")):
             raise self._in_c.fail(part.value, f"!{chr(part.conversion)} in a text: leave it out")
+        if any(isinstance(x, ast.FormattedValue) for x in getattr(part.format_spec, "values", ())):
+            raise self._in_c.fail(part.value, "a format that is computed")
         how = "".join(ast.literal_eval(x) for x in getattr(part.format_spec, "values", ()))
         if code.shape == TEXT and not how:
             return "%s", code.text

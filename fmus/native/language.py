@@ -71,6 +71,8 @@ INSTEAD = {
     "the name random": "use the hooks seed and measured",
     "an assignment to Attribute": "write x = x._replace(field=...)",
     "an assignment to Subscript": "write v = v.replaced(k, x)",
+    "a value of _": "give it a name: _ is for what is not used",
+    "an argument _": "give it a name: _ is for what is not used",
     "Assert": "write if not ...: raise Refusal(\"...\")",
     "AsyncFunctionDef": "write def",
     "Delete": "leave it out",
@@ -200,7 +202,9 @@ def _names(function: ast.FunctionDef, known: set[str], modules: Mapping[str, str
     for statement in function.body:
         used += _used(statement)
     for name in used:
-        if name.id not in local:
+        if name.id == "_" and isinstance(name.ctx, ast.Load):
+            yield name.lineno, "a value of _"
+        elif name.id not in local:
             module = modules.get(name.id)
             yield name.lineno, f"the module {module}" if module else f"the name {name.id}"
 
@@ -222,6 +226,8 @@ def _function(node: ast.FunctionDef) -> _Found:
     special = given.posonlyargs or given.kwonlyargs or given.vararg or given.kwarg
     if special or given.defaults or node.decorator_list:
         yield node.lineno, f"more than plain arguments of {node.name}"
+    if any(argument.arg == "_" for argument in given.args):
+        yield node.lineno, "an argument _"
     if node.returns is None or any(a.annotation is None for a in given.args):
         yield node.lineno, f"an argument or a result of {node.name} without a type"
     yield from _block(node.body)

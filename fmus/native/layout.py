@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import re
 import textwrap
 import tokenize
 from functools import cache
-from pathlib import Path
 
 from fmus.native.shapes import strip_sphinx_marks
 
@@ -33,6 +31,7 @@ def laid_out(text: str, indent: str) -> list[str]:
 def quoted(text: str) -> str:
     """A text in C."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    escaped = re.sub(r"[\x00-\x1f\x7f]", lambda found: f"\\{ord(found[0]):03o}", escaped)
     # Two question marks may begin a trigraph.
     escaped = escaped.replace("?", "\\?") if "??" in escaped else escaped
     return f'"{escaped}"'
@@ -103,13 +102,12 @@ def _split(text: str) -> list[str]:
 @cache
 def comments_of(path: str) -> dict[int, str]:
     """The comments of a file after code, by line."""
-    text = Path(path).read_text(encoding="utf-8-sig")
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
-    return {
-        token.start[0]: token.string.lstrip("#: ")
-        for token in tokens
-        if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
-    }
+    with tokenize.open(path) as file:
+        return {
+            token.start[0]: token.string.lstrip("#: ")
+            for token in tokenize.generate_tokens(file.readline)
+            if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
+        }
 
 
 def annotated(lines: list[str], comment: str, indent: str) -> list[str]:
@@ -122,7 +120,7 @@ def annotated(lines: list[str], comment: str, indent: str) -> list[str]:
 def comment_of(docstring: str | None) -> list[str]:
     if not docstring:
         return []
-    lines = strip_sphinx_marks(textwrap.dedent(docstring)).rstrip().splitlines()
+    lines = strip_sphinx_marks(textwrap.dedent(docstring)).rstrip().splitlines() or [""]
     if len(lines) == 1:
         return [f"/* {lines[0]} */"]
     return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import NamedTuple
 
-from fmus.native.expressions import Code, Expressions, is_dotted_name
+from fmus.native.expressions import Code, Expressions, is_fixed_name
 from fmus.native.shapes import INTEGER, Structure, in_c
 from fmus.native.variables import names_in
 
@@ -15,16 +15,23 @@ class Loop(NamedTuple):
 
     Attributes:
         before: what is computed before it: declarations.
-        head: with the open brace.
+        begin, test, change: what stands in the brackets after `for`.
         bound: names that get a value in each turn, and the value.
         turns: how often it runs; None: that is not known before.
 
     """
 
     before: list[str]
-    head: str
+    begin: str
+    test: str
+    change: str
     bound: list[tuple[str, Code]]
     turns: int | None
+
+    def head(self, *, may_raise: bool) -> str:
+        """Its first line, with the open brace; it ends after an error, also by `continue`."""
+        test = f"!error->raised && {self.test}" if may_raise else self.test
+        return f"for ({self.begin}; {test}; {self.change}) {{"
 
 
 def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed: set[str]) -> Loop:
@@ -51,8 +58,8 @@ def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed
     items = _Items(within, before, changed, first)
     place = Code(within.unused(f"{first}_at"), INTEGER)
     bound, count = items.taken(target, iterable, place)
-    head = f"for (int {place.text} = 0; {place.text} < {count}; {place.text}++) {{"
-    return Loop(before, head, bound, count)
+    at = place.text
+    return Loop(before, f"int {at} = 0", f"{at} < {count}", f"{at}++", bound, count)
 
 
 def _called(within: Expressions, node: ast.expr) -> object:
@@ -62,6 +69,9 @@ def _called(within: Expressions, node: ast.expr) -> object:
 def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
     if not isinstance(target, ast.Name):
         raise within.fail(target, "more than one name for the numbers of a range")
+    within.check_plain(call, "range")
+    if not 1 <= len(call.args) <= 3:
+        raise within.fail(call, f"range with {len(call.args)} arguments")
     arguments = [_bound(within, argument) for argument in call.args]
     if len(arguments) == 1:
         arguments = [Code("0", INTEGER), *arguments]
@@ -84,8 +94,9 @@ def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
     else:
         at, kind, counter = name, "int", Code(name, INTEGER)
     change = {1: "++", -1: "--"}.get(numbers[2], f" += {step.text}")
-    head = f"for ({kind} {at} = {first.text}; {at} {sign} {stop.text}; {at}{change}) {{"
-    return Loop(before, head, [] if name == "_" else [(target.id, counter)], known)
+    begin, test = f"{kind} {at} = {first.text}", f"{at} {sign} {stop.text}"
+    bound = [] if name == "_" else [(target.id, counter)]
+    return Loop(before, begin, test, f"{at}{change}", bound, known)
 
 
 def _bound(within: Expressions, node: ast.expr) -> Code:
@@ -141,7 +152,7 @@ class _Items:
     def _named(self, node: ast.expr, code: Code) -> Code:
         """The same, in a variable if it is no name, or if the body changes what it is made of."""
         used = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
-        if is_dotted_name(node) and not used & self._changed:
+        if is_fixed_name(node) and not used & self._changed:
             return code
         name = self._within.unused(f"{self._name}_all")
         self._within.program.defined(code.shape)

@@ -91,11 +91,16 @@ class Program:
         self.functions: dict[Hashable, Function] = {}
         self._begun: set[Hashable] = set()
         self._owners: dict[str, Hashable] = {}
-        self._words: set[str] = set()
+        self.words: set[str] = set()
+
+    @property
+    def taken(self) -> set[str]:
+        """Names in C of functions and constants."""
+        return {*self._owners}
 
     def name(self, owner: Hashable, name: str) -> str:
         """A name in C that only its owner has, and no variable of a module met so far."""
-        taken = words_of_runtime() | self._words
+        taken = words_of_runtime() | self.words
         while name in taken or self._owners.setdefault(name, owner) != owner:
             name += "_"
         return name
@@ -115,10 +120,10 @@ class Program:
     def constant(self, module: str, name: str, value: Any) -> tuple[str, Shape]:
         """The name in C and the shape of what stands in a module: numbers, or tuples of them."""
         shape = self.defined(_shape_of_value(value, name))
-        literal = _literal(value, shape, name)
+        text = literal(value, shape, name)
         # Another module, or an enumeration, may have one of this name and another value.
-        given = self.name(("constant", shape, literal), c_name(module, name))
-        self.constants.setdefault(given, f"static const {shape.name} {given} = {literal};")
+        given = self.name(("constant", shape, text), c_name(module, name))
+        self.constants.setdefault(given, f"static const {shape.name} {given} = {text};")
         return given, shape
 
     def function(self, function: FunctionType, shapes: Sequence[Shape] = ()) -> Function:
@@ -138,14 +143,15 @@ class Program:
         if key in self._begun:
             raise Untranslatable(f"{function.__name__} calls itself")
         self._begun.add(key)
-        self._words |= _words(function.__module__)
+        self.words |= _words(function.__module__)
         arguments = {
             name: shapes[i] if has_no_size(hint) and i < len(shapes) else self.shape(hint)
             for i, (name, hint) in enumerate(hints.items())
         }
         name = c_name(function.__module__, function.__name__)
         if unsized:
-            name = "_".join([name, *(shape.name for shape in arguments.values())])
+            sizes = "_".join(shape.name for shape in arguments.values())
+            name = re.sub(r"\W+", "_", f"{name}_{sizes}")
         is_open = returns in (None, type(None)) or has_no_size(returns)
         shape = None if is_open else self.shape(returns)
         made = Function(self.name(key, name), arguments, shape)
@@ -158,7 +164,7 @@ class Program:
         if name not in self.functions:
             self.defined(returns)
             raises = "DIV(" in body or "PLACE(" in body
-            made = Function(name, arguments, returns, raises)
+            made = Function(self.name(("helper", name), name), arguments, returns, raises)
             for shape in arguments.values():
                 self.defined(shape)
             made.text = f"{made.head}\n{body}\n}}"
@@ -186,23 +192,36 @@ def _shape_of_value(value: Any, name: str) -> Shape:
         return shape_of(type(value))
     if isinstance(value, tuple) and value:
         return structure([_shape_of_value(part, name) for part in value])
-    if isinstance(value, float):
-        return DOUBLE  # numpy's floats, too
+    if type(value) is float:
+        return DOUBLE
     if isinstance(value, int):
         return BOOLEAN if type(value) is bool else INTEGER
-    raise Untranslatable(f"{name} is not a number, nor a tuple of numbers")
+    # numpy's numbers make numpy's of all that they meet, which divide by zero.
+    advice = ": write float(...) or int(...)" if hasattr(value, "dtype") else ""
+    raise Untranslatable(f"{name} is not a number, nor a tuple of numbers{advice}")
 
 
-def _literal(value: Any, shape: Shape, name: str) -> str:
+def literal(value: Any, shape: Shape, name: str) -> str:
+    """A value of a shape as an initializer.
+
+    Raises:
+        Untranslatable: it is of another shape, which its annotation does not tell.
+
+    """
     if isinstance(shape, Structure):
+        made = shape.made or tuple
+        if not isinstance(value, made) or len(value) != len(shape.parts):
+            raise Untranslatable(f"{name} is not {shape.word}")
         names = getattr(value, "_fields", range(len(value)))
         parts = ", ".join(
-            _literal(one, part, f"{name}.{field}")
+            literal(one, part, f"{name}.{field}")
             for one, (_, part), field in zip(value, shape.parts, names)
         )
         return f"{{{{{parts}}}}}" if shape.is_array else f"{{{parts}}}"
     if shape == DOUBLE and isinstance(value, int):
         raise Untranslatable(f"{name} is an int where a float is wanted: write {value}.0")
+    if type(value) is not float if shape == DOUBLE else not isinstance(value, int):
+        raise Untranslatable(f"{name} is a {type(value).__name__} where {shape.word} is wanted")
     return number_in_c(value)
 
 

@@ -10,6 +10,7 @@ from enum import IntEnum
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
+from unicodedata import category
 
 from auv_fmu import vectors
 from auv_fmu.arrays import Matrix, Vector
@@ -90,11 +91,12 @@ class Structure:
 
 Shape = Union[Scalar, Structure]
 
-DOUBLE, INTEGER, BOOLEAN, TEXT = (
+DOUBLE, INTEGER, BOOLEAN, TEXT, NOTHING = (
     Scalar("double", "a float"),
     Scalar("int", "an int"),
     Scalar("int", "a bool"),
     Scalar("const char *", "a text"),
+    Scalar("void", "nothing"),
 )
 
 _SCALARS: dict[Any, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN, str: TEXT}
@@ -104,12 +106,16 @@ _NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint)
 
 
 #: Words in capitals, for the headers of each system have macros of their own; structures' names.
-_PATTERNS = re.compile(r"[A-Z][A-Z0-9_]{3,}|(Vector|Matrix|int|double)\d*x?\d+\w*")
+_PATTERNS = re.compile(
+    r"[A-Z][A-Z0-9_]{3,}|_[A-Z]\w*|__\w*|(Vector|Matrix|int|double)(\d*x?\d+|_int|_double)\w*"
+)
 
 
 @cache
 def in_c(name: str) -> str:
     """The name of a variable or a member in C."""
+    # A mark over a letter is one of its own, which not all compilers take.
+    name = "".join(f"_u{ord(c):04x}" if category(c).startswith("M") else c for c in name)
     stem = name.rstrip("_")
     is_taken = stem in _TAKEN | _arithmetic() or _PATTERNS.fullmatch(stem)
     return f"{name}_" if is_taken else name
@@ -156,7 +162,9 @@ def shape_of(hint: Any) -> Shape:
     if isinstance(hint, type) and hasattr(hint, "__annotations__"):
         parts = [(f".{in_c(name)}", shape_of(part)) for name, part in hints_of(hint).items()]
         name = in_c(hint.__name__)
-        return Structure(f"{name}_" if name in words_of_runtime() else name, tuple(parts), hint)
+        # A name in lower case may be that of a variable, too.
+        is_taken = name in words_of_runtime() or not name[0].isupper()
+        return Structure(f"class_{name}" if is_taken else name, tuple(parts), hint)
     name = hint.__name__ if isinstance(hint, type) else hint
     raise TypeError(f"{name} is not a type in the language of equations")
 
@@ -181,12 +189,16 @@ def matrix(rows: int, columns: int) -> Structure:
 
 
 def _check_size(what: str, n: int) -> None:
+    if n < 1:
+        raise TypeError(f"{what} is empty")
     if n > _MOST_NUMBERS:
         raise TypeError(f"{what} is too large for C, which takes at most {_MOST_NUMBERS} numbers")
 
 
 def structure(items: list[Shape], name: str | None = None) -> Structure:
     """The structure of a plain tuple."""
+    if TEXT in items:
+        raise TypeError("a tuple of texts; choose between texts by if")
     if items and all(item == items[0] for item in items):
         first = items[0]
         own = f"Vector{len(items)}" if first == DOUBLE else f"{first.name}x{len(items)}"
@@ -232,7 +244,11 @@ def _comments(made: Any) -> dict[str, str]:
     """What `#:` says of the fields of a class, as comments."""
     if made is None:
         return {}
-    found = re.findall(r"^    (\w+):.*#: (.*)$", inspect.getsource(made), re.MULTILINE)
+    try:
+        text = inspect.getsource(made)
+    except OSError:
+        return {}  # it was not written as a class
+    found = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
     return {f".{in_c(name)}": f" /* {strip_sphinx_marks(text)} */" for name, text in found}
 
 

@@ -19,7 +19,7 @@ from fmus.compilers import SAME_NUMBERS
 from fmus.native.functions import function_in_c
 from fmus.native.language import CONSTANTS, MATHEMATICS
 from fmus.native.program import Function, Program
-from fmus.native.shapes import DOUBLE, RUNTIME, Shape, Structure, shape_of
+from fmus.native.shapes import DOUBLE, RUNTIME, Shape, Structure, in_c, shape_of
 from fmus.ports.groups import hints_of
 from fmus.ports.port import Refusal
 
@@ -152,12 +152,13 @@ def _shim(name: str, function: Function) -> str:
     assert function.returns is not None
     lines, place = ["Error error[1] = {{0}};"], 0
     for argument, shape in function.arguments.items():
+        argument = in_c(argument)
         lines.append(f"{shape.name} given_{argument};")
         for leaf, part in _leaves(shape, f"given_{argument}"):
             cast = "" if part == DOUBLE else f"({part.name})"
             lines.append(f"{leaf} = {cast}in[{place}];")
             place += 1
-    call = function.call([f"given_{argument}" for argument in function.arguments])
+    call = function.call([f"given_{in_c(argument)}" for argument in function.arguments])
     lines.append(f"const {function.returns.name} result = {call};")
     leaves = _leaves(function.returns, "result")
     lines += [f"out[{i}] = {leaf};" for i, (leaf, _) in enumerate(leaves)]

@@ -75,6 +75,12 @@ class File(NamedTuple):
     b: float
 
 
+class pose(NamedTuple):
+    """A record in lower case."""
+
+    x: float
+
+
 START = Inner(0.5)
 N = 3
 TABLE = ((1, 50.0), (2, 10.0), (0, 30.0))
@@ -344,6 +350,48 @@ CONSTRUCTS = {
         "def f(x: float, k: int) -> float:\n"
         "    a, b = (x, k, 2.0 * x), ((x, k), 0.5)\n    return a[2] * b[1] + b[0][0] - a[1]\n"
     ),
+    "local function in an expression of its own names": (
+        "def f(x: float, v: Annotated[Vector, 3]) -> Annotated[Vector, 3]:\n"
+        "    def g(a: float) -> float:\n        return a + x\n"
+        "    w = Vector(Vector(g(x) for x in v).sum() for _ in range(3))\n"
+        "    return w + Vector(g(x) for x in v)\n"
+    ),
+    "stars are fitted": (
+        "def f(x: float, k: int) -> Inner:\n"
+        "    def g(a: float, n: int) -> float:\n        return a * n + x\n"
+        "    t = (x, k)\n    return Inner(g(*t), k)\n"
+    ),
+    "what is dropped is computed": (
+        "def f(x: float, k: int) -> float:\n"
+        "    y, _ = 2.0, 1.0 / x\n    for _ in A[k]:\n        y += 1.0\n"
+        "    _, z, _ = A[k]\n    return y + z\n"
+    ),
+    "for after an error in it": (
+        "def f(x: float, k: int) -> float:\n"
+        "    n, y = (2000000000 if x == 0.0 else k % 3), 0.0\n"
+        "    for i in range(n):\n        for j in range(n):\n            if 1.0 / x > y:\n"
+        "                continue\n            y += 1.0\n"
+        "        if y < 1.0:\n            continue\n        y += 1.0\n    return y\n"
+    ),
+    "for after an error before it": (
+        "def f(x: float, k: int) -> float:\n"
+        "    def work(n: int) -> float:\n        y = x\n        for i in range(n):\n"
+        "            for j in range(n):\n                y = y * 0.5 + j\n        return y\n"
+        "    n = 2000000000 if x == 0.0 else k % 3\n    return 1.0 / x + work(n)\n"
+    ),
+    "raise with texts": (
+        "def f(x: float) -> float:\n"
+        "    low, high = 'too low\\t', 'too\\r high'\n"
+        "    if x > 1.0:\n"
+        "        raise Refusal(f\"{high} ??! {x > 2.0} {x:8.3f} {'' if x > 3.0 else low}\")\n"
+        "    return x\n"
+    ),
+    "names that C reserves": (
+        "def f(_Bool: float, x\u0302: float, double_int: pose) -> float:\n"
+        "    pose_ = double_int._replace(x=_Bool)\n    each1 = x\u0302\n"
+        "    def each2(a: float) -> float:\n        return a * each1\n"
+        "    v = Vector(each2(k * pose_.x) for k in range(2))\n    return v.sum() + pose_.x\n"
+    ),
     "names of C": (
         "def f(double: float, error: int, int_: float) -> float:\n"
         "    switch, sin, NAN = double / int_, 1.0, 0.5\n    register = switch + sin * NAN\n"
@@ -363,6 +411,36 @@ CONSTRUCTS = {
         "def f(x: float) -> Annotated[Vector, 3]:\n    return Vector(x * k for k in range(N))\n"
     ),
 }  # fmt: skip
+
+#: What Python takes and means otherwise than its annotations say.
+WRONG_CONSTANTS = """
+class Default(NamedTuple):
+    a: float
+    n: int = 2.5
+
+
+LARGE, ZERO, WRONG = 3000000000, Inner(0), Inner(0.5, 2.5)
+LONG, PLAIN = Record(1.0, Vector((1.0,) * 4), START), Record(1.0, (1.0, 2.0, 3.0), START)
+
+
+def _nothing(x: float) -> None:
+    if x > 1.0:
+        raise Refusal("no")
+
+
+def _none(x: float) -> None:
+    return x
+
+
+def _any(v: Vector) -> float:
+    return v.sum()
+
+
+_twice = {2: lambda x: x * 2.0}
+_rebound = _twice[2]
+
+
+"""
 
 floats = st.floats() | st.floats(-3.0, 3.0) | st.sampled_from([0.0, -0.0, 1.0, 0.5, 5e-324, 1e308])
 integers = st.integers(-(2**31), 2**31 - 1) | st.integers(-5, 8)
@@ -453,6 +531,48 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y += A[0:1, 2]", "Slice has no counterpart"),
         ('raise Refusal(f"{y!r}")', "!r in a text"),
         ("y, y = 1.0, y", "a name twice in one assignment"),
+        (
+            "def g(a: float) -> float:\n        return a + y\n"
+            "    def h(b: float) -> float:\n        y = 2.0 * b\n        return g(b) + y\n"
+            "    y = h(v[0])",
+            "y, which g uses, is changed",
+        ),
+        (
+            "z = 2.0\n    def g(a: float) -> float:\n        return a + z\n"
+            "    def h(z: float) -> float:\n        return g(z)\n    y = h(y)",
+            "z has two meanings in h: rename one",
+        ),
+        ("k = (y, 3)\n    r = Inner(*k, 4)", "3 values for 2 fields"),
+        ("k = (3, y)\n    r = Inner(*k)", "*k is an int where a float is wanted"),
+        ("y = WRONG.n * y", "WRONG.n is a float where an int is wanted"),
+        ("y = LONG.v[2]", "LONG.v is not a Vector of 3"),
+        ("y = PLAIN.v[2]", "PLAIN.v is not a Vector of 3"),
+        ("y = Default(y).n * y", "the default value of n is a float where an int is wanted"),
+        ("_ = y\n    y = _", "a value of _ is not in the language"),
+        ("y = 1.0 * len(A[int(y)])", "len of a number, or of something that has no name"),
+        ("y = 1.0 * _nothing(y)", "nothing where a number is wanted"),
+        ("k = _nothing(y)", "what returns nothing is used as a value"),
+        ("y = _none(y)", "_none returns a value, and its type is None"),
+        ("y = _any(v, 5.0)", "arguments other than v"),
+        ("for k in range(0, 5, 1, 7): y += k", "range with 4 arguments"),
+        ("k = (y, 2)\n    y = k.m0", "m0 is not a field of a tuple of 2"),
+        ("y = POWERS[1.0]", "there is no element 1.0 here"),
+        ("y = NESTED[0, 1]", "two subscripts of a tuple of 2"),
+        ("w = A[0:1]", "a slice of a Matrix"),
+        ('for k in ("a", "b"): y += 1.0', "a tuple of texts; choose between texts by if"),
+        ('raise Refusal(f"{y:.{N}f}")', "a format that is computed"),
+        ("y = y * sin", "sin is not a number"),
+        ("y = _rebound(y)", "_rebound is not made by def with types"),
+        ("w = Vector(v[0:0])", "a slice without elements"),
+        (
+            "def g(w: Vector) -> float:\n        return w.sum()\n    y = g(v)",
+            "Vector has no size here",
+        ),
+        (
+            "def g(w: flaot) -> float:\n        return w\n    y = g(y)",
+            "name 'flaot' is not defined",
+        ),
+        ("y = " + "y / " * 250 + "y", "an expression of 200 levels: take it apart"),
         ("y = v + Vector((1.0, 2.0))", "a Vector of 3 + a Vector of 2 is not defined"),
         ("k = 0\n    k += 0.5", "k is an int and gets a float: begin with a float"),
         ("y = ZERO.a", "ZERO.a is an int where a float is wanted: write 0.0"),
@@ -469,13 +589,13 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         (
             "for k in range(3):\n        def g(a: float) -> float:\n            return a * k\n"
             "    y = g(y)",
-            "k may have no value here",
+            "g may have no value here",
         ),
     ],
 )  # fmt: skip
 def test_what_c_would_compute_otherwise_is_refused(tmp_path: Path, line: str, why: str):
     function = f"def f(y: float, v: Annotated[Vector, 3]) -> float:\n    {line}\n    return y\n"
-    constants = "\nLARGE, ZERO = 3000000000, Inner(0)\n\n"
+    constants = WRONG_CONSTANTS
     module = module_of(HEAD + SHARED + constants + function, tmp_path, "refused")
     with pytest.raises(Untranslatable, match=re.escape(why)):
         c_text({"f": module.f})
@@ -515,6 +635,16 @@ def test_constants_of_one_name_keep_their_values(tmp_path: Path, monkeypatch: py
     assert both.c("f", (1.0,)).numbers == both.python("f", (1.0,)).numbers == (380.0,)
 
 
+def test_a_function_that_is_bound_again_is_the_one_it_was(tmp_path: Path):
+    text = HEAD + (
+        "def h(x: float) -> float:\n    return x + 1.0\n\n\nold = h\n\n\n"
+        "def h(x: float) -> float:\n    return x * 5.0\n\n\n"
+        "def f(x: float) -> float:\n    return old(x) - h(x)\n"
+    )
+    both = Twins(module_of(text, tmp_path, "bound_again"), tmp_path)
+    assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (-11.0,)
+
+
 def test_comments_stay_comments(tmp_path: Path):
     text = HEAD + (
         "def f(x: float) -> float:\n"
@@ -525,12 +655,13 @@ def test_comments_stay_comments(tmp_path: Path):
     assert both.c("f", (3.0,)).numbers == (6.0,)
 
 
-def test_numbers_of_numpy_are_constants(tmp_path: Path):
+def test_numbers_of_numpy_are_refused(tmp_path: Path):
+    """What they meet becomes one of them, which divides by zero."""
     text = HEAD.replace("import math\n", "import math\n\nimport numpy as np\n") + (
         "G = np.float64(2.0) * 1.5\n\n\ndef f(x: float) -> float:\n    return G * x\n"
     )
-    both = Twins(module_of(text, tmp_path, "with_numpy"), tmp_path)
-    assert both.c("f", (3.0,)).numbers == (9.0,)
+    with pytest.raises(Untranslatable, match=r"G is not a number.*write float\(...\)"):
+        c_text({"f": module_of(text, tmp_path, "with_numpy").f})
 
 
 def test_functions_are_files_of_one_folder(tmp_path: Path):
