@@ -29,7 +29,6 @@ BY_SUBJECT = ("src/auv_fmu", *(page.parent.as_posix() for page in COMPONENTS))
 
 #: Why others have another size.
 REASONS = {
-    "fmus/native/variables.py": "reads a program's text, and needs nothing of the translation",
     "fmus/ports/controllers.py": "in the FMUs of controllers only",
     "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",

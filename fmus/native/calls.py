@@ -17,8 +17,6 @@ from fmus.native.expressions import (
     UNARY,
     WHOLE,
     Code,
-    is_dotted_name,
-    is_fixed_name,
 )
 from fmus.native.layout import laid_out
 from fmus.native.loops import loop_over
@@ -37,7 +35,7 @@ from fmus.native.shapes import (
     structure,
     vector,
 )
-from fmus.native.variables import free_names, names_in, renamed
+from fmus.native.variables import free_names, is_dotted_name, is_fixed_name, names_in, renamed
 from fmus.ports.groups import hints_of
 
 #: Functions that never raise, and arithmetic.h's for the others.

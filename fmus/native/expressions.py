@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import math
 import re
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
-from functools import cache
-from importlib.util import resolve_name
 from itertools import count
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -18,7 +14,7 @@ from typing import Any, NamedTuple
 from auv_fmu.arrays import Matrix
 from fmus.native import arrays
 from fmus.native.layout import quoted
-from fmus.native.program import Function, Program, Untranslatable, number_in_c
+from fmus.native.program import Function, Program, Untranslatable, home, number_in_c
 from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
@@ -31,6 +27,7 @@ from fmus.native.shapes import (
     structure,
     vector,
 )
+from fmus.native.variables import constant_of, is_dotted_name
 from fmus.ports.groups import is_class
 
 #: How tightly the operators of C bind.
@@ -244,7 +241,7 @@ class Expressions:
             raise self.fail(node, f"the name {ast.unparse(node)} is not known here")
         # It bears the name of the module that it stands in, wherever it was imported.
         is_dotted = isinstance(node, ast.Attribute) and self.known(node.value) is math
-        module = "math" if is_dotted else _home(self.scope["__name__"], name)
+        module = "math" if is_dotted else home(self.scope["__name__"], name)
         if module == "math" and type(value) is float:
             return Code(number_in_c(value), DOUBLE)
         if isinstance(value, IntEnum):
@@ -261,8 +258,7 @@ class Expressions:
         code = self.code(node.value)
         if node.attr == "T" and arrays.is_array(code.shape) and len(arrays.sizes(code.shape)) == 2:
             return self.calling(arrays.transpose(self.program, code.shape), [code.text])
-        has_fields = isinstance(code.shape, Structure) and hasattr(code.shape.made, "_fields")
-        for suffix, part in code.shape.parts if has_fields else ():  # type: ignore[union-attr]
+        for suffix, part in _fields(code.shape):
             if suffix == f".{in_c(node.attr)}":
                 return Code(f"{code.within(POSTFIX)}{suffix}", part)
         raise self.fail(node, f"{node.attr} is not a field of {code.shape.word}")
@@ -283,9 +279,8 @@ class Expressions:
 
     def _element(self, node: ast.Subscript, place: ast.expr, code: Code) -> Code:
         parts = code.shape.parts if isinstance(code.shape, Structure) else ()
-        key = _constant_of(place)
-        has_fields = hasattr(getattr(code.shape, "made", None), "_fields")
-        if isinstance(key, float) or (isinstance(key, str) and has_fields):
+        key = constant_of(place)
+        if isinstance(key, float) or (isinstance(key, str) and _fields(code.shape)):
             raise self.fail(node, f"there is no element {ast.unparse(place)} here")
         key = in_c(key) if isinstance(key, str) else key
         if isinstance(key, int) and key < 0:
@@ -316,7 +311,7 @@ class Expressions:
     def _sliced(self, node: ast.Subscript, places: ast.Slice, code: Code) -> list[Code]:
         """The elements of a constant slice."""
         bounds = [places.lower, places.upper, places.step]
-        numbers = [None if bound is None else _constant_of(bound) for bound in bounds]
+        numbers = [None if bound is None else constant_of(bound) for bound in bounds]
         known = all(n is not None or bound is None for n, bound in zip(numbers, bounds))
         if not known or not isinstance(code.shape, Structure) or not code.shape.is_array:
             raise self.fail(node, "a slice other than a constant one of a vector or tuple")
@@ -383,49 +378,13 @@ class Expressions:
         return Code(f"({shape.name}){{{', '.join(filled) or '0'}}}", shape)
 
 
-def _constant_of(node: ast.expr) -> Any:
-    """A number or a text that is written out; None: it is computed."""
-    try:
-        return ast.literal_eval(node)
-    except ValueError:
-        return None
-
-
-def _home(module: str, name: str) -> str:
-    """The module that a constant was defined in, seen from one that uses it."""
-    origin = _origins(sys.modules[module]).get(name)
-    return module if origin is None else origin if origin == "math" else _home(origin, name)
-
-
-@cache
-def _origins(module: ModuleType) -> dict[str, str]:
-    """Where the names come from that a module imports."""
-    imports = [
-        n for n in ast.parse(inspect.getsource(module)).body if isinstance(n, ast.ImportFrom)
-    ]
-    return {
-        alias.name: resolve_name(f"{'.' * node.level}{node.module or ''}", module.__package__)
-        for node in imports
-        for alias in node.names
-    }
+def _fields(shape: Shape) -> Sequence[tuple[str, Shape]]:
+    """The fields of a NamedTuple."""
+    is_record = isinstance(shape, Structure) and hasattr(shape.made, "_fields")
+    return shape.parts if is_record else ()  # type: ignore[union-attr]
 
 
 def _initializer(code: Code) -> str:
     """An expression within a literal, which says its type."""
     prefix = f"({code.shape.name}){{"
     return code.text[len(prefix) - 1 :] if code.text.startswith(prefix) else code.text
-
-
-def is_dotted_name(node: ast.expr) -> bool:
-    """Whether an expression is a name, or a part of one."""
-    if isinstance(node, (ast.Attribute, ast.Subscript)):
-        return is_dotted_name(node.value)
-    return isinstance(node, (ast.Name, ast.Constant)) or (
-        isinstance(node, ast.UnaryOp) and re.fullmatch(r"-[\d.]+", ast.unparse(node)) is not None
-    )
-
-
-def is_fixed_name(node: ast.expr) -> bool:
-    """Whether an expression is a name, or a part of one at a place that is written out."""
-    places = [part.slice for part in ast.walk(node) if isinstance(part, ast.Subscript)]
-    return is_dotted_name(node) and all(_constant_of(place) is not None for place in places)

@@ -8,12 +8,13 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
+from itertools import groupby
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 from fmus.native.calls import Calls
-from fmus.native.expressions import AND, OR, WHOLE, Code, is_fixed_name
+from fmus.native.expressions import AND, OR, WHOLE, Code
 from fmus.native.language import foreign
 from fmus.native.layout import INDENT, annotated, comment_of, comments_of, laid_out, quoted
 from fmus.native.loops import loop_over
@@ -31,7 +32,14 @@ from fmus.native.shapes import (
     in_c,
     shape_of,
 )
-from fmus.native.variables import always_stored, both, loaded_names, names_in, stored_names
+from fmus.native.variables import (
+    always_stored,
+    both,
+    is_fixed_name,
+    loaded_names,
+    names_in,
+    stored_names,
+)
 from fmus.ports.port import Refusal
 
 #: How values in the text of a refusal may be written: as C writes them, too.
@@ -63,7 +71,7 @@ def function_in_c(program: Program, function: FunctionType, made: Function) -> N
     found = [n for n in _checked(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line]
     if not found:
         raise Untranslatable(f"{path}:{line}: {function.__name__} is not made by def in a module")
-    [tree] = found
+    tree = found[0]
     names = {*made.arguments, *stored_names(*tree.body)}
     nothing = function.__annotations__.get("return") in (None, "None")
     _Translation(tree, Calls(program, path, function.__globals__, made, names), nothing).write()
@@ -83,12 +91,11 @@ class _Translation:
 
     def write(self) -> None:
         """Write its text."""
-        made = self._made
         body = list(self._block(self._tree.body, INDENT, new=False))
         if self._in_c.assigned is not None and not self._returns_nothing:
             raise self._in_c.fail(self._tree, f"{self._tree.name} may end without a return")
-        lines = [*comment_of(ast.get_docstring(self._tree)), *laid_out(made.head, ""), *body, "}"]
-        made.text = "\n".join(lines)
+        head = [*comment_of(ast.get_docstring(self._tree)), *laid_out(self._made.head, "")]
+        self._made.text = "\n".join([*head, *body, "}"])
 
     # Blocks
 
@@ -126,10 +133,8 @@ class _Translation:
                 yield laid_out(text, indent)
         elif isinstance(node, ast.Raise):
             yield laid_out(self._raised(node), indent)
-            if self._made.returns is not None:
-                yield [f"{indent}return {_zero(self._made.returns)};"]
-            elif self._returns_nothing:
-                yield [f"{indent}return;"]
+            if self._made.returns is not None or self._returns_nothing:
+                yield [f"{indent}{self._made.leave}"]
             self._in_c.assigned = None
         elif isinstance(node, ast.FunctionDef):
             self._local_function(node)
@@ -206,23 +211,22 @@ class _Translation:
         if self._assigned[node.name] > 1:
             raise self._in_c.fail(node, f"{node.name} is given a value twice: use two names")
         inner, captured = self._in_c.inside(node, node.name)
-        own = {argument.arg for argument in node.args.args} | set(stored_names(*node.body))
+        given: dict[str, Any] = {a.arg: self._shape(a.annotation) for a in node.args.args}
+        own = {*given, *stored_names(*node.body)}
         for name in captured:
             if name in own:
                 raise self._in_c.fail(node, f"{name} has two meanings in {node.name}: rename one")
             if self._assigned[name] > (name not in self._made.arguments):
                 raise self._in_c.fail(node, f"{name}, which {node.name} uses, is changed")
-        given: dict[str, Any] = {a.arg: self._shape(a.annotation) for a in node.args.args}
         made = inner.made
         made.arguments = {**given, **{name: self._in_c.local[name] for name in captured}}
         nothing = isinstance(node.returns, ast.Constant) and node.returns.value is None
         made.returns = None if nothing else self._shape(node.returns, is_result=True)
         inner.local = dict(made.arguments)
-        inner.names = {*made.arguments, *stored_names(*node.body)}
+        inner.names = {*made.arguments, *own}
+        inner.functions = {n: f for n, f in inner.functions.items() if n not in inner.names}
         if inner.assigned is not None:
-            inner.assigned = set(made.arguments) | (inner.functions.keys() - inner.names)
-        hidden = inner.names & inner.functions.keys()
-        inner.functions = {n: f for n, f in inner.functions.items() if n not in hidden}
+            inner.assigned = {*made.arguments, *inner.functions}
         _Translation(node, inner, nothing).write()
         self._in_c.program.functions[made.name] = made
         self._in_c.functions = {**self._in_c.functions, node.name: (made, captured)}
@@ -254,23 +258,23 @@ class _Translation:
             yield self._stored(node, [(target.id, self._in_c.code(changed))])
 
     def _assignment(self, target: ast.expr, value: ast.expr) -> Iterator[str]:
-        if isinstance(target, ast.Name):
+        if isinstance(target, ast.Name) and target.id == "_":
+            yield f"(void)({self._in_c.code(value).text});"
+        elif isinstance(target, ast.Name):
             is_old = any(target.id in scope for scope in self._scopes)
             wanted = self._in_c.local.get(target.id) if is_old else None
             yield self._stored(target, [(target.id, self._in_c.code(value, wanted))])
         elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-            if len(target.elts) != len(value.elts) or _has_star(value):
+            has_star = any(isinstance(one, ast.Starred) for one in value.elts)
+            if has_star or len(target.elts) != len(value.elts):
                 yield from self._taken_apart_in(target, value)
                 return
             pairs = list(zip(target.elts, value.elts))
             if names_in(target) & names_in(value):
                 yield from self._at_once(target, pairs)
-            elif all(isinstance(one, ast.Name) for one, _ in pairs):
-                for one, other in pairs:
-                    if ast.unparse(one) == "_" and not is_fixed_name(other):
-                        yield f"(void)({self._in_c.code(other).text});"
+            elif all(isinstance(one, ast.Name) and one.id != "_" for one, _ in pairs):
                 codes = [(ast.unparse(one), self._in_c.code(other)) for one, other in pairs]
-                for alike in _alike([pair for pair in codes if pair[0] != "_"]):
+                for alike in _alike(codes):
                     yield self._stored(target, alike)
             else:
                 for one, other in pairs:
@@ -391,21 +395,6 @@ class _Translation:
         raise self._in_c.fail(part.value, f"{{{name}}} in a text: write {{{name}:g}}")
 
 
-def _zero(shape: Shape) -> str:
-    return f"({shape.name}){{0}}" if isinstance(shape, Structure) else "0"
-
-
-def _has_star(node: ast.Tuple) -> bool:
-    return any(isinstance(element, ast.Starred) for element in node.elts)
-
-
 def _alike(values: list[tuple[str, Code]]) -> Iterator[list[tuple[str, Code]]]:
     """Neighbours of one type."""
-    group: list[tuple[str, Code]] = []
-    for value in values:
-        if group and group[0][1].shape != value[1].shape:
-            yield group
-            group = []
-        group.append(value)
-    if group:
-        yield group
+    return (list(group) for _, group in groupby(values, key=lambda value: value[1].shape))

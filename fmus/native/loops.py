@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 from typing import NamedTuple
 
-from fmus.native.expressions import Code, Expressions, is_fixed_name
+from fmus.native.expressions import Code, Expressions
 from fmus.native.shapes import INTEGER, Structure, in_c
-from fmus.native.variables import names_in
+from fmus.native.variables import is_fixed_name, names_in
 
 
 class Loop(NamedTuple):

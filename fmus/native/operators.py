@@ -20,9 +20,9 @@ from fmus.native.expressions import (
     WHOLE,
     Code,
     Expressions,
-    is_dotted_name,
 )
 from fmus.native.shapes import BOOLEAN, DOUBLE, INTEGER, Shape
+from fmus.native.variables import is_dotted_name
 
 _BINARY = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}
 _COMPARE = {

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
 import sys
 from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.util import resolve_name
 from math import isinf, isnan
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from auv_fmu.arrays import Matrix, Vector
@@ -63,6 +65,12 @@ class Function:
         given += ["Error *error"] if self.raises else []
         returned = self.returns.name if self.returns else "void"
         return f"static {returned} {self.name}({', '.join(given) or 'void'}) {{"
+
+    @property
+    def leave(self) -> str:
+        """The statement that ends it after an error."""
+        zero = f"({self.returns.name}){{0}}" if isinstance(self.returns, Structure) else "0"
+        return f"return {zero};" if self.returns else "return;"
 
     def call(self, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
@@ -176,6 +184,25 @@ class Program:
 def _words(module: str) -> frozenset[str]:
     """All names in the text of a module."""
     return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", inspect.getsource(sys.modules[module])))
+
+
+def home(module: str, name: str) -> str:
+    """The module that a constant was defined in, seen from one that uses it."""
+    origin = _origins(sys.modules[module]).get(name)
+    return module if origin is None else origin if origin == "math" else home(origin, name)
+
+
+@cache
+def _origins(module: ModuleType) -> dict[str, str]:
+    """Where the names come from that a module imports."""
+    imports = [
+        n for n in ast.parse(inspect.getsource(module)).body if isinstance(n, ast.ImportFrom)
+    ]
+    return {
+        alias.name: resolve_name(f"{'.' * node.level}{node.module or ''}", module.__package__)
+        for node in imports
+        for alias in node.names
+    }
 
 
 def c_name(module: str, name: str) -> str:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
+from typing import Any
 
 
 def stored_names(*nodes: ast.AST) -> list[str]:
@@ -89,3 +91,26 @@ def renamed(node: ast.GeneratorExp, names: Mapping[str, str]) -> ast.GeneratorEx
             part.id = names.get(part.id, part.id)
     made.generators[0].iter = node.generators[0].iter
     return made
+
+
+def constant_of(node: ast.expr) -> Any:
+    """A number or a text that is written out; None: it is computed."""
+    try:
+        return ast.literal_eval(node)
+    except ValueError:
+        return None
+
+
+def is_dotted_name(node: ast.expr) -> bool:
+    """Whether an expression is a name, or a part of one."""
+    if isinstance(node, (ast.Attribute, ast.Subscript)):
+        return is_dotted_name(node.value)
+    return isinstance(node, (ast.Name, ast.Constant)) or (
+        isinstance(node, ast.UnaryOp) and re.fullmatch(r"-[\d.]+", ast.unparse(node)) is not None
+    )
+
+
+def is_fixed_name(node: ast.expr) -> bool:
+    """Whether an expression is a name, or a part of one at a place that is written out."""
+    places = [part.slice for part in ast.walk(node) if isinstance(part, ast.Subscript)]
+    return is_dotted_name(node) and all(constant_of(place) is not None for place in places)
