@@ -216,14 +216,7 @@ class Expressions:
         if isinstance(value, str):
             return Code(quoted(value), TEXT)
         shapes: dict[type, Shape] = {float: DOUBLE, bool: BOOLEAN, int: INTEGER}
-        return Code(self.written(node, value), shapes[type(value)])
-
-    def written(self, node: ast.AST, value: float) -> str:
-        """A number in C."""
-        try:
-            return number_in_c(value)
-        except Untranslatable as error:
-            raise self.fail(node, str(error)) from None
+        return Code(number_in_c(value), shapes[type(value)])
 
     def _name(self, node: ast.Name, wanted: Shape | None) -> Code:
         if node.id not in self.names:
@@ -246,10 +239,7 @@ class Expressions:
             return Code(number_in_c(value), DOUBLE)
         if isinstance(value, IntEnum):
             module, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
-        try:
-            return Code(*self.program.constant(module, name, value))
-        except (Untranslatable, TypeError) as error:
-            raise self.fail(node, str(error)) from None
+        return Code(*self.program.constant(module, name, value))
 
     def _attribute(self, node: ast.Attribute, wanted: Shape | None) -> Code:
         owner = self.known(node.value)

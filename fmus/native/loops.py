@@ -103,7 +103,7 @@ def _bound(within: Expressions, node: ast.expr) -> Code:
     """A bound of a range; a constant of a module is the number that it stands for."""
     value = within.known(node)
     if type(value) is int:
-        return Code(within.written(node, value), INTEGER)
+        return within.code(ast.copy_location(ast.Constant(value), node))
     return within.integer(node, "a bound of a range")
 
 

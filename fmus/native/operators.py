@@ -21,6 +21,7 @@ from fmus.native.expressions import (
     Code,
     Expressions,
 )
+from fmus.native.program import number_in_c
 from fmus.native.shapes import BOOLEAN, DOUBLE, INTEGER, Shape
 from fmus.native.variables import is_dotted_name
 
@@ -103,7 +104,7 @@ class Operators(Expressions):
         if isinstance(node.op, ast.UAdd):
             raise self.fail(node, "the operator +")
         if isinstance(node.operand, ast.Constant) and type(node.operand.value) is int:
-            return Code(self.written(node, -node.operand.value), INTEGER, UNARY)
+            return Code(number_in_c(-node.operand.value), INTEGER, UNARY)
         operand = self.code(node.operand)
         if arrays.is_array(operand.shape):
             return self.calling(arrays.negative(self.program, operand.shape), [operand.text])
