@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.master.experiment import COUPLINGS
 from orchestrator.runs.scenario_events import ACTIONS
+from orchestrator.runs.vehicles import MOST_VEHICLES
 from orchestrator.vehicle.signals import STANDARD
 
 #: What an input does between two rows of its table; the first is the default.
@@ -137,10 +138,14 @@ class ScenarioFile(TomlTable):
         "The components to keep; wires to the others are removed too.", "all of them"
     )
     remark: str = entry("What the report says below the figure, in Markdown.", "none")
-    components: dict[str, Name] = entry(
+    vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = entry(
+        "How many vehicles there are, each with the closed loop: [see below](#vehicles).",
+        "one, whose components have no prefix",
+    )
+    components: dict[str, Name | Literal[False]] = entry(
         "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
-        "this file.",
+        "this file. `false` removes a component, and its wires.",
         "none",
     )
     wires: dict[str, Name | Literal[False]] = entry(
