@@ -201,7 +201,7 @@ def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") 
     if name not in known:
         hint = did_you_mean(name, known) or f"; there are {', '.join(known)}"
         raise InputError(f"no figure {name!r}{hint}")
-    loops = {loop.vehicle: (i, loop) for i, loop in enumerate(runs[0].loops)}
+    loops = {loop.name: (i, loop) for i, loop in enumerate(runs[0].loops)}
     if vehicle and vehicle not in loops:
         raise InputError(f"no vehicle {vehicle!r}; there are {', '.join(loops)}")
     i, loop = loops[vehicle] if vehicle else (0, runs[0].loop)
@@ -256,14 +256,14 @@ def draw(
     notes: list[str] = []
     for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
         of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
-        name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
+        name = ", ".join(filter(None, (title, loop.name if vehicle and title else "")))
         notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
     return notes
 
 
 def _same(run: Drawn, loop: Loop, i: int) -> Loop:
     """The loop of a run that is drawn beside another's: the one of the same vehicle."""
-    named = [own for own in run.loops if own.vehicle == loop.vehicle]
+    named = [own for own in run.loops if own.name == loop.name]
     return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
 
 

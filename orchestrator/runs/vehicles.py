@@ -50,9 +50,7 @@ def for_each(table: Mapping[str, T], vehicles: int | None) -> dict[str, T]:
 
 def named(names: list[str], vehicles: int | None) -> list[str]:
     """Names, with one for each vehicle in the place of one for all."""
-    return [
-        name.replace(_EACH, number) for name in names for number in _numbers(name, vehicles)
-    ]
+    return [name.replace(_EACH, number) for name in names for number in _numbers(name, vehicles)]
 
 
 def role_of(component: str) -> str:

@@ -258,7 +258,7 @@ def index_columns(loops: Sequence[Loop] = (STANDARD,)) -> tuple[str, ...]:
 
 def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
     for loop in loops:
-        yield loop, f"{loop.vehicle}." if len(loops) > 1 else ""
+        yield loop, f"{loop.name}." if len(loops) > 1 else ""
 
 
 class Indices:
@@ -354,7 +354,7 @@ class Metrics(Indices):
         }
         if self._failure is not None:
             content["failure"] = self._failure
-        of = {loop.vehicle: self._of(loop, system) for loop in self._loops}
+        of = {loop.name: self._of(loop, system) for loop in self._loops}
         return content | (next(iter(of.values())) if len(of) == 1 else {VEHICLES: of})
 
     def _of(self, loop: Loop, system: System) -> dict[str, Any]:

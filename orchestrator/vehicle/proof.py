@@ -97,7 +97,7 @@ def gain_check(system: System) -> str:
     for loop in loops:
         found = theorem_of(system, loop)
         if len(loops) > 1:
-            lines += [f"{loop.vehicle}:", ""]
+            lines += [f"{loop.name}:", ""]
         lines += [*stated(found), "", _NOTE, "", *_sampling(system, loop)]
         if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
             lines += ["", _PAPER]
