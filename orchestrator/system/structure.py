@@ -111,10 +111,10 @@ class System:
 
         """
         found: dict[PortName, object] = {}
-        for said in sorted(values, key=lambda name: STAR not in str(name)):
+        for said, values_of in sorted(values.items(), key=lambda one: STAR not in str(one[0])):
             stated = said if isinstance(said, PortName) else self._port_name(str(said))
             meant = self._meant(stated)
-            for name, value in zip(meant, _spread(stated, values[said], len(meant)), strict=True):
+            for name, value in zip(meant, _spread(stated, values_of, len(meant)), strict=True):
                 several = None if self.has(name) else _several(value)
                 ports = [] if several is None else self.members(str(name), ("parameter", "input"))
                 found |= dict(paired(name, ports, several)) if several and ports else {name: value}
