@@ -68,7 +68,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         PortName(name, variable.name)
         for name, component in components.items()
         for variable in component.having("input")
-        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
+        if any(group in groups for group, _ in splits(f"{name}.{variable.name}"))
     }
     system = System(
         name=wiring["name"],

@@ -302,8 +302,9 @@ class Indices:
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account."""
+        table = Table.of(self._header, np.vstack((self._last, rows)))
         for loop, reducers in self._reducers.items():
-            seen = LoopRows(self._header, loop, self._n, self._last, rows)
+            seen = LoopRows(loop, self._n, table, len(self._last))
             for reducer in reducers.values():
                 reducer.take(seen)
         for name, before in self.together.items():
