@@ -101,9 +101,9 @@ def started(eta0, nu0, parameters=PARAMETERS):
     return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), UNDRIVEN, parameters.current)[0]
 
 
-def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1):
+def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1, dwater=(0.0, 0.0, 0.0)):
     rotation = rotation_from_quaternion(state.quaternion)
-    return plant.steps(parameters, state, rotation, tau, tau_w, parameters.current, h, n)[0]
+    return plant.steps(parameters, state, rotation, tau, tau_w, parameters.current, dwater, h, n)[0]
 
 
 def seen(state, parameters=PARAMETERS):
