@@ -74,11 +74,11 @@ PARAMETERS = ParameterSet(
             "Direction that the current goes to: 0 north, pi/2 east",
             tunable=True,
         ),
-        exponent=parameter(
-            "current.exponent",
-            _CURRENT.exponent,
+        root=parameter(
+            "current.root",
+            _CURRENT.root,
             "1",
-            "Exponent of the profile from the bottom to the surface; 0: no profile",
+            "Profile: the root of the height above the bottom, of this degree; 0: no profile",
             0.0,
         ),
         mu=parameter(

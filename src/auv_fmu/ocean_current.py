@@ -28,7 +28,7 @@ class Current(NamedTuple):
 
     speed: float = 0.1  #: mean at the surface [m/s]
     direction: float = 0.0  #: that it goes to, from north to east [rad]
-    exponent: float = 1.0 / 7.0  #: of the profile over depth; 0: the same at all depths
+    root: float = 7.0  #: of the profile over depth; 0: the same at all depths
     mu: float = 0.005  #: rate at which the variation is forgotten [1/s]
     sigma: float = 0.02  #: standard deviation of the variation in each direction [m/s]
     seed: int = 1  #: of the variation
@@ -74,18 +74,18 @@ def advance(current: Current, variation: Variation, h: float) -> Variation:
     )
 
 
-def profile(exponent: float, z: float, depth: float) -> float:
+def profile(root: float, z: float, depth: float) -> float:
     """The current at a depth, as a share of that at the surface.
 
     Args:
-        exponent: of the power law; 0: the current is the same at all depths.
+        root: 1 / exponent of the power law; 0: the current is the same at all depths.
         z: depth below still water, from 0 to that of the bottom [m].
         depth: of the water [m]; 0: it is deep, and the current the same at all depths.
 
     """
-    if depth == 0.0 or exponent == 0.0:
+    if depth == 0.0 or root == 0.0:
         return 1.0
-    return math.pow(1.0 - z / depth, exponent)
+    return math.pow(1.0 - z / depth, 1.0 / root)
 
 
 def velocity(current: Current, variation: Variation, z: float, depth: float) -> Vector3:
@@ -97,7 +97,7 @@ def velocity(current: Current, variation: Variation, z: float, depth: float) -> 
         depth: of the water [m]; 0: it is deep.
 
     """
-    share = profile(current.exponent, z, depth)
+    share = profile(current.root, z, depth)
     return (
         share * (current.speed * cos(current.direction) + variation.north),
         share * (current.speed * sin(current.direction) + variation.east),

@@ -404,7 +404,7 @@ def steps(
         state, rotation: at the beginning.
         tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
-        water: velocity of the water at the beginning [m/s], earth frame.
+        water: velocity of the water at the beginning of each of them [m/s], earth frame.
         dwater: its acceleration [m/s2], earth frame.
         h: step [s].
         n: how many.
@@ -412,8 +412,8 @@ def steps(
     """
     T_u, T_q, T_r = parameters.T
     acting = Drive(tau, tau, tau, tau)
-    state = immersed(state, rotation, water)
     while n > 0:
+        state = immersed(state, rotation, water)
         if T_u or T_q or T_r:
             acting = drive(state.tau, tau, parameters.T, h)
         if parameters.integrator == RK4:

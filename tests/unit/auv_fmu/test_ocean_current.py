@@ -16,14 +16,14 @@ CURRENT = Current(speed=0.4, direction=0.6, mu=0.05, sigma=0.1)
 
 @given(share=st.floats(0.0, 1.0), depth=st.floats(1.0, 5000.0))
 def test_profile_is_the_seventh_root_of_the_height_above_the_bottom(share, depth):
-    actual = ocean_current.profile(Current().exponent, share * depth, depth)
+    actual = ocean_current.profile(Current().root, share * depth, depth)
     assert actual**7 == pytest.approx(1.0 - share, abs=1e-12)
 
 
 def test_profile_ends_at_the_bottom_and_is_even_in_deep_water():
-    assert ocean_current.profile(1 / 7, 0.0, 50.0) == 1.0
-    assert ocean_current.profile(1 / 7, 50.0, 50.0) == 0.0
-    assert ocean_current.profile(1 / 7, 1e9, 0.0) == 1.0
+    assert ocean_current.profile(7.0, 0.0, 50.0) == 1.0
+    assert ocean_current.profile(7.0, 50.0, 50.0) == 0.0
+    assert ocean_current.profile(7.0, 1e9, 0.0) == 1.0
     assert ocean_current.profile(0.0, 50.0, 50.0) == 1.0
 
 
@@ -31,7 +31,7 @@ def test_profile_ends_at_the_bottom_and_is_even_in_deep_water():
 def test_current_is_level_and_goes_where_it_is_said_to_go(direction, z):
     current = CURRENT._replace(direction=direction)
     still = Variation(0.0, 0.0, 1.0)
-    share = ocean_current.profile(current.exponent, z, 50.0)
+    share = ocean_current.profile(current.root, z, 50.0)
     expected = (share * 0.4 * cos(direction), share * 0.4 * sin(direction), 0.0)
     actual = ocean_current.velocity(current, still, z, 50.0)
     np.testing.assert_allclose(actual, expected, rtol=1e-14)
