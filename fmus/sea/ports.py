@@ -35,7 +35,7 @@ PARAMETERS = ParameterSet(
             "waves.highest",
             _WAVES.highest,
             "1",
-            "Highest frequency of the waves, as a multiple of that of the peak",
+            "Highest frequency of the waves, as a multiple of the peak's",
             1.0,
             10.0,
         ),

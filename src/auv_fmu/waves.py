@@ -86,7 +86,7 @@ class Waves(NamedTuple):
     Hs: float = 1.0  #: significant wave height [m]
     Tp: float = 7.0  #: period of the peak of the spectrum [s]
     gamma: float = 3.3  #: how much JONSWAP raises the peak
-    highest: float = 4.0  #: highest frequency, as a multiple of that of the peak
+    highest: float = 4.0  #: highest frequency, as a multiple of the peak's
     direction: float = 0.0  #: mean direction that waves go to, from north to east [rad]
     s: float = 10.0  #: exponent of the spreading; 0: all waves go in the mean direction
     n: int = 32  #: number of regular waves
