@@ -10,10 +10,11 @@ from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
 from types import ModuleType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from fmus.discovery import components, source_of
 from fmus.native.translator import translated
+from fmus.ports.groups import hints_of, parts_of
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = ROOT / "fmus/native/runtime"
@@ -58,8 +59,8 @@ def structure(kind: Any) -> Any:
         return c_double
     if kind in (int, bool):
         return c_int
-    if get_origin(kind) is tuple:
-        parts = [(f"x{i}", structure(k)) for i, k in enumerate(get_args(kind))]
+    if get_origin(kind) in (tuple, Annotated):
+        parts = [(f"x{i}", structure(k)) for i, k in enumerate(parts_of(kind) or ())]
     else:
         parts = [(name, structure(k)) for name, k in get_type_hints(kind).items()]
     return type("Part", (Structure,), {"_fields_": parts})
@@ -99,10 +100,7 @@ class Equations:
         subprocess.run([*command, "-o", library, folder / "shim.c", "-lm"], check=True)
         self.library = CDLL(str(library))
         self.library.restarted.restype = c_char_p
-        hints = {
-            **get_type_hints(self.behaviour.begin),
-            **get_type_hints(self.behaviour.advance),
-        }
+        hints = {**hints_of(self.behaviour.begin), **hints_of(self.behaviour.advance)}
         self.parameters, self.state = hints["parameters"], hints["state"]
         self.inputs = hints.get("inputs", tuple[()])
         self.derived = hints.get("derived")

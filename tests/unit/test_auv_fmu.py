@@ -9,6 +9,7 @@ import auv_fmu
 from auv_fmu import control_point, euler, plant
 from auv_fmu.observer import EULER
 from auv_fmu.saturation import TANH
+from auv_fmu.waves import JONSWAP
 
 TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {
@@ -71,6 +72,26 @@ OURS = {
         "rounding": 6.0,
     },
     "path_planner.Parameters": {"speed_max": 2.5, "turn_max": 4.0},
+    "Waves": {
+        "spectrum": JONSWAP,
+        "Hs": 1.0,
+        "Tp": 7.0,
+        "gamma": 3.3,
+        "highest": 4.0,
+        "direction": 0.0,
+        "s": 10.0,
+        "n": 32,
+        "seed": 1,
+    },
+    "Current": {
+        "speed": 0.1,
+        "direction": 0.0,
+        "root": 7.0,
+        "mu": 0.005,
+        "sigma": 0.02,
+        "seed": 1,
+    },
+    "Sea": {"depth": 50.0, "g": 9.81},
 }
 
 

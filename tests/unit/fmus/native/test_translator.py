@@ -16,7 +16,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.sea import Sea
+from auv_fmu.waves import MOST as MOST_WAVES
+from auv_fmu.waves import SPECTRA, Waves
 from fmus.discovery import components, ports_of, source_of
 from fmus.native.shapes import strip_sphinx_marks
 from fmus.native.tables import tables
@@ -381,6 +385,47 @@ def test_paths_are_refused_alike(random, n, timed):
     parameters = default._replace(waypoints=waypoints)
     why = both.call("check", filled(both.parameters, parameters))
     assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+
+
+@given(
+    random=randoms,
+    spectrum=st.sampled_from([*SPECTRA.values()]),
+    n=st.integers(1, MOST_WAVES),
+    depth=st.sampled_from((0.0, 2.0, 30.0, 6000.0)),
+)
+def test_seas_are_alike(random, spectrum, n, depth):
+    """Such as a user may want, at places above the surface, in the water and in the bottom."""
+    both = equations("Sea")
+    parameters = Sea(
+        Waves(
+            spectrum,
+            Hs=random.uniform(0.0, 10.0),
+            Tp=random.uniform(2.0, 20.0),
+            gamma=random.uniform(1.0, 7.0),
+            direction=random.uniform(-4.0, 4.0),
+            s=random.choice((0.0, random.uniform(0.0, 100.0))),
+            n=n,
+            seed=random.randrange(-(2**31), 2**31),
+        ),
+        Current(speed=random.uniform(0.0, 3.0), seed=random.randrange(-(2**31), 2**31)),
+        depth=depth,
+    )
+    given = filled(both.parameters, parameters)
+    why = both.call("check", given)
+    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+    kept, outputs, t = both.kept(), structure(both.outputs)(), random.uniform(0.0, 1e5)
+    inputs = both.inputs((random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), 0.0))
+    assert not both.call("begin", given, filled(both.inputs, inputs), t, kept, outputs)
+    state, derived, seen = both.python("begin", parameters=parameters, inputs=inputs, t=t)
+    assert outcome([kept, outputs]) == outcome([[state, derived], seen])
+    for _ in range(3):
+        h, z = random.uniform(0.0, 10.0), random.uniform(-5.0, 40.0)
+        inputs = both.inputs((*inputs.eta[:2], z))
+        arguments = {"parameters": parameters, "state": state, "derived": derived}
+        assert not both.call("advance", given, kept, filled(both.inputs, inputs), t, h, 1, outputs)
+        state, derived, seen = both.python("advance", **arguments, inputs=inputs, t=t, h=h)
+        assert outcome([kept, outputs]) == outcome([[state, derived], seen])
+        t += h
 
 
 @given(random=randoms)
