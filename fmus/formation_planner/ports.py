@@ -110,9 +110,6 @@ PARAMETERS = ParameterSet(
     limits=LIMITS,
     speed_max=parameter("speed_max", _DEFAULTS.speed_max, "m/s", "Largest accepted speed", 0.0),
     turn_max=parameter("turn_max", _DEFAULTS.turn_max, "rad/s", "Largest accepted turn rate", 0.0),
-    slow=parameter(
-        "slow", _DEFAULTS.slow, "m/s", "Speed below which the course may turn in any way", POSITIVE
-    ),
 )
 
 PORTS: tuple[Port, ...] = (

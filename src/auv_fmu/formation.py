@@ -35,7 +35,6 @@ from auv_fmu import observer, path_planner
 from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
 from auv_fmu.motion_planner import Reference
-from auv_fmu.path_planner import Demand
 from auv_fmu.saturation import TANH, saturation
 from auv_fmu.vectors import (
     Vector3,
@@ -123,7 +122,7 @@ class Parameters(NamedTuple):
     number: int = 2  #: place of this vehicle, from 1
     vehicles: int = 3  #: how many there are
     stages: Stages = Stages()
-    omega_chi: float = 0.5  #: omega of the filter of the heading [rad/s]
+    omega_chi: float = 0.3  #: omega of the filter of the heading [rad/s]
     estimated: bool = False  #: whether the leader is known by its position and heading only
     estimator: Estimator = Estimator()
     vehicle: Vehicle = Vehicle()  #: that is to follow
@@ -131,7 +130,6 @@ class Parameters(NamedTuple):
     limits: Limits = Limits()  #: of its actuators
     speed_max: float = 2.5  #: that is let pass [m/s]
     turn_max: float = 4.0  #: that is let pass [rad/s]
-    slow: float = 0.25  #: below this speed its course may turn in any way [m/s]
 
 
 class Known(NamedTuple):
@@ -414,43 +412,47 @@ def posture(parameters: Parameters, state: FormationState, wanted: Reference) ->
 def hold(parameters: Parameters, wanted: Reference) -> None:
     """Refuse a moment of the reference that the vehicle cannot follow.
 
+    It can where it could with its bow in any direction; if not there, by a steady motion along the
+    path. The first is for formations that set off and begin to turn: places on the inner side then
+    move back, so their course turns round, at little speed, which no steady motion does.
+
     Raises:
         ImpossiblePath: a limit is exceeded.
 
     """
-    speed, level = norm(wanted.dy_d), norm((wanted.dy_d[0], wanted.dy_d[1], 0.0))
-    if speed >= parameters.slow and level > 0.0:
-        asked = path_planner.demand(parameters.vehicle, parameters.ell, wanted)
-    else:
-        asked = demand_of_the_slow(parameters, wanted)
-    path_planner.hold_moment(
-        asked, parameters.limits, parameters.speed_max, parameters.turn_max, 0, wanted.y_d
-    )
+    if not is_easy(parameters, wanted):
+        path_planner.hold_moment(
+            path_planner.demand(parameters.vehicle, parameters.ell, wanted),
+            parameters.limits,
+            parameters.speed_max,
+            parameters.turn_max,
+            0,
+            wanted.y_d,
+        )
 
 
-def demand_of_the_slow(parameters: Parameters, wanted: Reference) -> Demand:
-    """What a slow reference asks of the vehicle at most, wherever its bow points.
+def is_easy(parameters: Parameters, wanted: Reference) -> bool:
+    """Whether the vehicle can follow a moment of the reference wherever its bow points.
 
-    The course of a slow reference may turn in any way: it does where a formation that sets off
-    begins to turn, and moves the places on its inner side back. No steady turn follows that. But
-    the surge force moves the control point along the bow, and the moments move it across, ell
-    ahead of the centre of mass.
+    The surge force moves the control point along the bow, and the moments move it across, ell ahead
+    of the centre of mass. Sway and heave are left out.
 
     Args:
         parameters: of the planner.
         wanted: its reference.
 
     """
-    vehicle, ell, speed = parameters.vehicle, parameters.ell, norm(wanted.dy_d)
-    a = norm(wanted.ddy_d)
-    return Demand(
-        speed,
-        0.0,
-        (
-            vehicle.m11 * a + vehicle.d11 * speed,
-            (vehicle.m55 * a + vehicle.d55 * speed) / ell + abs(vehicle.righting_pitch),
-            (vehicle.m66 * a + vehicle.d66 * speed) / ell,
-        ),
+    vehicle, ell, (least, most) = parameters.vehicle, parameters.ell, parameters.limits
+    speed, a = norm(wanted.dy_d), norm(wanted.ddy_d)
+    tau_u = vehicle.m11 * a + vehicle.d11 * speed
+    tau_q = (vehicle.m55 * a + vehicle.d55 * speed) / ell + abs(vehicle.righting_pitch)
+    tau_r = (vehicle.m66 * a + vehicle.d66 * speed) / ell
+    return (
+        speed <= parameters.speed_max
+        and speed / ell <= parameters.turn_max
+        and tau_u <= min(most[0], -least[0])
+        and tau_q <= min(most[1], -least[1])
+        and tau_r <= min(most[2], -least[2])
     )
 
 

@@ -259,7 +259,7 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
         raise ImpossiblePath(
             f"at ({x:.3g}, {y:.3g}, {z:.3g}) m the path turns at {sqrt(r * r + q * q):.3g} rad/s "
             f"with {speed:.3g} m/s: more tightly than the vehicle's control point can, {ell:g} m "
-            f"ahead; raise rounding"
+            f"ahead; turn more widely, with a longer rounding"
         )
     u = (B + sqrt(B * B - A * C)) / A
     v, w = -sway * u, heave * u
