@@ -87,7 +87,10 @@ PARAMETERS = ParameterSet(
         duration=_DURATION,
     ),
     omega_chi=parameter(
-        "omega_chi", _DEFAULTS.omega_chi, "rad/s", "How fast the formation turns", POSITIVE
+        "omega_chi", _DEFAULTS.omega_chi, "rad/s", "Of the filter of the heading", POSITIVE
+    ),
+    turn_chi=parameter(
+        "turn_chi", _DEFAULTS.turn_chi, "rad/s", "Fastest turn that the formation follows", 0.0
     ),
     estimated=setting(
         "estimated",

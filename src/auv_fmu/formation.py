@@ -9,10 +9,11 @@ to starboard and down in a horizontal frame that is turned by chi:
 
 with R = R_z(chi), S d = (-d_y, d_x, 0) and d_h = (d_x, d_y, 0): exact derivatives.
 
-- A reference carries its heading psi_0, but not psi_0' and psi_0''. So chi follows it through a
-  filter of third order, which has no error at a constant rate of turn; (chi, chi', b) is a state:
+- A reference carries its heading psi_0, but not the derivatives of it, and that of a link comes in
+  jumps. So chi follows psi, which turns towards psi_0 at no more than `turn_chi`, through a filter
+  of third order, which has no error at a constant rate of turn:
 
-      chi'' = -3 omega chi' + 3 omega^2 e + b,  b' = omega^3 e,  e = psi_0 - chi
+      chi'' = -3 omega chi' + 3 omega^2 e + b,  b' = omega^3 e,  e = psi - chi
 
 - d changes from stage to stage by 10 a^3 - 15 a^4 + 6 a^5, a from 0 to 1 over the change: twice
   continuously differentiable, with at most 15/8 of the mean speed, and 10 / sqrt(3) |change| / T^2.
@@ -123,6 +124,7 @@ class Parameters(NamedTuple):
     vehicles: int = 3  #: how many there are
     stages: Stages = Stages()
     omega_chi: float = 0.3  #: omega of the filter of the heading [rad/s]
+    turn_chi: float = 0.2  #: fastest turn of the path that it follows [rad/s]
     estimated: bool = False  #: whether the leader is known by its position and heading only
     estimator: Estimator = Estimator()
     vehicle: Vehicle = Vehicle()  #: that is to follow
@@ -145,6 +147,7 @@ class Known(NamedTuple):
 class Heading(NamedTuple):
     """State of the filter of the heading."""
 
+    psi: float  #: that it follows: the path's, without fast turns [rad]
     chi: float  #: [rad]
     dchi: float  #: [rad/s]
     b: float  #: of its integrator [rad/s2]
@@ -219,51 +222,50 @@ def place(parameters: Parameters, t: float) -> Place:
 # The heading of the formation
 
 
-def lag(chi: float, psi_0: float) -> float:
-    """e = psi_0 - chi [rad], the short way round."""
-    e = psi_0 - chi
-    return atan2(sin(e), cos(e))
-
-
-def ddchi(omega: float, heading: Heading, psi_0: float) -> float:
+def ddchi(omega: float, heading: Heading) -> float:
     """chi'' [rad/s2].
 
     Args:
         omega: of the filter [rad/s].
         heading: state of the filter.
-        psi_0: heading of the path [rad].
 
     """
-    e = lag(heading.chi, psi_0)
+    e = heading.psi - heading.chi
     return 3 * omega * (omega * e - heading.dchi) + heading.b
 
 
-def turned(omega: float, heading: Heading, psi_0: float, h: float) -> Heading:
-    """State of the filter after h seconds, exact for a held heading of the path.
+def turned(omega: float, turn: float, heading: Heading, psi_0: float, h: float) -> Heading:
+    """State of the filter after h seconds, exact for what it follows.
 
-    With x = (e, chi', b / omega), x' = (-omega + N) x, and N^3 = 0 as the filter has a triple pole
-    at -omega: exp((-omega + N) h) = exp(-omega h) (1 + N h + N^2 h^2 / 2).
+    It follows a heading psi that turns at a constant rate over the step, towards that of the path.
+    With x = (e, chi' - psi', b / omega - 3 psi'), x' = (-omega + N) x, and N^3 = 0, as the filter
+    has a triple pole at -omega: exp((-omega + N) h) = exp(-omega h) (1 + N h + N^2 h^2 / 2).
 
     Args:
         omega: of the filter [rad/s].
+        turn: fastest turn that it follows [rad/s].
         heading: state of the filter at the beginning.
-        psi_0: heading of the path [rad], held.
-        h: step [s].
+        psi_0: heading of the path [rad].
+        h: step [s], not zero.
 
     """
-    e, rate, c = lag(heading.chi, psi_0), heading.dchi, heading.b / omega
-    p = omega * e - rate  # N x, its first part
+    way = psi_0 - heading.psi
+    way = max(-turn * h, min(turn * h, atan2(sin(way), cos(way))))  # the short way round
+    dpsi = way / h
+    e, rate, c = heading.psi - heading.chi, heading.dchi - dpsi, heading.b / omega - 3 * dpsi
+    p = omega * e - rate  # N x
     q = omega * (3 * omega * e - 2 * rate + c)
     r = omega * (omega * e + c)
     pp = omega * p - q  # N^2 x
     qq = omega * (3 * omega * p - 2 * q + r)
     rr = omega * (omega * p + r)
     decay = exp(-omega * h)
-    left = decay * (e + h * (p + h / 2 * pp))
+    psi = heading.psi + way
     return Heading(
-        heading.chi + (e - left),
-        decay * (rate + h * (q + h / 2 * qq)),
-        omega * decay * (c + h * (r + h / 2 * rr)),
+        psi,
+        psi - decay * (e + h * (p + h / 2 * pp)),
+        dpsi + decay * (rate + h * (q + h / 2 * qq)),
+        omega * (3 * dpsi + decay * (c + h * (r + h / 2 * rr))),
     )
 
 
@@ -320,7 +322,7 @@ def leader(parameters: Parameters, state: FormationState, known: Known) -> Refer
 def first_state(known: Known) -> FormationState:
     """State at the start: at the leader's position and heading, and at rest."""
     dy_hat_o = observer.initial_dy_hat_o(_NOWHERE, _NOWHERE, 1.0, 1.0)
-    return FormationState(Heading(known.psi_0, 0.0, 0.0), known.y_0, dy_hat_o)
+    return FormationState(Heading(known.psi_0, known.psi_0, 0.0, 0.0), known.y_0, dy_hat_o)
 
 
 def steps(
@@ -339,7 +341,7 @@ def steps(
 
     """
     while n > 0:
-        heading = turned(parameters.omega_chi, state.heading, known.psi_0, h)
+        heading = turned(parameters.omega_chi, parameters.turn_chi, state.heading, known.psi_0, h)
         if parameters.estimated:
             _, dy_hat, ddy_hat_o = leader(parameters, state, known)
             y_hat = plus_scaled(state.y_hat, h, dy_hat)
@@ -365,8 +367,8 @@ def reference(parameters: Parameters, state: FormationState, known: Known, t: fl
     """
     y_0, dy_0, ddy_0 = leader(parameters, state, known)
     d, dd, ddd = place(parameters, t)
-    chi, dchi, _ = state.heading
-    turning = ddchi(parameters.omega_chi, state.heading, known.psi_0)
+    _, chi, dchi, _ = state.heading
+    turning = ddchi(parameters.omega_chi, state.heading)
     velocity = plus_scaled(dd, dchi, across(d))
     faster = plus_two_scaled(ddd, 2 * dchi, across(dd), turning, across(d))
     level = (d[0], d[1], 0.0)

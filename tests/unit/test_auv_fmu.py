@@ -87,6 +87,7 @@ OURS = {
         "number": 2,
         "vehicles": 3,
         "omega_chi": 0.3,
+        "turn_chi": 0.2,
         "estimated": False,
         "speed_max": 2.5,
         "turn_max": 4.0,
