@@ -1,0 +1,42 @@
+"""How Allocation runs in both kinds of FMU: the hooks of `fmus/ports/behaviour.py`.
+
+Like the controllers it is sampled: its outputs belong to the beginning of the step.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple, TypedDict
+
+from auv_fmu.allocation import Parameters, evaluate
+from auv_fmu.vectors import Vector3
+
+
+class Inputs(NamedTuple):
+    """Wanted force and moments, and the velocity through the water."""
+
+    tau: Vector3
+    nu_r: Vector3
+
+
+class Outputs(TypedDict):
+    """Commands of fins and propeller, and what they give."""
+
+    delta_r: float
+    delta_s: float
+    n: float
+    tau_attained: Vector3
+
+
+def begin(parameters: Parameters, inputs: Inputs) -> Outputs:
+    """Outputs at the start."""
+    return _seen(parameters, inputs)
+
+
+def advance(parameters: Parameters, inputs: Inputs) -> Outputs:
+    """Outputs of a step: computed at its beginning, held through it."""
+    return _seen(parameters, inputs)
+
+
+def _seen(parameters: Parameters, inputs: Inputs) -> Outputs:
+    (delta_r, delta_s, n), attained = evaluate(parameters, inputs.tau, inputs.nu_r)
+    return {"delta_r": delta_r, "delta_s": delta_s, "n": n, "tau_attained": attained}

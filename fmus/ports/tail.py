@@ -1,0 +1,80 @@
+"""Ports that the REMUS 100 and what allocates its fins and propeller share."""
+
+from __future__ import annotations
+
+from math import pi
+
+from auv_fmu import __version__
+from auv_fmu.tail import Tail
+from fmus.ports.definition import Origin
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import POSITIVE, parameter
+
+#: The model of the vehicle.
+REMUS = Origin(
+    "auv-fmu",
+    "MIT",
+    __version__,
+    "The model is that of the class remus100 in PythonVehicleSimulator 1.0.1 by T. I. Fossen",
+)
+
+_TAIL = Tail()
+
+TAIL = ParameterSet(
+    Tail,
+    rho=parameter("rho", _TAIL.rho, "kg/m3", "Density of the water", POSITIVE),
+    area=parameter("fin.area", _TAIL.area, "m2", "Area of a pair of fins", POSITIVE),
+    x=parameter(
+        "fin.x",
+        _TAIL.x,
+        "m",
+        "Where the fins are ahead of the centre; at the stern: < 0",
+        maximum=-POSITIVE,
+    ),
+    lift_r=parameter(
+        "fin.lift.r", _TAIL.lift_r, "1/rad", "Lift coefficient of the rudder per angle", POSITIVE
+    ),
+    lift_s=parameter(
+        "fin.lift.s",
+        _TAIL.lift_s,
+        "1/rad",
+        "Lift coefficient of the stern planes per angle",
+        POSITIVE,
+    ),
+    delta_max=parameter(
+        "fin.max", _TAIL.delta_max, "rad", "Largest angle of a fin", POSITIVE, maximum=pi / 2
+    ),
+    diameter=parameter(
+        "propeller.diameter", _TAIL.diameter, "m", "Diameter of the propeller", POSITIVE
+    ),
+    deduction=parameter(
+        "propeller.deduction", _TAIL.deduction, "1", "Thrust deduction number", 0.0, 0.9
+    ),
+    advance=parameter(
+        "propeller.advance", _TAIL.advance, "1", "Speed of advance per speed of the vehicle", 0.0
+    ),
+    J_1=parameter(
+        "propeller.J_1", _TAIL.J_1, "1", "Advance number to which KT_1 and KQ_1 belong", POSITIVE
+    ),
+    KT_0=parameter(
+        "propeller.KT_0", _TAIL.KT_0, "1", "Thrust coefficient at advance number 0", POSITIVE
+    ),
+    KT_1=parameter("propeller.KT_1", _TAIL.KT_1, "1", "Thrust coefficient at advance number J_1"),
+    KQ_0=parameter(
+        "propeller.KQ_0", _TAIL.KQ_0, "1", "Torque coefficient at advance number 0", 0.0
+    ),
+    KQ_1=parameter("propeller.KQ_1", _TAIL.KQ_1, "1", "Torque coefficient at advance number J_1"),
+    torque=parameter(
+        "propeller.torque", _TAIL.torque, "1", "Share of the torque that rolls the vehicle", 0.0
+    ),
+    n_max=parameter(
+        "propeller.max", _TAIL.n_max, "rad/s", "Largest speed of the propeller", POSITIVE
+    ),
+)
+
+#: What is commanded: names, units and descriptions.
+FINS = (
+    ("delta_r", "rad", "angle of the rudder; positive: yaw to starboard"),
+    ("delta_s", "rad", "angle of the stern planes; positive: nose down"),
+    ("n", "rad/s", "speed of the propeller; positive: ahead"),
+)
