@@ -9,6 +9,7 @@ from typing import NamedTuple, TypedDict
 
 from auv_fmu.allocation import Parameters, evaluate
 from auv_fmu.vectors import Vector3
+from fmus.ports.groups import Nothing
 
 
 class Inputs(NamedTuple):
@@ -27,14 +28,14 @@ class Outputs(TypedDict):
     tau_attained: Vector3
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> Outputs:
+def begin(parameters: Parameters, inputs: Inputs) -> tuple[Nothing, Outputs]:
     """Outputs at the start."""
-    return _seen(parameters, inputs)
+    return Nothing(), _seen(parameters, inputs)
 
 
-def advance(parameters: Parameters, inputs: Inputs) -> Outputs:
+def advance(parameters: Parameters, state: Nothing, inputs: Inputs) -> tuple[Nothing, Outputs]:
     """Outputs of a step: computed at its beginning, held through it."""
-    return _seen(parameters, inputs)
+    return state, _seen(parameters, inputs)
 
 
 def _seen(parameters: Parameters, inputs: Inputs) -> Outputs:

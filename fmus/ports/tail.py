@@ -53,17 +53,17 @@ TAIL = ParameterSet(
     advance=parameter(
         "propeller.advance", _TAIL.advance, "1", "Speed of advance per speed of the vehicle", 0.0
     ),
-    J_1=parameter(
-        "propeller.J_1", _TAIL.J_1, "1", "Advance number to which KT_1 and KQ_1 belong", POSITIVE
+    j_1=parameter(
+        "propeller.J_1", _TAIL.j_1, "1", "Advance number to which KT_1 and KQ_1 belong", POSITIVE
     ),
-    KT_0=parameter(
-        "propeller.KT_0", _TAIL.KT_0, "1", "Thrust coefficient at advance number 0", POSITIVE
+    kt_0=parameter(
+        "propeller.KT_0", _TAIL.kt_0, "1", "Thrust coefficient at advance number 0", POSITIVE
     ),
-    KT_1=parameter("propeller.KT_1", _TAIL.KT_1, "1", "Thrust coefficient at advance number J_1"),
-    KQ_0=parameter(
-        "propeller.KQ_0", _TAIL.KQ_0, "1", "Torque coefficient at advance number 0", 0.0
+    kt_1=parameter("propeller.KT_1", _TAIL.kt_1, "1", "Thrust coefficient at advance number J_1"),
+    kq_0=parameter(
+        "propeller.KQ_0", _TAIL.kq_0, "1", "Torque coefficient at advance number 0", 0.0
     ),
-    KQ_1=parameter("propeller.KQ_1", _TAIL.KQ_1, "1", "Torque coefficient at advance number J_1"),
+    kq_1=parameter("propeller.KQ_1", _TAIL.kq_1, "1", "Torque coefficient at advance number J_1"),
     torque=parameter(
         "propeller.torque", _TAIL.torque, "1", "Share of the torque that rolls the vehicle", 0.0
     ),

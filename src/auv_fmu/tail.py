@@ -33,11 +33,11 @@ class Tail(NamedTuple):
     diameter: float = 0.14  #: of the propeller [m]
     deduction: float = 0.1  #: share of the thrust that the flow around the hull takes
     advance: float = 0.944  #: speed of advance per speed of the vehicle: 1 - wake fraction
-    J_1: float = 0.6632  #: advance number at the largest speed
-    KT_0: float = 0.4566  #: thrust coefficient at the advance number 0
-    KT_1: float = 0.1798  #: thrust coefficient at J_1
-    KQ_0: float = 0.0700  #: torque coefficient at the advance number 0
-    KQ_1: float = 0.0312  #: torque coefficient at J_1
+    j_1: float = 0.6632  #: advance number at the largest speed
+    kt_0: float = 0.4566  #: thrust coefficient at the advance number 0
+    kt_1: float = 0.1798  #: thrust coefficient at j_1
+    kq_0: float = 0.0700  #: torque coefficient at the advance number 0
+    kq_1: float = 0.0312  #: torque coefficient at j_1
     torque: float = 0.1  #: share of the torque of the propeller that rolls the vehicle
     n_max: float = 1525.0 * pi / 30.0  #: largest speed of the propeller [rad/s]
 
@@ -67,7 +67,7 @@ def fin_lift(tail: Tail, lift: float, squared_speed: float) -> float:
 def thrust_at_rest(tail: Tail) -> float:
     """The thrust of the propeller per squared speed, in rev/s, of a vehicle at rest [N.s2]."""
     D = tail.diameter
-    return tail.rho * D * D * D * D * tail.KT_0
+    return tail.rho * D * D * D * D * tail.kt_0
 
 
 def thrust_loss(tail: Tail, speed: float) -> float:
@@ -79,7 +79,7 @@ def thrust_loss(tail: Tail, speed: float) -> float:
 
     """
     D = tail.diameter
-    return tail.rho * D * D * D * (tail.KT_0 - tail.KT_1) / tail.J_1 * tail.advance * speed
+    return tail.rho * D * D * D * (tail.kt_0 - tail.kt_1) / tail.j_1 * tail.advance * speed
 
 
 def propeller(tail: Tail, n: float, speed: float) -> tuple[float, float]:
@@ -97,10 +97,10 @@ def propeller(tail: Tail, n: float, speed: float) -> tuple[float, float]:
     rev = n / (2.0 * pi)
     D = tail.diameter
     thrust = thrust_at_rest(tail) * abs(rev) * rev
-    torque = tail.rho * D * D * D * D * D * tail.KQ_0 * abs(rev) * rev
+    torque = tail.rho * D * D * D * D * D * tail.kq_0 * abs(rev) * rev
     if rev > 0.0:
         thrust -= thrust_loss(tail, speed) * rev
-        slope = (tail.KQ_0 - tail.KQ_1) / tail.J_1
+        slope = (tail.kq_0 - tail.kq_1) / tail.j_1
         torque -= tail.rho * D * D * D * D * slope * tail.advance * speed * rev
     return thrust, torque
 
