@@ -22,9 +22,7 @@ class Inputs(NamedTuple):
 class Outputs(TypedDict):
     """Commands of fins and propeller, and what they give."""
 
-    delta_r: float
-    delta_s: float
-    n: float
+    command: Vector3
     tau_attained: Vector3
 
 
@@ -39,5 +37,5 @@ def advance(parameters: Parameters, state: Nothing, inputs: Inputs) -> tuple[Not
 
 
 def _seen(parameters: Parameters, inputs: Inputs) -> Outputs:
-    (delta_r, delta_s, n), attained = evaluate(parameters, inputs.tau, inputs.nu_r)
-    return {"delta_r": delta_r, "delta_s": delta_s, "n": n, "tau_attained": attained}
+    command, attained = evaluate(parameters, inputs.tau, inputs.nu_r)
+    return {"command": command, "tau_attained": attained}

@@ -7,7 +7,7 @@ from auv_fmu.tail import FASTEST
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, setting
 from fmus.ports.quantities import NU, TAU
-from fmus.ports.tail import FINS, REMUS, TAIL
+from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 
 DESCRIPTION = "Allocation of a force and two moments to the fins and the propeller of Remus100"
 ORIGIN = REMUS
@@ -44,18 +44,7 @@ PARAMETERS = ParameterSet(
 
 PORTS: tuple[Port, ...] = (
     *_INPUTS,
-    *(
-        Port(
-            name,
-            "output",
-            "continuous",
-            "Real",
-            f"Command: {about}",
-            unit,
-            feedthrough=tuple(port.name for port in _INPUTS),
-        )
-        for name, unit, about in FINS
-    ),
+    *outputs("command", TAIL_COMMAND, "Command of rudder, stern planes and propeller", _INPUTS),
     *outputs("tau_attained", TAU, "Force and moments that the command gives", _INPUTS),
     *PARAMETERS.ports,
 )

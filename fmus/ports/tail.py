@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from math import pi
 
-from auv_fmu import __version__
 from auv_fmu.tail import Tail
-from fmus.ports.definition import Origin
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, parameter
+from fmus.ports.quantities import Members
+from fmus.ports.vehicle import PAPER
 
-#: The model of the vehicle.
-REMUS = Origin(
-    "auv-fmu",
-    "MIT",
-    __version__,
-    "The model is that of the class remus100 in PythonVehicleSimulator 1.0.1 by T. I. Fossen",
+#: The source of the model, and the paper whose numbers of equations stand beside it.
+REMUS = PAPER._replace(
+    citation="The model is that of the class remus100 in PythonVehicleSimulator 1.0.1, by T. I. "
+    f"Fossen. {PAPER.citation}"
 )
 
 _TAIL = Tail()
@@ -72,9 +70,5 @@ TAIL = ParameterSet(
     ),
 )
 
-#: What is commanded: names, units and descriptions.
-FINS = (
-    ("delta_r", "rad", "angle of the rudder; positive: yaw to starboard"),
-    ("delta_s", "rad", "angle of the stern planes; positive: nose down"),
-    ("n", "rad/s", "speed of the propeller; positive: ahead"),
-)
+#: What is commanded, and what fins and propeller are.
+TAIL_COMMAND: Members = {"delta_r": "rad", "delta_s": "rad", "n": "rad/s"}

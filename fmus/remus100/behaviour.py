@@ -20,9 +20,7 @@ _THICKEST = 0.9
 class Inputs(NamedTuple):
     """Commands of fins and propeller, and the velocity of the water."""
 
-    delta_r: float
-    delta_s: float
-    n: float
+    command: Vector3
     water: Vector3
 
 
@@ -63,8 +61,7 @@ def advance(
     parameters: Parameters, state: RemusState, inputs: Inputs, h: float, n: int
 ) -> tuple[RemusState, Outputs]:
     """State and outputs after n steps of h seconds."""
-    command = (inputs.delta_r, inputs.delta_s, inputs.n)
-    state = remus100.steps(parameters, state, command, inputs.water, h, n)
+    state = remus100.steps(parameters, state, inputs.command, inputs.water, h, n)
     return state, _seen(parameters, state)
 
 

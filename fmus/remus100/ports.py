@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from auv_fmu.hull import Drag, Hull
 from auv_fmu.plant import Localisation
-from auv_fmu.remus100 import Drag, Hull, Parameters
+from auv_fmu.remus100 import Parameters
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import (
     H_MAX,
@@ -16,7 +17,7 @@ from fmus.ports.port import (
     setting,
 )
 from fmus.ports.quantities import ETA, NU, POSITION, TAU, VELOCITY
-from fmus.ports.tail import FINS, REMUS, TAIL
+from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 from fmus.ports.vehicle import CONTROL_POINT
 
 DESCRIPTION = "REMUS 100: underwater vehicle with fins and a propeller, and noisy position sensor"
@@ -109,10 +110,7 @@ PARAMETERS = ParameterSet(
 )
 
 PORTS: tuple[Port, ...] = (
-    *(
-        Port(name, "input", "continuous", "Real", f"Command: {about}", unit, start=0.0)
-        for name, unit, about in FINS
-    ),
+    *inputs("command", TAIL_COMMAND, "Command of rudder, stern planes and propeller"),
     *_WATER,
     *outputs("eta", ETA, "Position of the centre of buoyancy and Euler angles"),
     *outputs("nu", NU, "Velocity in the body frame"),
@@ -122,7 +120,7 @@ PORTS: tuple[Port, ...] = (
         "tau_applied", TAU, "Force and moments that fins and propeller give", initially=_WATER
     ),
     *outputs("nu_r", NU, "Velocity through the water in the body frame", initially=_WATER),
-    *outputs("actuator", {name: unit for name, unit, _ in FINS}, "What fins and propeller are"),
+    *outputs("actuator", TAIL_COMMAND, "What rudder, stern planes and propeller are"),
     *PARAMETERS.ports,
     H_MAX,
 )

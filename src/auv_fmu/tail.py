@@ -39,7 +39,7 @@ class Tail(NamedTuple):
     kq_0: float = 0.0700  #: torque coefficient at the advance number 0
     kq_1: float = 0.0312  #: torque coefficient at j_1
     torque: float = 0.1  #: share of the torque of the propeller that rolls the vehicle
-    n_max: float = 1525.0 * pi / 30.0  #: largest speed of the propeller [rad/s]
+    n_max: float = round(1525.0 * pi / 30.0, 12)  #: largest speed of the propeller [rad/s]
 
 
 def limit_tail(tail: Tail, actuator: Vector3) -> Vector3:
