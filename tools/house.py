@@ -31,6 +31,7 @@ BY_SUBJECT = ("src/auv_fmu", *(page.parent.as_posix() for page in COMPONENTS))
 REASONS = {
     "fmus/ports/controllers.py": "in the FMUs of controllers only",
     "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
+    "fmus/ports/tail.py": "in the FMUs of Remus100 and Allocation only",
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
     "fmus/python/own.py": "slaves of PythonFMU only, which no component needs",
     "orchestrator/commands/listing.py": "imports nothing that takes longer than the command",

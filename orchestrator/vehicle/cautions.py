@@ -17,7 +17,15 @@ from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, type_of, unit_of
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, real_parameter, value_of, vehicle
+from orchestrator.vehicle.signals import (
+    STANDARD,
+    AllocatedLoop,
+    Loop,
+    loops_of,
+    real_parameter,
+    value_of,
+    vehicle,
+)
 
 #: References that are farther apart are not the same [m].
 _SAME = 1e-6
@@ -201,9 +209,13 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
 def velocities_reaching(system: System, component: str = STANDARD.controller) -> list[str]:
     """Velocities of the vehicle that reach a component, directly or through others.
 
-    The vehicle is what the component feeds. Empty for a controller without velocity sensors.
+    The vehicle is what the component feeds, itself or through an allocation. Empty for a
+    controller without velocity sensors.
     """
     vehicles = {c.target.component for c in system.connections if c.source.component == component}
+    for loop in loops_of(system):
+        if isinstance(loop, AllocatedLoop) and loop.controller == component:
+            vehicles = vehicles - {loop.allocation} | {loop.vehicle}
     sources = (connection.source for connection in reaching(system, component, until=vehicles))
     return sorted(
         {
