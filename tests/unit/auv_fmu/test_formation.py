@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from itertools import combinations
 from math import cos, dist, hypot, pi, sin, sqrt
+from random import Random
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import formation, motion_planner
+from auv_fmu import closed_loop, formation, motion_planner
+from auv_fmu.closed_loop import PAPER
 from auv_fmu.formation import (
     CIRCLE,
     COLUMN,
@@ -213,6 +215,42 @@ def test_places_beside_the_helix_of_the_paper_can_be_followed(shape, number):
         formation.reference(parameters, state, leader, 0.02 * k)
         state = formation.steps(parameters, state, leader, 0.02, 1)
         moving, motion = motion_planner.steps(of_leader, moving, motion, 0.02, 1)
+
+
+def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
+    """With plants, controllers and disturbances as in Fig. 4, from rest in their places.
+
+    The distances are within the errors that each has: all planners have the same heading.
+    """
+    law, h, moments = closed_loop.LAWS[type(PAPER.controller)], PAPER.h, []
+    parts, of_leader = closed_loop.splits(PAPER, h), motion_planner.Parameters()
+    moving, motion = motion_planner.begin(of_leader)
+    leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
+    planners = [in_shape(LINE, number) for number in (1, 2, 3)]
+    states = [formation.first_state(leader)] * 3
+    noise = Random(1).gauss
+    for planner, state in zip(planners, states, strict=True):
+        x, y, z = formation.reference(planner, state, leader, 0.0).y_d
+        begun = PAPER._replace(plant=PAPER.plant._replace(eta0=(x - 0.35, y, z, 0.0, 0.0, 0.0)))
+        moments.append(closed_loop.begin(begun, law, ORIGIN))
+    for k in range(3000):
+        errors, positions = [], []
+        for i, planner in enumerate(planners):
+            wanted = formation.reference(planner, states[i], leader, k * h)
+            moment = moments[i]._replace(scene=moments[i].scene._replace(reference=wanted))
+            instant = closed_loop.act(PAPER, law, moment, h, parts, delayed=False)
+            n = (noise(0.0, 1.0), noise(0.0, 1.0), noise(0.0, 1.0))
+            moments[i] = closed_loop.step(PAPER, law, instant, h, parts, (k + 1) * h, n)
+            states[i] = formation.steps(planner, states[i], leader, h, 1)
+            errors.append(dist(moment.scene.plant.y, wanted.y_d))
+            positions.append(moment.scene.plant.y)
+            assert instant.tau == instant.command  # no actuator is at its limit
+        for (i, a), (j, b) in combinations(enumerate(positions), 2):
+            d = dist(formation.offset(planners[i], 0), formation.offset(planners[j], 0))
+            assert abs(dist(a, b) - d) <= errors[i] + errors[j] + 1e-9
+        assert max(errors) < (0.2 if k * h > 40.0 else 1.5)
+        moving, motion = motion_planner.steps(of_leader, moving, motion, h, 1)
+        leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
 
 
 def test_vehicle_points_along_its_reference_and_at_rest_with_the_formation():

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from math import dist, hypot, inf
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from hypothesis import strategies as st
 from auv_fmu import formation
 from auv_fmu.formation import Estimator, FormationState, Heading, Parameters
 from auv_fmu.proof import formation_bounds
-from auv_fmu.proof.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAIN
+from auv_fmu.proof.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAIN, Messages
 from support.formations import follow, known, tables
 
 
@@ -157,3 +159,42 @@ def test_bounds_hold_for_steps_of_a_tenth_of_a_second():
 def test_bounds_are_infinite_where_the_proof_does_not_reach():
     messages = formation_bounds.Messages(1.0, (0.2, 0.2), 4)
     assert formation_bounds.estimate_bounds(Estimator(), messages, 0.02).position == inf
+
+
+def test_page_has_the_gains_and_the_bounds():
+    """formation.md: what its tables say of the filter, and of the estimate."""
+    page = (Path(__file__).parents[4] / "docs/explanation/formation.md").read_text("utf-8")
+    assert f"(1 + 10 exp(-3)) r = {RATE_GAIN:.3f} r" in page
+    assert f"| {ACCELERATION_GAIN:.3f} omega r |" in page
+    assert f"| {LAG_GAIN:.3f} r / omega |" in page
+    rows = re.findall(
+        r"^\| (\d) s \| (none|one) \| ([\d.]+) m/s² \| (.*) m \| (.*) m/s \|$", page, re.M
+    )
+    assert len(rows) == 4
+    for period, lost, most, position, velocity in rows:
+        messages = Messages(float(period), (0.2, 0.2), ["none", "one"].index(lost) + 1)
+        found = formation_bounds.estimate_bounds(Estimator(), messages, float(most))
+        assert (f"{found.position:.2f}", f"{found.velocity:.2f}") == (position, velocity)
+
+
+@pytest.mark.parametrize(
+    ("period", "gap", "most", "reached"),
+    [
+        (1.0, 1, 0.02, "0.13"),
+        (1.0, 1, 0.05, "0.34"),
+        (2.0, 1, 0.02, "0.19"),
+        (1.0, 2, 0.02, "0.19"),
+    ],
+)
+def test_leaders_that_are_pushed_to_and_fro_reach_what_the_page_says(period, gap, most, reached):
+    h, n, worst = 0.1, 1200, 0.0
+    received = [(k * period + 0.2, k * period) for k in range(0, int(n * h / period), gap)]
+    for half in range(5, 150, 5):
+        signs = np.array([1.0 if (k // half) % 2 == 0 else -1.0 for k in range(n + half // 2)])
+        for first in (0, half // 2):
+            v = np.concatenate([[0.0], np.cumsum(signs[first : first + n]) * most * h])
+            y = np.concatenate([[0.0], np.cumsum((v[1:] + v[:-1]) / 2) * h])
+            rows = follow(Estimator(), lambda t, y=y: (y[round(t / h)], 0.0, 0.0), received, h, n)
+            errors = (abs(y[round(t / h)] - state.y_hat[0]) for t, state, _ in rows)
+            worst = max(worst, *errors)
+    assert f"{worst:.2f}" == reached
