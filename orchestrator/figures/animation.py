@@ -16,11 +16,11 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from auv_fmu.attitude import rotation_from_euler
+from orchestrator.figures.body import PAINT, Z_UP, body
 from orchestrator.figures.drawing import styled
 from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, draw_all_errors, draw_commands, over_time
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, heading
-from orchestrator.figures.view import PAINT, Z_UP, body
 from orchestrator.figures.visible import moving_mean
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import Loop, real_parameter, true_control_point

@@ -7,8 +7,8 @@ import pytest
 from PIL import Image
 
 from orchestrator.figures.animation import _Camera, animate, check_film
+from orchestrator.figures.body import body
 from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import body
 from orchestrator.machine.errors import InputError
 from support.tables import loop_table
 

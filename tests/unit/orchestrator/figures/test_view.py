@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from orchestrator.figures.page_series import extremes
 from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import extremes, view_page
+from orchestrator.figures.view import view_page
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import STANDARD
 from support.tables import loop_table
