@@ -71,6 +71,8 @@ def series_of_several(run: Drawn) -> tuple[dict[str, Any], list[str]]:
     choices = []
     for loop in run.loops:
         own, left_out = _panels(run._replace(loops=[loop]))
+        name = html.escape(loop.name)
+        own = [panel._replace(title=f"{name}: {panel.title}") for panel in own]
         notes += [f"{loop.name}: {note}" for note in left_out]
         panels = [_titled(panel) for panel in (*common, *own)]
         traces = [
