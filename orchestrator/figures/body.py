@@ -31,6 +31,9 @@ Z_UP = np.array([1.0, -1.0, -1.0])
 #: Colours of the hull, the upper fin, which shows the roll, and the other fins.
 PAINT = (COLOURS[5], COLOURS[0], REFERENCE)
 
+#: The upper fin of one of several vehicles, whose hull has the colour of its own.
+_DARK = "#222222"
+
 
 class Body(NamedTuple):
     """Triangles of a vehicle of length 1, its nose in the origin.
@@ -68,3 +71,8 @@ def body() -> Body:
         triangles += [(n, n + 1, n + 2), (n, n + 2, n + 3)]
         parts += [2 if i else 1] * 2
     return Body(np.array(points), np.array(triangles), np.array(parts))
+
+
+def paint_of(colour: str) -> tuple[str, str, str]:
+    """Colours in place of :data:`PAINT` for a vehicle with a colour of its own."""
+    return colour, _DARK, REFERENCE

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
-from orchestrator.figures.body import PAINT, Z_UP, body
+from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
 from orchestrator.figures.page_series import numbers
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes, vehicle_colours
 from orchestrator.master.observers.table import Table
@@ -20,8 +20,8 @@ _FRAMES, _FEWEST, _TOGETHER = 1000, 200, 6000
 #: Length of the drawn vehicle as a share of the largest extent of the scene, and times ell.
 _SHARE, _LENGTH = 0.18, 2.0
 
-#: Colour of the upper fins of several vehicles, whose hulls have theirs.
-_FIN = "#222222"
+#: Size of the mark of a reference, and at least, where many vehicles have one [px].
+_MARKERS = 4, 2
 
 #: How much is to be seen of where several vehicles will go.
 _FUTURE = 0.35
@@ -117,7 +117,7 @@ def scene_of_several(run: Drawn) -> dict[str, Any]:
     shape = body()
     i, j, k = shape.triangles.T.tolist()
     for loop, y, colour, group in zip(run.loops, paths, colours, groups, strict=True):
-        paint = [(colour, _FIN, REFERENCE)[part] for part in shape.part]
+        paint = [paint_of(colour)[part] for part in shape.part]
         traces += [
             _line(y[:1], colour, 5, _named(loop)) | group,
             {"type": "mesh3d", "i": i, "j": j, "k": k, "facecolor": paint, "name": _named(loop)}
@@ -125,8 +125,11 @@ def scene_of_several(run: Drawn) -> dict[str, Any]:
             | hidden
             | group,
         ]
+    size = max(_MARKERS[1], _MARKERS[0] / n**0.5)
     for y_d, (colour, group) in zip(followed, references.values(), strict=True):
-        traces.append(_marker(y_d[:1], colour) | hidden | group)
+        traces.append(_marker(y_d[:1], colour, size) | hidden | group)
+    layout = _layout(lower, upper, length, z_up)
+    layout["legend"]["tracegroupgap"] = 0
     return {
         "frames": {
             "time": numbers(time[rows]),
@@ -136,7 +139,7 @@ def scene_of_several(run: Drawn) -> dict[str, Any]:
         },
         "parts": [_points(length * shape.points * (Z_UP if z_up else 1.0))],
         "moving": list(range(moving, len(traces))),
-        "scene": {"traces": traces, "layout": _layout(lower, upper, length, z_up)},
+        "scene": {"traces": traces, "layout": layout},
     }
 
 
@@ -200,7 +203,7 @@ def _waypoints(points: np.ndarray) -> dict[str, Any]:
     return _line(points, "black", 1, "waypoints") | {"mode": "markers", "marker": marker}
 
 
-def _marker(point: np.ndarray, colour: str) -> dict[str, Any]:
+def _marker(point: np.ndarray, colour: str, size: float = _MARKERS[0]) -> dict[str, Any]:
     """Where a reference is now."""
-    marker = {"color": colour, "size": 4, "symbol": "square"}
+    marker = {"color": colour, "size": size, "symbol": "square"}
     return _line(point, colour, 1, "reference (now)") | {"mode": "markers", "marker": marker}

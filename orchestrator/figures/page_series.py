@@ -27,6 +27,9 @@ _DIVISIONS, _FEWEST, _TOGETHER = 700, 100, 2800
 #: Height of a panel of the series, and of the gaps between them [px].
 _PANEL, _GAP, _MARGIN = 150, 26, 40
 
+#: Room above and below lines, as a share of their range.
+_MARGINS = 0.08
+
 #: Digits of numbers in the page: more than a screen resolves.
 _DIGITS = 6
 
@@ -198,9 +201,8 @@ def _layout(panels: Sequence[_Lines], has_legends: bool = True) -> dict[str, Any
         if panel.limits:
             low, high = panel.limits
             title += f", limits ±{high:g}" if low == -high else f", limits {low:g}, {high:g}"
+        if panel.limits or panel.is_size:
             axis["range"] = _range(panel)
-        if panel.is_size:
-            axis["rangemode"] = "tozero"
         layout[_axis("yaxis", i)] = axis
         layout["annotations"].append(
             {"text": title, "xref": "paper", "yref": "paper", "x": 0, "y": upper}
@@ -255,10 +257,12 @@ def _range(panel: _Lines) -> list[float]:
     """Where the values are; the limits are in sight when they are near, or by zooming out."""
     finite = panel.values[np.isfinite(panel.values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (-1.0, 1.0)
+    if panel.is_size:
+        return [0.0, (1.0 + _MARGINS) * high or 1.0]
     for limit in panel.limits:
         if max(high, -low) > 0.5 * abs(limit):
             low, high = min(low, limit), max(high, limit)
-    margin = 0.08 * (high - low) or 1.0
+    margin = _MARGINS * (high - low) or 1.0
     return [low - margin, high + margin]
 
 

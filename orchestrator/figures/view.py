@@ -19,6 +19,14 @@ _PAGE = Path(__file__).with_name("view.html")
 _SCRIPTS = (_PAGE.with_name("view_one.js"), _PAGE.with_name("view_several.js"))
 
 
+#: A narrow page has a choice of the vehicle in its lowest line, too.
+_NARROW = (
+    "\n    nav { flex-wrap: wrap; }"
+    "\n    nav > #toggle { min-width: 4rem; }"
+    "\n    #vehicle { max-width: 5.5rem; }"
+)
+
+
 def view_page(title: str, run: Drawn) -> str:
     """A page of a run that needs no other file: of its vehicle, or of all of them together.
 
@@ -51,6 +59,7 @@ def view_page(title: str, run: Drawn) -> str:
         "plotly": import_module("plotly.offline").get_plotlyjs(),
         # What ends the script's element must not occur in it.
         "data": text.replace("</", "<\\/"),
+        "narrow": "" if is_one else _NARROW,
         "vehicles": "" if is_one else _choice(run),
         "show": _SCRIPTS[not is_one].read_text(encoding="utf-8").rstrip(),
     }

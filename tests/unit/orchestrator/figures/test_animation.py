@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from orchestrator.figures.animation import _Camera, animate, check_film
+from orchestrator.figures.animation import animate, check_film
 from orchestrator.figures.body import body
+from orchestrator.figures.film_scene import Camera
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
 from support.tables import loop_table
@@ -15,7 +16,7 @@ from support.tables import loop_table
 
 def test_camera_sees_what_it_looks_at_in_the_middle():
     middle = np.array([3.0, -2.0, 5.0])
-    camera = _Camera.at(middle, 7.0)
+    camera = Camera.at(middle, 7.0)
     seen, ahead = camera.project(middle[np.newaxis])
     np.testing.assert_allclose(seen, [[0.0, 0.0]], atol=1e-12)
     # One width to the right is one wide; up is against z, which points down.
@@ -28,7 +29,7 @@ def test_camera_sees_what_it_looks_at_in_the_middle():
 
 
 def test_what_is_twice_as_far_away_is_half_as_large():
-    camera = _Camera.at(np.zeros(3), 1.0)
+    camera = Camera.at(np.zeros(3), 1.0)
     right, _, ahead = camera.axes
     points = np.array([camera.place + d * ahead + 0.1 * right for d in (1.0, 2.0)])
     (near, far), distance = camera.project(points)
@@ -37,7 +38,7 @@ def test_what_is_twice_as_far_away_is_half_as_large():
 
 
 def test_lines_behind_the_camera_are_not_drawn():
-    camera = _Camera.at(np.zeros(3), 1.0)
+    camera = Camera.at(np.zeros(3), 1.0)
     ahead = camera.axes[2]
     t = np.linspace(-1.0, 3.0, 41)
     pieces = camera.line(camera.place + t[:, np.newaxis] * ahead)
