@@ -193,7 +193,7 @@ def figures_of(key: str, loops: Sequence[Loop]) -> Iterator[tuple[str, str, Sequ
         A key, what the names of the files go on with, and the loops that are drawn.
 
     """
-    if len(loops) > 1:
+    if len(loops) > 1 or key == FLEET:
         yield FLEET, "", loops
     if len(loops) <= MOST_DRAWN and key != FLEET:
         yield from ((key, vehicle, [loop]) for loop, vehicle in suffixes(loops).items())

@@ -239,7 +239,8 @@ def is_known(value: str, columns: Sequence[str]) -> bool:
 
 
 def _factors(value: str) -> list[str]:
-    return [factor.strip() for factor in value.split("*")]
+    # A star without spaces stands for any text in the name of a component.
+    return [factor.strip() for factor in value.split(" * ")]
 
 
 def _is_nan(value: Any) -> bool:

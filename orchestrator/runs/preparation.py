@@ -23,8 +23,8 @@ from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
-from orchestrator.runs.vehicles import role_of
 from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
+from orchestrator.system.names import role_of
 from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 

@@ -22,8 +22,7 @@ from orchestrator.machine.user_files import explain_errors, find_toml, names_in,
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
 from orchestrator.runs import SCENARIOS_FOLDER
-from orchestrator.runs.vehicles import for_each, named
-from orchestrator.system.names import PortName, file_name, flatten, port_name
+from orchestrator.system.names import PortName, file_name, flatten, for_each, port_name
 from orchestrator.system.structure import System, is_spread
 from orchestrator.system.values import EXACT, finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
@@ -43,8 +42,18 @@ _FARTHEST = 1e308
 #: The model of the planners that run through waypoints.
 _PATH_PLANNER = "PathPlanner"
 
+#: Stands for the name of each vehicle, `auv1`, `auv2`, ...; in a wire, for the same one.
+EACH_VEHICLE = "auv*"
+
 #: The columns of a table of waypoints, without times and with them.
 _PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
+
+
+def vehicle_names(n: int | None) -> list[str]:
+    """Names of n vehicles; None: the components of a single one have no prefix."""
+    if n is None:
+        return []
+    return [EACH_VEHICLE.replace("*", str(number)) for number in range(1, n + 1)]
 
 
 @dataclass(frozen=True)
@@ -164,12 +173,13 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
     content["parameters"] = {
         port_name(key): value for key, value in flatten(content.get("parameters", {}), is_spread)
     }
-    vehicles = content.get("vehicles")
+    vehicles = vehicle_names(content.get("vehicles"))
     for key in content.keys() & {"components", "wires", "steps"}:
-        content[key] = for_each(content[key], vehicles)
+        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
     for key in content.keys() & {"order", "only"}:
         if isinstance(content[key], list):
-            content[key] = named(content[key], vehicles)
+            listed = dict.fromkeys(content[key])
+            content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
     if "path" in content:
         said, others = content.pop("path"), content["parameters"]
         component = said.get("component", STANDARD.planner)

@@ -9,8 +9,10 @@ from pydantic import Field, model_validator
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.master.experiment import COUPLINGS
 from orchestrator.runs.scenario_events import ACTIONS
-from orchestrator.runs.vehicles import MOST_VEHICLES
 from orchestrator.vehicle.signals import STANDARD
+
+#: More vehicles take longer to put together than anyone waits.
+MOST_VEHICLES = 10_000
 
 #: What an input does between two rows of its table; the first is the default.
 INTERPOLATIONS = ("linear", "hold")

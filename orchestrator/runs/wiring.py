@@ -9,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.runs.scenario import Scenario
-from orchestrator.runs.vehicles import of_vehicles
+from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, vehicle_names
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.names import PortName, listed, port_name, splits
+from orchestrator.system.names import PortName, for_each, listed, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.variables import BUS, COMPLETE, Terminal
 
@@ -22,8 +21,16 @@ _WIRING = Path(__file__).with_name("closed_loop.toml")
 def read_wiring(vehicles: int | None = None) -> dict[str, Any]:
     """What `closed_loop.toml` holds, for each of several vehicles; None: for a single one."""
     wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
-    tables = {key: of_vehicles(wiring[key], vehicles) for key in ("components", "wires")}
-    return {**wiring, **tables}
+    if vehicles is None:
+        return wiring
+    names, each = vehicle_names(vehicles), f"{EACH_VEHICLE}."
+    components = {each + name: fmu for name, fmu in wiring["components"].items()}
+    wires = {each + target: source and each + source for target, source in wiring["wires"].items()}
+    return {
+        **wiring,
+        "components": for_each(EACH_VEHICLE, names, components),
+        "wires": for_each(EACH_VEHICLE, names, wires),
+    }
 
 
 def component_of(name: str, components: Collection[str]) -> str:
@@ -61,7 +68,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         PortName(name, variable.name)
         for name, component in components.items()
         for variable in component.having("input")
-        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
+        if any(group in groups for group, _ in splits(f"{name}.{variable.name}"))
     }
     system = System(
         name=wiring["name"],

@@ -113,14 +113,14 @@ class System:
         found: dict[PortName, object] = {}
         for said, values_of in sorted(values.items(), key=lambda one: STAR not in str(one[0])):
             stated = said if isinstance(said, PortName) else self._port_name(str(said))
-            meant = self._meant(stated)
+            meant = self.meant(stated)
             for name, value in zip(meant, _spread(stated, values_of, len(meant)), strict=True):
                 several = None if self.has(name) else _several(value)
                 ports = [] if several is None else self.members(str(name), ("parameter", "input"))
                 found |= dict(paired(name, ports, several)) if several and ports else {name: value}
         return found
 
-    def _meant(self, name: PortName) -> list[PortName]:
+    def meant(self, name: PortName) -> list[PortName]:
         """The ports or groups that a name with stars means; any other name means itself."""
         for like, port in splits(str(name)) if STAR in str(name) else ():
             components = re.compile(re.escape(like).replace(re.escape(STAR), "[^.]*"))
@@ -166,7 +166,7 @@ class System:
         It is one of the longest component that the text begins with and that has such a port; a
         name that means none is left as it is. With a star, it is the first of those it means.
         """
-        name, components = self._meant(name)[0], self.components
+        name, components = self.meant(name)[0], self.components
         for component, port in splits(str(name)):
             if component in components and port in components[component].variables:
                 return PortName(component, port)

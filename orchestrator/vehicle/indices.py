@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -266,10 +267,7 @@ def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
 
 
 class Indices:
-    """An observer that computes indices on the way; it keeps no more than the last seconds.
-
-    Those whose columns a loop does not have are left out.
-    """
+    """An observer that computes the indices there are columns for; it keeps the last seconds."""
 
     def __init__(
         self, loops: Sequence[Loop] = (STANDARD,), chosen: Sequence[Index] | None = None
@@ -293,8 +291,9 @@ class Indices:
             loop: [index for index in self._chosen if not none.missing(*index.needs(loop))]
             for loop in self._loops
         }
-        self._has_distances = len(self._loops) > 1 and not none.missing(*for_distances(self._loops))
-        self._smallest_distance = np.inf
+        has_distances = len(self._loops) > 1 and not none.missing(*for_distances(self._loops))
+        #: What there is of several vehicles together.
+        self.together = {SMALLEST_DISTANCE: inf} if has_distances else {}
         # Those that are made of the same share it.
         self._reducers = {
             loop: {index.reducer: index.reducer() for index in found}
@@ -303,13 +302,14 @@ class Indices:
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account."""
+        table = Table.of(self._header, np.vstack((self._last, rows)))
         for loop, reducers in self._reducers.items():
-            seen = LoopRows(self._header, loop, self._n, self._last, rows)
+            seen = LoopRows(loop, self._n, table, len(self._last))
             for reducer in reducers.values():
                 reducer.take(seen)
-        if self._has_distances:
+        for name, before in self.together.items():
             apart = smallest_distances(Table.of(self._header, rows), self._loops)
-            self._smallest_distance = min(self._smallest_distance, float(apart.min()))
+            self.together[name] = min(before, float(apart.min()))
         self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])
         self._n += len(rows)
 
@@ -325,11 +325,6 @@ class Indices:
             for index in self._measured[loop]
             if (reducer := self._reducers[loop][index.reducer]).n
         }
-
-    @property
-    def together(self) -> dict[str, float]:
-        """What there is of several vehicles together."""
-        return {SMALLEST_DISTANCE: self._smallest_distance} if self._has_distances else {}
 
     def values(self) -> dict[str, float]:
         """The numbers of all loops, by their columns in a study."""

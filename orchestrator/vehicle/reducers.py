@@ -13,7 +13,6 @@ from operator import itemgetter
 
 import numpy as np
 
-from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import Loop, Needs, limits, tracking_error
 
@@ -38,16 +37,20 @@ class LoopRows:
 
     """
 
-    def __init__(
-        self, header: Header, loop: Loop, number: int, before: np.ndarray, rows: np.ndarray
-    ) -> None:
-        """Take rows, and the one before them, if there is one."""
+    def __init__(self, loop: Loop, number: int, table: Table, new: int) -> None:
+        """Take rows.
+
+        Args:
+            loop: whose signals count.
+            number: of the first of them in the run.
+            table: of these rows, which begins with the one before them, if there is one.
+            new: how many there are before them, 0 or 1.
+
+        """
         self.loop, self.number = loop, number
-        self.half = 0.5 * header.experiment.stop_time
-        self._header, self._rows = header, np.vstack((before, rows))
-        self._table = Table.of(header, self._rows)
+        self.half = 0.5 * table.header.experiment.stop_time
+        self._table, self._new = table, new
         self._groups: dict[tuple[str, ...], np.ndarray] = {}
-        self._new = len(before)
 
     @property
     def time(self) -> np.ndarray:
@@ -78,8 +81,8 @@ class LoopRows:
 
     def errors(self, wanted: np.ndarray | slice = slice(None)) -> np.ndarray:
         """y - y_d with the true control point, in all rows or in some [m]."""
-        rows = self._rows[self._new :][wanted]
-        return tracking_error(Table.of(self._header, rows), self.loop)
+        rows = self._table.rows[self._new :][wanted]
+        return tracking_error(Table.of(self._table.header, rows), self.loop)
 
     @cached_property
     def distance(self) -> np.ndarray:
