@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
-from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, vehicle_colours
+from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, reference_colours, vehicle_colours
 from orchestrator.figures.visible import moving_mean
 from orchestrator.vehicle.signals import Loop, real_parameter, true_control_point
 
@@ -69,8 +69,10 @@ class Scene:
             looks = [_Look(COLOURS[0], REFERENCE, PAINT, _VEHICLE)]
         else:
             share = _VEHICLES / len(run.loops) ** 0.5
-            colours = vehicle_colours(len(run.loops))
-            looks = [_Look(colour, colour, paint_of(colour), share) for colour in colours]
+            colours = zip(
+                vehicle_colours(len(run.loops)), reference_colours(run.loops), strict=True
+            )
+            looks = [_Look(own, other, paint_of(own), share) for own, other in colours]
         self._vehicles = [
             _Vehicle(axes, run, loop, rows, look)
             for loop, look in zip(run.loops, looks, strict=True)

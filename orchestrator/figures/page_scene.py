@@ -10,7 +10,14 @@ import numpy as np
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
 from orchestrator.figures.page_series import numbers
-from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes, vehicle_colours
+from orchestrator.figures.style import (
+    COLOURS,
+    REFERENCE,
+    Drawn,
+    earth_axes,
+    reference_colours,
+    vehicle_colours,
+)
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import Loop, real_parameter, true_control_point, waypoints
 
@@ -87,13 +94,12 @@ def scene_of_several(run: Drawn) -> dict[str, Any]:
     rows = _rows(time, max(_FEWEST, min(_FRAMES, _TOGETHER // n)))
     paths = [true_control_point(table, loop) for loop in run.loops]
     colours = vehicle_colours(n)
-    references: dict[tuple[str, ...], tuple[str, dict[str, Any]]] = {}
     groups = [{"legendgroup": loop.name} for loop in run.loops]
-    for loop, colour, group in zip(run.loops, colours, groups, strict=True):
+    references: dict[tuple[str, ...], tuple[str, dict[str, Any]]] = {}
+    for loop, colour, group in zip(run.loops, reference_colours(run.loops), groups, strict=True):
         if not table.missing(loop.y_d):
-            # What several vehicles follow belongs to none of them.
-            is_shared = loop.y_d in references
-            references[loop.y_d] = (REFERENCE, {}) if is_shared else (colour, group)
+            # What several vehicles follow goes with none of them.
+            references[loop.y_d] = (colour, {} if colour == REFERENCE else group)
     followed = [table.group(*columns) for columns in references]
     by_planner = {loop.planner: waypoints(table, loop) for loop in run.loops}
     points = np.vstack(list(by_planner.values()))

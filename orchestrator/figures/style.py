@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import colorsys
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from itertools import cycle
 from typing import Any, NamedTuple
@@ -98,6 +99,13 @@ def vehicle_colours(n: int) -> list[str]:
         rgb = colorsys.hls_to_rgb(i / more, lightness, _SATURATION)
         colours.append("#" + "".join(f"{round(255 * part):02X}" for part in rgb))
     return colours
+
+
+def reference_colours(loops: Sequence[Loop]) -> list[str]:
+    """The colour of each vehicle's reference: its own, or grey where several have the same."""
+    followed = Counter(loop.y_d for loop in loops)
+    colours = zip(loops, vehicle_colours(len(loops)), strict=True)
+    return [REFERENCE if followed[loop.y_d] > 1 else colour for loop, colour in colours]
 
 
 def earth_axes(z_up: bool) -> tuple[str, str, str]:
