@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 from PIL import Image
@@ -93,6 +93,8 @@ def test_films_that_cannot_be_written_are_refused(tmp_path, name, fps, text):
     st.floats(0.0, 50.0),
     st.booleans(),
 )
+# One is between the camera and the other.
+@example([(75.0, 50.0, 45.0), (-75.0, -50.0, -45.0)], 0.0, False)
 def test_camera_has_all_vehicles_and_references_in_sight(places, amplitude, z_up):
     """In each row all control points and references are in the picture, and none too near."""
     n = len(places)
