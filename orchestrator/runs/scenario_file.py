@@ -141,7 +141,8 @@ class ScenarioFile(TomlTable):
     )
     remark: str = entry("What the report says below the figure, in Markdown.", "none")
     vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = entry(
-        "How many vehicles there are, each with the closed loop: [see below](#vehicles).",
+        "How many vehicles there are, `auv1`, `auv2` and so on, each with the closed loop: see "
+        "[several vehicles](../how-to/vehicles.md).",
         "one, whose components have no prefix",
     )
     components: dict[str, Name | Literal[False]] = entry(
