@@ -18,7 +18,7 @@ from orchestrator.figures.drawing import styled
 from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.film_scene import Scene
 from orchestrator.figures.panels import Cell, draw_all_errors, draw_commands, over_time, title
-from orchestrator.figures.style import Drawn, escape_math, heading, vehicle_colours
+from orchestrator.figures.style import REFERENCE, Drawn, escape_math, heading, vehicle_colours
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.reducers import SMALLEST_DISTANCE_LABEL, size, smallest_distances
 from orchestrator.vehicle.signals import Loop, tracking_error
@@ -40,8 +40,11 @@ _ROOM = 1.05
 #: Colours of a film of one vehicle, and of several.
 _COLOURS = 128, 256
 
-#: Vehicles that the legend names beside each other.
-_BESIDE = 6
+#: Of more vehicles none is named.
+_MOST_NAMED = 24
+
+#: Letters in a row of the legend, of which the line of a vehicle takes some.
+_LETTERS, _LINE = 54, 4
 
 
 def check_film(path: Path, fps: int) -> None:
@@ -119,7 +122,7 @@ def _frames(text: str, run: Drawn, n: int) -> Iterator[Image.Image]:
         # Of one vehicle all rows are drawn, of several as many as can be seen.
         kept = np.arange(len(table)) if len(run.loops) == 1 else _seen(table.time, rows)
         scene = Scene(figure.add_subplot(grid[0]), run, kept)
-        if len(run.loops) > 1:
+        if 1 < len(run.loops) <= _MOST_NAMED:
             _name_vehicles(scene.axes, run)
         series = _draw_series(Cell(figure, grid[1]), run)
         list_events(figure, [run], grow=False)
@@ -153,9 +156,9 @@ def _name_vehicles(axes: Any, run: Drawn) -> None:
         Line2D([], [], color=colour, label=escape_math(loop.name))
         for loop, colour in zip(run.loops, vehicle_colours(len(run.loops)), strict=True)
     ]
-    axes.legend(
-        handles=lines, loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=min(_BESIDE, len(lines)),
-    )  # fmt: skip
+    longest = max(len(loop.name) for loop in run.loops)
+    columns = max(1, min(_LETTERS // (longest + _LINE), len(lines)))
+    axes.legend(handles=lines, loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=columns)
 
 
 def _draw_series(cell: Cell, run: Drawn) -> list[Any]:
@@ -189,7 +192,7 @@ def _series_of_several(cell: Cell, run: Drawn) -> list[Any]:
             axes.plot(table.time, size(tracking_error(table, loop)), color=colour)
         axes.set_ylabel("|e| [m]")
         title(axes, "sizes of the tracking errors")
-    of_distance.plot(table.time, smallest_distances(table, run.loops), color="black")
+    of_distance.plot(table.time, smallest_distances(table, run.loops), color=REFERENCE)
     of_distance.set_ylabel("distance [m]")
     title(of_distance, SMALLEST_DISTANCE_LABEL)
     for axes in panels:

@@ -126,7 +126,10 @@ def _panels_of_all(run: Drawn) -> tuple[list[_Lines], list[str]]:
         )  # fmt: skip
     smallest = smallest_distances(table, run.loops)[:, np.newaxis]
     text = SMALLEST_DISTANCE_LABEL
-    panels.append(_Lines(f"{text} [m]", [text], table.time, smallest, is_size=True))
+    # No vehicle's colour.
+    panels.append(
+        _Lines(f"{text} [m]", [text], table.time, smallest, colours=[REFERENCE], is_size=True)
+    )
     return panels, notes
 
 

@@ -27,5 +27,5 @@ const vehicle = document.getElementById("vehicle");
 data.series = chosen(vehicle.value);
 vehicle.onchange = () => {
   const { traces, layout } = chosen(vehicle.value);
-  Plotly.react(series, traces, layout, config).then(() => show(frame));
+  return Plotly.react(series, traces, layout, config).then(() => show(frame));
 };
