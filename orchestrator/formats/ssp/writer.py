@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
+from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -17,6 +18,7 @@ from orchestrator.formats.ssp.nesting import End, Line, Nest, nested, order_of
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
+from orchestrator.system.renaming import flattened
 from orchestrator.system.structure import System
 from orchestrator.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
 from orchestrator.system.values import Value, items_of, literal, type_of
@@ -41,29 +43,55 @@ _BOX, _GAP = (40.0, 60.0), 30.0
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def write_ssp(system: System, folder: Path) -> list[Path]:
-    """Write `NAME.ssp`; the step is part of the system."""
+def write_ssp(system: System, folder: Path, flat: bool = False) -> list[Path]:
+    """Write `NAME.ssp`; the step is part of the system; arguments as of :func:`ssp_bytes`."""
     path = folder / f"{file_name(system.name)}.ssp"
-    path.write_bytes(ssp_bytes(system))
+    path.write_bytes(ssp_bytes(system, flat))
     return [path]
 
 
-def ssp_bytes(system: System) -> bytes:
-    """The archive of a system: its structure and its FMUs, the same bytes every time."""
+def ssp_bytes(system: System, flat: bool = False) -> bytes:
+    """The archive of a system: its structure and its FMUs, the same bytes every time.
+
+    Args:
+        system: to write.
+        flat: for tools that know no systems in systems, or make one instance of an FMU only: names
+            have no dots, and each component has a copy of its FMU.
+
+    """
+    system = flattened(system) if flat else system
+    sources = _sources(system, flat)
     archive = BytesIO()
     with ZipFile(archive, "w") as content:
-        content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
+        content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system, sources))
         for name, source in _parameter_sources(system).items():
             values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
-        for fmu, source in _sources(system).items():
+        fmus = {sources[name]: component.fmu for name, component in system.components.items()}
+        # In the order of their paths, as before there were copies.
+        for source, fmu in sorted(fmus.items(), key=itemgetter(1)):
             content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
     return archive.getvalue()
 
 
-def _sources(system: System) -> dict[Path, str]:
-    """Where the archive has each FMU."""
-    return {fmu: f"resources/{name}" for fmu, name in system.fmus().items()}
+def _sources(system: System, copied: bool = False) -> dict[str, str]:
+    """Where the archive has the FMU of each component.
+
+    Args:
+        system: whose FMUs they are.
+        copied: whether each component has one of its own.
+
+    """
+    names = system.fmus()
+    taken, found = list(names.values()), dict[str, str]()
+    first: dict[Path, str] = {}
+    for name, component in system.components.items():
+        file = names[component.fmu]
+        if first.setdefault(component.fmu, name) != name and copied:
+            [file] = plain_file_names([f"{name}.fmu"], *taken)
+            taken.append(file)
+        found[name] = f"resources/{file}"
+    return found
 
 
 def _parameter_sources(system: System) -> dict[str, str]:
@@ -126,15 +154,22 @@ def _serialised(root: Element) -> bytes:
     return content
 
 
-def structure_xml(system: System) -> bytes:
+def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> bytes:
     """SystemStructure.ssd; connectors and units come from the FMUs' own descriptions.
 
     libcosim and OMSimulator each need the step in an annotation of their own.
+
+    Args:
+        system: to write.
+        sources: where the archive has the FMU of each component; None: each FMU once.
+
     """
     version = max(map(_version, system.components.values()))
     root = Element(_tag("ssd:SystemStructureDescription"), name=system.name, version=version)
     structure, nest = _add(root, "ssd:System", name=system.name), nested(system)
-    given = _Given(system, _sources(system), _parameter_sources(system), _clear_units(system))
+    given = _Given(
+        system, sources or _sources(system), _parameter_sources(system), _clear_units(system)
+    )
     _fill(structure, nest, given)
     if system.step is not None:
         _add_master(structure, system.step)
@@ -149,14 +184,14 @@ class _Given(NamedTuple):
 
     Attributes:
         system: all of it.
-        sources: of FMUs.
+        sources: of the FMUs of components.
         parameter_sources: of the parameter sets of components.
         units: that the description can define.
 
     """
 
     system: System
-    sources: Mapping[Path, str]
+    sources: Mapping[str, str]
     parameter_sources: Mapping[str, str]
     units: Collection[Unit]
 
@@ -172,7 +207,7 @@ def _fill(structure: Element, nest: Nest, given: _Given) -> None:
             _add_geometry(inner, position)
             _fill(inner, component, given)
             continue
-        source = given.sources[component.fmu]
+        source = given.sources[component.name]
         element = _add_component(elements, name, component, position, source, system.left_open)
         if component.name in given.parameter_sources:
             bindings = _add(element, "ssd:ParameterBindings")
