@@ -191,8 +191,10 @@ class _Known:
         if name == STEP:
             return "s"
         target = port_name(name)
-        having = [one.component(target.component) for one in self._systems if one.has(target)]
-        units = {unit_of(component.variable(target.port)) or "" for component in having}
+        having = ((one, one.named(target)) for one in self._systems if one.has(target))
+        units = {
+            unit_of(one.component(port.component).variable(port.port)) or "" for one, port in having
+        }
         return units.pop() if len(units) == 1 else ""
 
     def typed(self, name: str, value: Any) -> Value:
@@ -216,6 +218,7 @@ class _Known:
     def _variable(self, name: str) -> ModelVariable:
         target = port_name(name)
         system = next((one for one in self._systems if one.has(target)), self._systems[-1])
+        target = system.named(target)
         return system.component(target.component).variable(target.port)
 
 

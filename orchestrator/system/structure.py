@@ -139,14 +139,25 @@ class System:
     def named(self, name: PortName) -> PortName:
         """The port that a name means, which may have dots in its component's name as well.
 
-        It is one of the longest component that the text begins with and that has such a port; a
-        name that means none is left as it is.
+        It is one of the longest component that the text begins with and that has such a port. Where
+        there is none, it is of the component that was most likely meant.
         """
-        components = self.components
-        for component, port in splits(str(name)):
-            if component in components and port in components[component].variables:
-                return PortName(component, port)
-        return name
+        components, text = self.components, str(name)
+        meant = None
+        for component, port in splits(text):
+            if component in components:
+                if port in components[component].variables:
+                    return PortName(component, port)
+                meant = meant or PortName(component, port)
+        return meant or self._meant(name)
+
+    def _meant(self, name: PortName) -> PortName:
+        """A name that begins with no component, taken apart after the systems it begins with."""
+        outer, inner = name.component, name.port
+        while "." in inner and any(one.startswith(f"{outer}.") for one in self.components):
+            part, _, inner = inner.partition(".")
+            outer = f"{outer}.{part}"
+        return PortName(outer, inner)
 
     def has(self, name: PortName) -> bool:
         """Whether there is such a port or parameter."""
@@ -209,7 +220,7 @@ class System:
         """
         if name not in self.components:
             raise InputError(
-                f"the system has no component {name!r}; it has {', '.join(self.components)}"
+                f"the system has no component {name!r}; it has {listed([*self.components])}"
                 f"{did_you_mean(name, self.components)}"
             )
         return self.components[name]

@@ -10,7 +10,7 @@ from zipfile import ZipFile
 
 import pytest
 from fmpy.ssp.ssd import read_ssd
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from orchestrator.formats.ssp.reader import read_ssp
@@ -300,7 +300,6 @@ def nested_systems(draw: st.DrawFn, parts: dict[str, Component]) -> System:
     return system_of(parts, kinds, wires, made, stop_time=1.0)
 
 
-@settings(deadline=None, max_examples=60)
 @given(st.data())
 def test_random_systems_are_read_as_they_were(parts: dict[str, Component], data: st.DataObject):
     system = data.draw(nested_systems(parts))
