@@ -19,11 +19,12 @@ _MOST_DEVIATIONS = 9.0
 
 
 class Inputs(NamedTuple):
-    """Commanded force and moments, the disturbance, and the velocity of the water."""
+    """Commanded force and moments, the disturbance, and how the water moves."""
 
     tau: Vector3
     tau_w: Vector6
     water: Vector3
+    dwater: Vector3
 
 
 class Outputs(TypedDict):
@@ -75,7 +76,9 @@ def advance(
 ) -> tuple[PlantState, Rotation, Outputs]:
     """State, its attitude and outputs after n steps of h seconds."""
     tau, water = plant.applied(parameters, inputs.tau), plant.flow(parameters, inputs.water)
-    state, derived = plant.steps(parameters, state, derived, tau, inputs.tau_w, water, h, n)
+    state, derived = plant.steps(
+        parameters, state, derived, tau, inputs.tau_w, water, inputs.dwater, h, n
+    )
     return state, derived, _seen(parameters, state, derived)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from auv_fmu import __version__
 from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
@@ -60,16 +62,21 @@ CONTROL_POINT = parameter(
 )
 
 
-def reference(posture: str) -> tuple[Port, ...]:
+def reference(
+    posture: str, feedthrough: Sequence[Port] = (), initially: Sequence[Port] = ()
+) -> tuple[Port, ...]:
     """The outputs of every planner, so that one can take the other's place.
 
     Args:
         posture: what its posture is.
+        feedthrough: inputs that all of them depend on directly.
+        initially: inputs that they depend on at the start besides.
 
     """
+    on = (feedthrough, initially)
     return (
-        *outputs("y_d", POSITION, "Desired control point"),
-        *outputs("dy_d", VELOCITY, "Desired velocity"),
-        *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form"),
-        *outputs("eta_d", ETA_WITHOUT_ROLL, posture),
+        *outputs("y_d", POSITION, "Desired control point", *on),
+        *outputs("dy_d", VELOCITY, "Desired velocity", *on),
+        *outputs("ddy_d", ACCELERATION, "Desired acceleration, in closed form", *on),
+        *outputs("eta_d", ETA_WITHOUT_ROLL, posture, *on),
     )

@@ -197,7 +197,7 @@ def _of_vehicles(run: Drawn, path: Path, title: str) -> Iterator[tuple[Drawn, Pa
     """A run once for each of its vehicles, with the file and the heading of each."""
     for loop, vehicle in suffixes(run.loops).items():
         file = path.with_name(f"{path.stem}{vehicle}{path.suffix}")
-        yield run._replace(loops=[loop]), file, f"{title}, {loop.vehicle}" if vehicle else title
+        yield run._replace(loops=[loop]), file, f"{title}, {loop.name}" if vehicle else title
 
 
 def _animate(options: argparse.Namespace) -> int:

@@ -23,7 +23,7 @@ from tqdm import tqdm
 
 from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import Cell, Panel, Rows, run_line
-from orchestrator.figures.run_figures import FIGURES
+from orchestrator.figures.run_figures import FIGURES, MOST_DRAWN, figures_of
 from orchestrator.figures.style import (
     COLOURS,
     FIGURE_FORMATS,
@@ -34,7 +34,7 @@ from orchestrator.figures.style import (
     heading,
 )
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.vehicle.signals import Loop, suffixes
+from orchestrator.vehicle.signals import Loop
 
 #: What a file would say of its time and tool, by its ending.
 _NO_DATE: dict[str, Any] = {
@@ -201,7 +201,7 @@ def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") 
     if name not in known:
         hint = did_you_mean(name, known) or f"; there are {', '.join(known)}"
         raise InputError(f"no figure {name!r}{hint}")
-    loops = {loop.vehicle: (i, loop) for i, loop in enumerate(runs[0].loops)}
+    loops = {loop.name: (i, loop) for i, loop in enumerate(runs[0].loops)}
     if vehicle and vehicle not in loops:
         raise InputError(f"no vehicle {vehicle!r}; there are {', '.join(loops)}")
     i, loop = loops[vehicle] if vehicle else (0, runs[0].loop)
@@ -239,7 +239,8 @@ def draw(
 ) -> list[str]:
     """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
 
-    Of several vehicles each has its own, together with the vehicle of that name in the other runs.
+    Several vehicles have one together. Each of a few has its own, with the vehicle of that name in
+    the other runs.
 
     Args:
         kind: key of :data:`FIGURES`.
@@ -254,16 +255,23 @@ def draw(
 
     """
     notes: list[str] = []
-    for i, (loop, vehicle) in enumerate(suffixes(runs[0].loops).items()):
-        of_vehicle = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
-        name = ", ".join(filter(None, (title, loop.vehicle if vehicle and title else "")))
-        notes += _drawn(kind, name, of_vehicle, folder, f"{stem}{vehicle}", stop)
+    loops = runs[0].loops
+    for key, vehicle, drawn in figures_of(kind, loops):
+        of_vehicles, name = list(runs), title
+        if len(drawn) < len(loops):
+            [loop] = drawn
+            i = loops.index(loop)
+            of_vehicles = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
+            name = ", ".join(filter(None, (title, loop.name if title else "")))
+        notes += _drawn(key, name, of_vehicles, folder, f"{stem}{vehicle}", stop)
+    if len(loops) > MOST_DRAWN:
+        notes.append(f"no figure of each of {len(loops)} vehicles, only of all together")
     return notes
 
 
 def _same(run: Drawn, loop: Loop, i: int) -> Loop:
     """The loop of a run that is drawn beside another's: the one of the same vehicle."""
-    named = [own for own in run.loops if own.vehicle == loop.vehicle]
+    named = [own for own in run.loops if own.name == loop.name]
     return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
 
 

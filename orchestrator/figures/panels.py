@@ -129,11 +129,12 @@ def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
             *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
             facecolors="none" if i else colour, label=None if i else "vehicle start",
         )  # fmt: skip
-    _frame_path(axes, np.vstack(paths), runs[0].z_up)
+    frame_path(axes, np.vstack(paths), runs[0].z_up)
     title(axes, "path")
 
 
-def _frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
+def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
+    """Limits, names and the box of axes that hold the points of paths, (n, 3) [m]."""
     points = points[np.isfinite(points).all(axis=1)]
     lower, upper = np.min(points, axis=0), np.max(points, axis=0)
     extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))

@@ -5,12 +5,13 @@ A new one is an entry of :data:`FIGURES`, of the panels here and in :mod:`.panel
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from fmus.ports.quantities import NU, THETA
+from orchestrator.figures import fleet_panels
 from orchestrator.figures.panels import (
     COMMANDS,
     ERRORS,
@@ -137,6 +138,9 @@ FROM_ABOVE = Panel("path from above", Loop.for_control_point, _from_above)
 
 _SURGE, _LINEAR, _ANGULAR = slice(1), slice(3), slice(3, None)
 
+#: The figure of several vehicles together, and of how many each has its own besides.
+FLEET, MOST_DRAWN = "fleet", 10
+
 #: Rows of panels by what the names of their files end with, for each name.
 FIGURES: Mapping[str, Mapping[str, Rows]] = {
     # Figs. 4 and 7: one run, and thin and black its twin, say without noise.
@@ -150,6 +154,13 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
     "comparison-errors": {"": ((ERRORS, LOGARITHMIC_ERRORS),)},
     # Fig. 7 in one: any number of runs.
     "overlay": {"": ((ERRORS, COMMANDS),)},
+    # Several vehicles together.
+    FLEET: {
+        "": (
+            (fleet_panels.PATHS, fleet_panels.FROM_ABOVE),
+            (fleet_panels.ERRORS, fleet_panels.DISTANCES),
+        )
+    },
     # Fig. 3(a): only the vehicle.
     "open-loop-surge": {
         "": (
@@ -169,6 +180,23 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
         )
     },
 }
+
+
+def figures_of(key: str, loops: Sequence[Loop]) -> Iterator[tuple[str, str, Sequence[Loop]]]:
+    """The figures of a run: of all vehicles together, and of each.
+
+    Args:
+        key: of :data:`FIGURES` that a single vehicle has.
+        loops: of the vehicles.
+
+    Yields:
+        A key, what the names of the files go on with, and the loops that are drawn.
+
+    """
+    if len(loops) > 1 or key == FLEET:
+        yield FLEET, "", loops
+    if len(loops) <= MOST_DRAWN and key != FLEET:
+        yield from ((key, vehicle, [loop]) for loop, vehicle in suffixes(loops).items())
 
 
 def check_figure(key: str) -> None:
@@ -194,7 +222,7 @@ def figure_files(key: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> li
     """
     return [
         f"{stem}{vehicle}{suffix}.{ending}"
-        for vehicle in suffixes(loops).values()
-        for suffix in FIGURES[key]
+        for of, vehicle, _ in figures_of(key, loops)
+        for suffix in FIGURES[of]
         for ending in FIGURE_FORMATS
     ]

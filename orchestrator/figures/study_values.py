@@ -14,6 +14,7 @@ import numpy as np
 from orchestrator.figures.style import heading, printed_unit
 from orchestrator.vehicle import indices
 from orchestrator.vehicle.indices import REACHED, Index
+from orchestrator.vehicle.reducers import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 
 #: Columns of runs.parquet, an array each; what a run does not have is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]
@@ -164,6 +165,8 @@ class Values:
             return heading(self._labels[value])
         if value in VERDICTS:
             return VERDICTS[value][0]
+        if value == SMALLEST_DISTANCE:
+            return f"{SMALLEST_DISTANCE_LABEL} [m]"
         if len(factors := _factors(value)) > 1:
             return " · ".join(map(self.label, factors))
         if (parts := _parts(value)) is None:
@@ -236,7 +239,8 @@ def is_known(value: str, columns: Sequence[str]) -> bool:
 
 
 def _factors(value: str) -> list[str]:
-    return [factor.strip() for factor in value.split("*")]
+    # A star without spaces stands for any text in the name of a component.
+    return [factor.strip() for factor in value.split(" * ")]
 
 
 def _is_nan(value: Any) -> bool:

@@ -22,8 +22,9 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import Scenario, names, read_scenario, scenario_of
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
+from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System, unfed_inputs
+from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import differing_vehicle
 
 T = TypeVar("T")

@@ -23,8 +23,8 @@ from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
-from orchestrator.runs.wiring import closed_loop, read_wiring
-from orchestrator.system.names import port_name
+from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
+from orchestrator.system.names import role_of
 from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
@@ -230,30 +230,43 @@ def _beside(
         kind: of the bundle's FMUs.
 
     """
-    standard = read_wiring()["components"]
+    if scenario.vehicles != companion.vehicles:
+        raise InputError(
+            f"{scenario.name}: compare = {companion.name!r}: write the same number of vehicles in "
+            f"both, not {scenario.vehicles or 'none'} and {companion.vehicles or 'none'}"
+        )
+    standard = read_wiring(scenario.vehicles)["components"]
     ours, theirs = ({**standard, **one.components} for one in (scenario, companion))
-    is_compared = ours[CONTROLLER] != theirs[CONTROLLER]
-    shared = ours.keys() - {CONTROLLER} if is_compared else {PLANNER}
+    controllers = {name for name in (*ours, *theirs) if role_of(name) == CONTROLLER}
+    # What is outside of all vehicles leads them.
+    planners = {
+        name
+        for name in (*ours, *theirs)
+        if role_of(name) == PLANNER or (scenario.vehicles and role_of(name) == name)
+    }
+    is_compared = any(ours.get(name) != theirs.get(name) for name in controllers)
+    shared = ours.keys() - controllers if is_compared else ours.keys() & planners
 
     def is_taken(target: str, source: str | bool) -> bool:
-        if port_name(target).component not in shared:
+        if component_of(target, ours) not in shared:
             return False
-        start = port_name(source) if isinstance(source, str) else None
-        if start is None or start.component in shared:
+        start = component_of(source, ours) if isinstance(source, str) else None
+        if start is None or start in shared:
             return True
-        there = other.components.get(start.component)
-        return there is not None and any(v.startswith(f"{start.port}.") for v in there.variables)
+        there = other.components.get(start)
+        group = f"{str(source)[len(start) + 1 :]}."
+        return there is not None and any(v.startswith(group) for v in there.variables)
 
     wires = {
         target: source
         for target, source in companion.wires.items()
-        if port_name(target).component != PLANNER
+        if component_of(target, theirs) not in planners
     }
     wires |= {
         target: source for target, source in scenario.wires.items() if is_taken(target, source)
     }
     only, given = companion.only, companion.parameters
-    if is_compared and CONTROLLER in scenario.only:
+    if is_compared and not controllers.isdisjoint(scenario.only):
         only = [*scenario.only, *(name for name in theirs if name not in ours)]
     companion = replace(
         companion,
@@ -264,13 +277,14 @@ def _beside(
     )
     new = closed_loop(current_fmus(kind), companion)
     values = {
-        name: system.value(name) if name.component == PLANNER else value
+        name: system.value(name) if is_planned else value
         for name, value in given.items()
-        if new.has(name) and (name.component != PLANNER or system.has(name))
+        for is_planned in [new.named(name).component in planners]
+        if new.has(name) and (system.has(name) or not is_planned)
     }
     steps = {
         name: step
         for name, step in companion.steps.items()
-        if name in new.components and name != PLANNER
+        if name in new.components and name not in planners
     }
     return replace(companion, parameters=values), replace(new.with_parameters(values), steps=steps)

@@ -39,6 +39,7 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics, of_vehicles
+from orchestrator.vehicle.reducers import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.signals import Loop
 
 if TYPE_CHECKING:
@@ -279,6 +280,8 @@ def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
                 unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
                 title = f"{index.label} {index.members}{unit}"
                 yield vehicle, title, [*map(_number, np.atleast_1d(found[index.name]).tolist())]
+    if SMALLEST_DISTANCE in values:
+        yield "all", f"{SMALLEST_DISTANCE_LABEL} [m]", [_number(values[SMALLEST_DISTANCE])]
 
 
 def _number(value: float) -> str:

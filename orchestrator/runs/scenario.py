@@ -22,8 +22,8 @@ from orchestrator.machine.user_files import explain_errors, find_toml, names_in,
 from orchestrator.master.experiment import Order
 from orchestrator.master.hooks.timing import InputTable
 from orchestrator.runs import SCENARIOS_FOLDER
-from orchestrator.system.names import PortName, file_name, flatten, port_name
-from orchestrator.system.structure import System
+from orchestrator.system.names import PortName, file_name, flatten, for_each, port_name
+from orchestrator.system.structure import System, is_spread
 from orchestrator.system.values import EXACT, finite, type_of, typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
@@ -42,8 +42,18 @@ _FARTHEST = 1e308
 #: The model of the planners that run through waypoints.
 _PATH_PLANNER = "PathPlanner"
 
+#: Stands for the name of each vehicle, `auv1`, `auv2`, ...; in a wire, for the same one.
+EACH_VEHICLE = "auv*"
+
 #: The columns of a table of waypoints, without times and with them.
 _PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
+
+
+def vehicle_names(n: int | None) -> list[str]:
+    """Names of n vehicles; None: the components of a single one have no prefix."""
+    if n is None:
+        return []
+    return [EACH_VEHICLE.replace("*", str(number)) for number in range(1, n + 1)]
 
 
 @dataclass(frozen=True)
@@ -96,7 +106,8 @@ class Scenario:
     coupling: str | None = None
     only: Sequence[str] = ()
     remark: str = ""
-    components: Mapping[str, str] = field(default_factory=dict)
+    vehicles: int | None = None
+    components: Mapping[str, str | bool] = field(default_factory=dict)
     wires: Mapping[str, str | bool] = field(default_factory=dict)
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     ours: Mapping[str, str] = field(default_factory=dict)
@@ -160,11 +171,19 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
 
     ScenarioFile.check(path, content)
     content["parameters"] = {
-        port_name(key): value for key, value in flatten(content.get("parameters", {}))
+        port_name(key): value for key, value in flatten(content.get("parameters", {}), is_spread)
     }
+    vehicles = vehicle_names(content.get("vehicles"))
+    for key in content.keys() & {"components", "wires", "steps"}:
+        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
+    for key in content.keys() & {"order", "only"}:
+        if isinstance(content[key], list):
+            listed = dict.fromkeys(content[key])
+            content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
     if "path" in content:
         said, others = content.pop("path"), content["parameters"]
-        found = path_parameters(path.parent / said["file"], said.get("component", STANDARD.planner))
+        component = said.get("component", STANDARD.planner)
+        found = path_parameters(path.parent / said["file"], component)
         for name in found.keys() & others.keys():
             raise InputError(f"{path}: {name} is already given by {said['file']}")
         content["parameters"] |= found
@@ -173,7 +192,7 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
         content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     content["components"] = {
-        component: str(path.parent / fmu) if fmu.endswith(".fmu") else fmu
+        component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
     }
     if content.get("compare", "").endswith(".toml"):

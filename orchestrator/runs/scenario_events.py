@@ -125,7 +125,7 @@ def _condition(text: str, system: System) -> Condition:
 def _ports(
     system: System, text: str, causalities: Sequence[str], single: bool = False
 ) -> list[PortName]:
-    """The port of a name, or the ports of a group.
+    """The port of a name, or the ports of a group; of all components that a name with stars means.
 
     Args:
         system: that has them.
@@ -137,7 +137,12 @@ def _ports(
         InputError: there is none.
 
     """
-    port = system.named(port_name(text))
+    several = system.meant(port_name(text))
+    if len(several) > 1:
+        if single:
+            raise InputError(f"{text} are {len(several)} signals; name one of them")
+        return [port for one in several for port in _ports(system, str(one), causalities)]
+    port = system.named(several[0])
     if not system.has(port) and not single and (members := system.members(text, causalities)):
         return members
     variable = system.component(port.component).variable(port.port)

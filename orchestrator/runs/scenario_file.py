@@ -11,6 +11,9 @@ from orchestrator.master.experiment import COUPLINGS
 from orchestrator.runs.scenario_events import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
 
+#: More vehicles take longer to put together than anyone waits.
+MOST_VEHICLES = 10_000
+
 #: What an input does between two rows of its table; the first is the default.
 INTERPOLATIONS = ("linear", "hold")
 
@@ -137,10 +140,15 @@ class ScenarioFile(TomlTable):
         "The components to keep; wires to the others are removed too.", "all of them"
     )
     remark: str = entry("What the report says below the figure, in Markdown.", "none")
-    components: dict[str, Name] = entry(
+    vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = entry(
+        "How many vehicles there are, `auv1`, `auv2` and so on, each with the closed loop: see "
+        "[several vehicles](../how-to/vehicles.md).",
+        "one, whose components have no prefix",
+    )
+    components: dict[str, Name | Literal[False]] = entry(
         "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
-        "this file.",
+        "this file. `false` removes a component, and its wires.",
         "none",
     )
     wires: dict[str, Name | Literal[False]] = entry(

@@ -4,23 +4,39 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, vehicle_names
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.names import PortName, listed, port_name
+from orchestrator.system.names import PortName, for_each, listed, port_name, splits
 from orchestrator.system.structure import Connection, System
 from orchestrator.system.variables import BUS, COMPLETE, Terminal
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")
 
 
-def read_wiring() -> dict[str, Any]:
-    """What `closed_loop.toml` holds."""
-    return tomllib.loads(_WIRING.read_text(encoding="utf-8"))
+def read_wiring(vehicles: int | None = None) -> dict[str, Any]:
+    """What `closed_loop.toml` holds, for each of several vehicles; None: for a single one."""
+    wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
+    if vehicles is None:
+        return wiring
+    names, each = vehicle_names(vehicles), f"{EACH_VEHICLE}."
+    components = {each + name: fmu for name, fmu in wiring["components"].items()}
+    wires = {each + target: source and each + source for target, source in wiring["wires"].items()}
+    return {
+        **wiring,
+        "components": for_each(EACH_VEHICLE, names, components),
+        "wires": for_each(EACH_VEHICLE, names, wires),
+    }
+
+
+def component_of(name: str, components: Collection[str]) -> str:
+    """The component that a port or group belongs to; of an unknown one, the text before a dot."""
+    known = (component for component, _ in splits(name) if component in components)
+    return next(known, name.partition(".")[0])
 
 
 def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
@@ -34,7 +50,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         Refused: a component or group of ports that the scenario names does not exist.
 
     """
-    findings, wiring = Findings(), read_wiring()
+    findings, wiring = Findings(), read_wiring(scenario.vehicles if scenario else None)
     scenario = scenario or Scenario(wiring["name"])
     chosen, wires = _changed(scenario, wiring["components"], wiring["wires"], findings)
     components = {}
@@ -52,7 +68,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         PortName(name, variable.name)
         for name, component in components.items()
         for variable in component.having("input")
-        if any(f"{name}.{variable.name}".startswith(f"{group}.") for group in groups)
+        if any(group in groups for group, _ in splits(f"{name}.{variable.name}"))
     }
     system = System(
         name=wiring["name"],
@@ -63,20 +79,23 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         step=wiring["experiment"]["step"],
         steps=scenario.steps,
     )
-    for port, value in scenario.parameters.items():
+    values: dict[PortName, object] = {}
+    for port, value in system.expanded(scenario.parameters).items():
         with findings.collecting():
-            system = system.with_parameters({port: value})
+            system.with_parameters({port: value})
+            values[port] = value
     findings.refuse()
-    return system
+    return system.with_parameters(values)
 
 
 def _left_open(chosen: Mapping[str, str], wiring: Mapping[str, Any]) -> Iterator[str]:
     """The groups of inputs that the closed loop leaves open, of all components of the same FMU."""
     for target, source in wiring["wires"].items():
         if source is False:
-            component, group = target.split(".")
+            component = component_of(target, wiring["components"])
+            group = target.removeprefix(component)
             standard = wiring["components"][component]
-            yield from (f"{name}.{group}" for name, fmu in chosen.items() if fmu == standard)
+            yield from (f"{name}{group}" for name, fmu in chosen.items() if fmu == standard)
 
 
 def _changed(
@@ -86,12 +105,17 @@ def _changed(
     findings: Findings,
 ) -> tuple[dict[str, str], dict[str, str]]:
     """The components and wires of a scenario."""
-    there = {**chosen, **scenario.components}
+    stated = {**chosen, **scenario.components}
+    there = {name: str(fmu) for name, fmu in stated.items() if fmu is not False}
     for name in there:
-        if not re.fullmatch(r"\w+", name):
+        if not re.fullmatch(r"\w+(\.\w+)*", name):
             findings.problem(
-                f"{scenario.name}: component {name!r}: write letters, digits and _ only"
+                f"{scenario.name}: component {name!r}: write letters, digits and _ only, and dots "
+                "between the names of systems"
             )
+        for system, _ in splits(name):
+            if system in there:
+                findings.problem(f"{scenario.name}: {system} and {name} cannot both be components")
     for target in scenario.wires.keys() - wires.keys():
         if scenario.wires[target] is False:
             findings.problem(
@@ -109,20 +133,21 @@ def _changed(
             f"there are {', '.join(there)}"
         )
     if scenario.only:
-        left = there.keys() - {*scenario.only}
         there = {name: fmu for name, fmu in there.items() if name in scenario.only}
-        wired = {
-            target: source
-            for target, source in wired.items()
-            if left.isdisjoint((target.split(".")[0], source.split(".")[0]))
-        }
-    return there, wired
+    left = stated.keys() - there.keys()
+    return there, {
+        target: source
+        for target, source in wired.items()
+        if left.isdisjoint(component_of(end, stated) for end in (target, source))
+    }
 
 
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
     """The connections of one wire: of ports, of terminals, or inputs of a group take namesakes."""
-    to, group = port_name(target).component, port_name(target).port
-    start, source_group = port_name(source).component, port_name(source).port
+    for name in (target, source):
+        port_name(name)
+    to, start = (component_of(name, components) for name in (target, source))
+    group, source_group = target[len(to) + 1 :], source[len(start) + 1 :]
     for name in (to, start):
         if name not in components:
             raise InputError(

@@ -191,10 +191,8 @@ class _Known:
         if name == STEP:
             return "s"
         target = port_name(name)
-        having = ((one, one.named(target)) for one in self._systems if one.has(target))
-        units = {
-            unit_of(one.component(port.component).variable(port.port)) or "" for one, port in having
-        }
+        having = [(one, one.named(target)) for one in self._systems if one.has(target)]
+        units = {unit_of(one.component(of.component).variable(of.port)) or "" for one, of in having}
         return units.pop() if len(units) == 1 else ""
 
     def typed(self, name: str, value: Any) -> Value:

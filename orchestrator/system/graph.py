@@ -1,10 +1,14 @@
-"""The graph of a system: what depends on what, and which order of stepping follows from it."""
+"""The graph of a system: what depends on what, the order of stepping, and what nothing feeds."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from orchestrator.system.structure import Connection, System
+from fmpy.model_description import ModelVariable
+
+from orchestrator.system.component import Component
+from orchestrator.system.names import PortName, listed
+from orchestrator.system.structure import Connection, System, can_feed
 
 #: What each component waits for: the components whose direct feedthrough feeds it.
 _Sources = Mapping[str, Collection[str]]
@@ -298,3 +302,53 @@ def _strongly_connected(sources: _Sources) -> list[list[str]]:
                     part.append(last)
                 parts.append(part)
     return parts
+
+
+def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | None:
+    """The inputs that nothing feeds or sets, in words, with wires that could feed them.
+
+    Args:
+        system: that is looked at.
+        settled: inputs that are set during a run.
+
+    Returns:
+        One line; None: there is no such input.
+
+    """
+    fed = {connection.target for connection in system.connections}
+    feeding = {
+        (connection.source.component, connection.target.port) for connection in system.connections
+    }
+    taken = {*fed, *system.parameters, *system.left_open, *settled}
+    labels: list[str] = []
+    wires: list[str] = []
+    for name, component in system.components.items():
+        groups: dict[str, list[ModelVariable]] = {}
+        for variable in component.having("input"):
+            groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
+        for group, members in groups.items():
+            found = [v for v in members if PortName(name, v.name) not in taken]
+            if not group or len(found) < len(members):
+                labels += [f"{name}.{variable.name}" for variable in found]
+                continue
+            labels.append(f"{name}.{group}.*")
+            # What feeds the same inputs of another component is that one's.
+            sources = [
+                other
+                for other, source in system.components.items()
+                if other != name
+                and all(_could_feed(source, variable) for variable in members)
+                and not any((other, variable.name) in feeding for variable in members)
+            ]
+            if len(sources) == 1:
+                wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')
+    if not labels:
+        return None
+    wanted = f"; wire {listed(wires)}" if wires else ""
+    return f"nothing feeds or sets {listed(labels)}{wanted}"
+
+
+def _could_feed(source: Component, variable: ModelVariable) -> bool:
+    """Whether a component has an output of the name and type of an input."""
+    output = source.variables.get(variable.name)
+    return output is not None and output.causality == "output" and can_feed(output, variable)

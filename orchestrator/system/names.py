@@ -77,6 +77,29 @@ def flatten(
             yield name, value
 
 
+def role_of(component: str) -> str:
+    """What a component is called in its innermost system."""
+    return component.rpartition(".")[2]
+
+
+def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with an entry for each name in the place of one with a star; others win.
+
+    Args:
+        star: that stands for a name, in keys, and in texts that are their values.
+        names: that it stands for.
+        table: by texts that may have it.
+
+    """
+    found = {
+        key.replace(star, name): value.replace(star, name) if isinstance(value, str) else value
+        for name in names
+        for key, value in table.items()
+        if star in key
+    }
+    return found | {key: value for key, value in table.items() if star not in key or not names}
+
+
 def file_name(name: str, taken: Collection[str] = ()) -> str:
     """A name for a file or folder, which every system takes and no other name becomes.
 

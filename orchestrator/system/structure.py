@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -16,10 +17,13 @@ from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, listed, plain_file_names, port_name, splits
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.system.values import EXACT, TYPES, Value, typed, unit_of
+from orchestrator.system.values import EXACT, TYPES, Value, is_finite, typed, unit_of
 
 #: Values by the names of ports or of groups, taken apart or as text.
 Values = Mapping[PortName, object] | Mapping[str, object]
+
+#: Stands for any part of a component's name, between two dots.
+STAR = "*"
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -78,8 +82,8 @@ class System:
         """The same system with further values, which win over its own.
 
         Args:
-            values: by the names of their ports, or of groups; text is read as the command line
-                reads it.
+            values: by the names of their ports, or of groups, as for :meth:`expanded`; text is
+                read as the command line reads it.
 
         Raises:
             InputError: there is no such port, or the value is not of its type or out of range.
@@ -99,17 +103,37 @@ class System:
     def expanded(self, values: Values) -> dict[PortName, object]:
         """Values by ports only: a list for a group has a value for each member. The last one wins.
 
+        A star in a component's name stands for any text without a dot. A value that
+        :func:`is_spread` differs from component to component. Names without a star win.
+
         Raises:
-            InputError: a name is not one of a port, or a list is not as long as its group.
+            InputError: a name is not one of a port, or there are not as many values as ports.
 
         """
         found: dict[PortName, object] = {}
-        for said, value in values.items():
-            name = said if isinstance(said, PortName) else self._port_name(str(said))
-            several = None if self.has(name) else _several(value)
-            ports = [] if several is None else self.members(str(name), ("parameter", "input"))
-            found |= dict(paired(name, ports, several)) if several and ports else {name: value}
+        for said, values_of in sorted(values.items(), key=lambda one: STAR not in str(one[0])):
+            stated = said if isinstance(said, PortName) else self._port_name(str(said))
+            meant = self.meant(stated)
+            for name, value in zip(meant, _spread(stated, values_of, len(meant)), strict=True):
+                several = None if self.has(name) else _several(value)
+                ports = [] if several is None else self.members(str(name), ("parameter", "input"))
+                found |= dict(paired(name, ports, several)) if several and ports else {name: value}
         return found
+
+    def meant(self, name: PortName) -> list[PortName]:
+        """The ports or groups that a name with stars means; any other name means itself."""
+        for like, port in splits(str(name)) if STAR in str(name) else ():
+            components = re.compile(re.escape(like).replace(re.escape(STAR), "[^.]*"))
+            starts = tuple(port + mark for mark in _MEMBER)
+            found = [
+                PortName(one, port)
+                for one, component in self.components.items()
+                if components.fullmatch(one)
+                and any(v == port or v.startswith(starts) for v in component.variables)
+            ]
+            if found:
+                return found
+        return [name]
 
     def _port_name(self, text: str) -> PortName:
         """The name of a port; where it lacks a component, the message says which ones have it."""
@@ -140,18 +164,19 @@ class System:
         """The port that a name means, which may have dots in its component's name as well.
 
         It is one of the longest component that the text begins with and that has such a port. Where
-        there is none, it is of the component that was most likely meant.
+        there is none, it is of the component that was most likely meant. With a star, it is the
+        first of those it means.
         """
-        components, text = self.components, str(name)
-        meant = None
-        for component, port in splits(text):
+        name, components = self.meant(name)[0], self.components
+        likely = None
+        for component, port in splits(str(name)):
             if component in components:
                 if port in components[component].variables:
                     return PortName(component, port)
-                meant = meant or PortName(component, port)
-        return meant or self._meant(name)
+                likely = likely or PortName(component, port)
+        return likely or self._likely(name)
 
-    def _meant(self, name: PortName) -> PortName:
+    def _likely(self, name: PortName) -> PortName:
         """A name that begins with no component, taken apart after the systems it begins with."""
         outer, inner = name.component, name.port
         while "." in inner and any(one.startswith(f"{outer}.") for one in self.components):
@@ -283,7 +308,7 @@ class System:
                 raise InputError(
                     f"{source} -> {target}: {end} has causality {variable.causality}, not {wanted}"
                 )
-        if not _can_feed(a, b):
+        if not can_feed(a, b):
             raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
         if connection.transformation not in (None, Linear()):
             _check_transformed(connection, b.type)
@@ -313,6 +338,33 @@ def paired(
     return zip(ports, values, strict=True)
 
 
+def is_spread(value: object) -> bool:
+    """Whether a value says what each of several components gets.
+
+    `{"each": [1, 2, 4]}` lists the values, `{"first": 1, "step": 2}` counts from the first on.
+    """
+    return isinstance(value, Mapping) and value.keys() in ({"each"}, {"first", "step"})
+
+
+def _spread(name: PortName, value: Any, n: int) -> list[Any]:
+    """The value of each of n components.
+
+    Raises:
+        InputError: there are more or fewer of them.
+
+    """
+    if not is_spread(value):
+        return [value] * n
+    if "each" in value:
+        if not isinstance(value["each"], list) or len(value["each"]) != n:
+            raise InputError(f"{name}: each takes a list of {n} values, one for each component")
+        return list(value["each"])
+    first, step = value["first"], value["step"]
+    if not (is_finite(first) and is_finite(step)):
+        raise InputError(f"{name}: first and step must be finite numbers")
+    return [first + step * k for k in range(n)]
+
+
 def _several(value: object) -> list[Any] | None:
     """The values of a list, which a command line writes with commas; None: it is one value."""
     if isinstance(value, str):
@@ -323,7 +375,7 @@ def _several(value: object) -> list[Any] | None:
     return list(value) if isinstance(value, list | tuple) else None
 
 
-def _can_feed(source: ModelVariable, target: ModelVariable) -> bool:
+def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
     """Whether a variable takes all values of another, and none is lost on the way."""
     start, end = TYPES[source.type], TYPES[target.type]
     if start.family not in (end.family, *_FED_FROM.get(end.family, ())):
@@ -354,53 +406,3 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
                     f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
                     f"FMI type {fmi_type} cannot hold"
                 )
-
-
-def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | None:
-    """The inputs that nothing feeds or sets, in words, with wires that could feed them.
-
-    Args:
-        system: that is looked at.
-        settled: inputs that are set during a run.
-
-    Returns:
-        One line; None: there is no such input.
-
-    """
-    fed = {connection.target for connection in system.connections}
-    feeding = {
-        (connection.source.component, connection.target.port) for connection in system.connections
-    }
-    taken = {*fed, *system.parameters, *system.left_open, *settled}
-    labels: list[str] = []
-    wires: list[str] = []
-    for name, component in system.components.items():
-        groups: dict[str, list[ModelVariable]] = {}
-        for variable in component.having("input"):
-            groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
-        for group, members in groups.items():
-            found = [v for v in members if PortName(name, v.name) not in taken]
-            if not group or len(found) < len(members):
-                labels += [f"{name}.{variable.name}" for variable in found]
-                continue
-            labels.append(f"{name}.{group}.*")
-            # What feeds the same inputs of another component is that one's.
-            sources = [
-                other
-                for other, source in system.components.items()
-                if other != name
-                and all(_could_feed(source, variable) for variable in members)
-                and not any((other, variable.name) in feeding for variable in members)
-            ]
-            if len(sources) == 1:
-                wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')
-    if not labels:
-        return None
-    wanted = f"; wire {listed(wires)}" if wires else ""
-    return f"nothing feeds or sets {listed(labels)}{wanted}"
-
-
-def _could_feed(source: Component, variable: ModelVariable) -> bool:
-    """Whether a component has an output of the name and type of an input."""
-    output = source.variables.get(variable.name)
-    return output is not None and output.causality == "output" and _can_feed(output, variable)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,13 +21,16 @@ from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.reducers import (
     LAST_SECONDS,
+    SMALLEST_DISTANCE,
     Fold,
     LargestOfTheEnd,
     LoopRows,
     first,
+    for_distances,
     largest,
     last,
     size,
+    smallest_distances,
     total,
 )
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
@@ -248,24 +252,22 @@ def metrics() -> tuple[Index, ...]:
 
 def index_columns(loops: Sequence[Loop] = (STANDARD,)) -> tuple[str, ...]:
     """The columns of all indices in a study; of several loops, after the names of the vehicles."""
-    return tuple(
+    of_each = (
         f"{prefix}{column}"
         for _, prefix in _prefixed(loops)
         for index in INDICES
         for column in index.columns
     )
+    return (*of_each, *([SMALLEST_DISTANCE] if len(loops) > 1 else []))
 
 
 def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
     for loop in loops:
-        yield loop, f"{loop.vehicle}." if len(loops) > 1 else ""
+        yield loop, f"{loop.name}." if len(loops) > 1 else ""
 
 
 class Indices:
-    """An observer that computes indices on the way; it keeps no more than the last seconds.
-
-    Those whose columns a loop does not have are left out.
-    """
+    """An observer that computes the indices there are columns for; it keeps the last seconds."""
 
     def __init__(
         self, loops: Sequence[Loop] = (STANDARD,), chosen: Sequence[Index] | None = None
@@ -289,6 +291,9 @@ class Indices:
             loop: [index for index in self._chosen if not none.missing(*index.needs(loop))]
             for loop in self._loops
         }
+        has_distances = len(self._loops) > 1 and not none.missing(*for_distances(self._loops))
+        #: What there is of several vehicles together.
+        self.together = {SMALLEST_DISTANCE: inf} if has_distances else {}
         # Those that are made of the same share it.
         self._reducers = {
             loop: {index.reducer: index.reducer() for index in found}
@@ -297,10 +302,14 @@ class Indices:
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account."""
+        table = Table.of(self._header, np.vstack((self._last, rows)))
         for loop, reducers in self._reducers.items():
-            seen = LoopRows(self._header, loop, self._n, self._last, rows)
+            seen = LoopRows(loop, self._n, table, len(self._last))
             for reducer in reducers.values():
                 reducer.take(seen)
+        for name, before in self.together.items():
+            apart = smallest_distances(Table.of(self._header, rows), self._loops)
+            self.together[name] = min(before, float(apart.min()))
         self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])
         self._n += len(rows)
 
@@ -319,7 +328,7 @@ class Indices:
 
     def values(self) -> dict[str, float]:
         """The numbers of all loops, by their columns in a study."""
-        return {
+        return self.together | {
             f"{prefix}{column}": value
             for loop, prefix in _prefixed(self._loops)
             for found in [self.found(loop)]
@@ -350,12 +359,19 @@ class Metrics(Indices):
             "stop_time": self._end,
             "step": experiment.step,
             "order": experiment.order,
-            "parameters": changed_parameters(system, self._header),
+            # What differs from the FMUs' own.
+            "parameters": {
+                str(name): value
+                for name, value in {**self._header.parameters, **system.parameters}.items()
+                if value != system.component(name.component).start(name.port)
+            },
         }
         if self._failure is not None:
             content["failure"] = self._failure
-        of = {loop.vehicle: self._of(loop, system) for loop in self._loops}
-        return content | (next(iter(of.values())) if len(of) == 1 else {VEHICLES: of})
+        of = {loop.name: self._of(loop, system) for loop in self._loops}
+        if len(of) == 1:
+            return content | next(iter(of.values()))
+        return content | self.together | {VEHICLES: of}
 
     def _of(self, loop: Loop, system: System) -> dict[str, Any]:
         found = self.found(loop)
@@ -382,12 +398,3 @@ def metrics_of(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> Metrics:
     found.take(table.rows)
     found.end(table.ending)
     return found
-
-
-def changed_parameters(system: System, header: Header) -> dict[str, Any]:
-    """Values of parameters, and of inputs that were set, that differ from the FMU's defaults."""
-    return {
-        str(name): value
-        for name, value in {**header.parameters, **system.parameters}.items()
-        if value != system.component(name.component).start(name.port)
-    }

@@ -6,6 +6,7 @@ Certificates are computed from the true state of the vehicle, which the controll
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +98,7 @@ def gain_check(system: System) -> str:
     for loop in loops:
         found = theorem_of(system, loop)
         if len(loops) > 1:
-            lines += [f"{loop.vehicle}:", ""]
+            lines += [f"{loop.name}:", ""]
         lines += [*stated(found), "", _NOTE, "", *_sampling(system, loop)]
         if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
             lines += ["", _PAPER]
@@ -164,11 +165,17 @@ def _sampling(system: System, loop: Loop) -> list[str]:
 
 def missing_for_certificates(table: Table, loop: Loop = STANDARD) -> list[str]:
     """Ports and parameters of the proposed controller and the vehicle that a run does not have."""
-    columns = (
+    return table.missing(
+        _columns(loop), (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell)
+    )
+
+
+def _columns(loop: Loop) -> tuple[str, ...]:
+    """The columns that certificates follow from."""
+    return (
         *loop.posture, *loop.dy, *loop.seen_y_d, *loop.seen_dy_d, *loop.y_hat, *loop.dy_hat,
         *loop.z, *loop.tau,
     )  # fmt: skip
-    return table.missing(columns, (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell))
 
 
 def _gains(loop: Loop) -> tuple[str, ...]:
@@ -237,15 +244,19 @@ class CertificatesFile:
     def begin(self, header: Header) -> None:
         """Find out whether there will be certificates."""
         self._every = every(self._interval, header)
-        self._header = header
-        self._last = np.empty((0, 1 + len(header.columns)))
-        self._is_possible = not missing_for_certificates(Table.of(header, self._last), self._loop)
+        table = Table.of(header, np.empty((0, 1 + len(header.columns))))
+        self._is_possible = not missing_for_certificates(table, self._loop)
+        columns = _columns(self._loop) if self._is_possible else ()
+        # Rows of many vehicles are long.
+        self._places = [0, *(header.place[name] for name in columns)]
+        self._header = replace(header, columns=columns)
+        self._last = np.empty((0, len(self._places)))
 
     def take(self, rows: np.ndarray) -> None:
         """Write the certificates of the steps that end at these rows."""
         if not self._is_possible:
             return
-        rows = np.vstack((self._last, rows))
+        rows = np.vstack((self._last, rows[:, self._places]))
         self._last = rows[-1:]
         starts, ends = rows[:-1], rows[1:]
         if self._every is not None and len(starts):

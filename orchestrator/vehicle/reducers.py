@@ -1,20 +1,30 @@
-"""What indices are made of: rows of one loop, and reducers that take them block by block."""
+"""What indices are made of: rows of one loop, and reducers that take them block by block.
+
+Of several vehicles together there is one index, the smallest distance between them.
+"""
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
+from itertools import combinations
 from operator import itemgetter
 
 import numpy as np
 
-from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.signals import Loop, limits, tracking_error
+from orchestrator.vehicle.signals import Loop, Needs, limits, tracking_error
 
 #: T_L of section 4.2 [s].
 LAST_SECONDS = 5.0
+
+#: The index of several vehicles: its name in files, and in words.
+SMALLEST_DISTANCE = "smallest_distance"
+SMALLEST_DISTANCE_LABEL = "smallest distance between vehicles"
+
+#: So many numbers are compared at once.
+_AT_ONCE = 1_000_000
 
 
 class LoopRows:
@@ -27,16 +37,20 @@ class LoopRows:
 
     """
 
-    def __init__(
-        self, header: Header, loop: Loop, number: int, before: np.ndarray, rows: np.ndarray
-    ) -> None:
-        """Take rows, and the one before them, if there is one."""
+    def __init__(self, loop: Loop, number: int, table: Table, new: int) -> None:
+        """Take rows.
+
+        Args:
+            loop: whose signals count.
+            number: of the first of them in the run.
+            table: of these rows, which begins with the one before them, if there is one.
+            new: how many there are before them, 0 or 1.
+
+        """
         self.loop, self.number = loop, number
-        self.half = 0.5 * header.experiment.stop_time
-        self._header, self._rows = header, np.vstack((before, rows))
-        self._table = Table.of(header, self._rows)
+        self.half = 0.5 * table.header.experiment.stop_time
+        self._table, self._new = table, new
         self._groups: dict[tuple[str, ...], np.ndarray] = {}
-        self._new = len(before)
 
     @property
     def time(self) -> np.ndarray:
@@ -67,8 +81,8 @@ class LoopRows:
 
     def errors(self, wanted: np.ndarray | slice = slice(None)) -> np.ndarray:
         """y - y_d with the true control point, in all rows or in some [m]."""
-        rows = self._rows[self._new :][wanted]
-        return tracking_error(Table.of(self._header, rows), self.loop)
+        rows = self._table.rows[self._new :][wanted]
+        return tracking_error(Table.of(self._table.header, rows), self.loop)
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -177,3 +191,34 @@ def size(vectors: np.ndarray) -> np.ndarray:
         squares = squares + column * column
     norm: np.ndarray = np.sqrt(squares)
     return norm
+
+
+def for_distances(loops: Sequence[Loop]) -> Needs:
+    """What distances between vehicles follow from."""
+    return [column for loop in loops for column in loop.position], ()
+
+
+def distances(table: Table, loops: Sequence[Loop]) -> dict[tuple[str, str], np.ndarray]:
+    """Distance between the centres of mass of each two vehicles, by their names, per row [m]."""
+    return {
+        (one.name, other.name): size(table.group(*one.position) - table.group(*other.position))
+        for one, other in combinations(loops, 2)
+    }
+
+
+def smallest_distances(table: Table, loops: Sequence[Loop]) -> np.ndarray:
+    """Distance between the two vehicles that are closest to each other, per row [m]."""
+    positions = np.stack([table.group(*loop.position) for loop in loops], axis=1)
+    rows = max(1, _AT_ONCE // len(loops))
+    blocks = np.split(positions, range(rows, len(table), rows))
+    return np.concatenate([_smallest(block) for block in blocks])
+
+
+def _smallest(positions: np.ndarray) -> np.ndarray:
+    """The smallest distance of each row, (rows, vehicles, 3)."""
+    squares = np.full(len(positions), np.inf)
+    for i in range(1, positions.shape[1]):
+        apart = positions[:, i:] - positions[:, :-i]
+        squares = np.minimum(squares, (apart**2).sum(axis=2).min(axis=1, initial=np.inf))
+    smallest: np.ndarray = np.sqrt(squares)
+    return smallest

@@ -76,6 +76,11 @@ class Loop:
     vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))
 
     @property
+    def name(self) -> str:
+        """What the vehicle is called: `auv1`, where `auv1.plant` is its component."""
+        return self.vehicle.removesuffix(f".{type(self).vehicle}")
+
+    @property
     def limits(self) -> tuple[str, ...]:
         """All parameters of (3)."""
         return (*self.lower_limits, *self.upper_limits)
@@ -150,7 +155,7 @@ def suffixes(loops: Sequence[Loop]) -> dict[Loop, str]:
         return {loops[0]: ""}
     found: dict[Loop, str] = {}
     for loop in loops:
-        found[loop] = f"-{file_name(loop.vehicle, [name[1:] for name in found.values()])}"
+        found[loop] = f"-{file_name(loop.name, [name[1:] for name in found.values()])}"
     return found
 
 

@@ -23,6 +23,9 @@ from auv_fmu.vectors import Rotation, Vector3, Vector4, Vector6
 _NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
 _UNDISTURBED: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+#: Acceleration of the water [m/s2]: the loop of Fig. 2 has only a constant current.
+_STEADY: Vector3 = (0.0, 0.0, 0.0)
+
 
 class LongestSteps(NamedTuple):
     """Largest internal step of each component [s]; a longer step is split evenly."""
@@ -130,7 +133,7 @@ def move(
     _, rotation, planner, moving = vehicles
     water, n, n_d = setting.plant.current, parts.plant, parts.planner
     state, rotation = plant.steps(
-        setting.plant, vehicles.plant, rotation, tau, tau_w, water, h / n, n
+        setting.plant, vehicles.plant, rotation, tau, tau_w, water, _STEADY, h / n, n
     )
     planner, moving = motion_planner.steps(setting.planner, planner, moving, h / n_d, n_d)
     return Vehicles(state, rotation, planner, moving)

@@ -259,7 +259,7 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
         raise ImpossiblePath(
             f"at ({x:.3g}, {y:.3g}, {z:.3g}) m the path turns at {sqrt(r * r + q * q):.3g} rad/s "
             f"with {speed:.3g} m/s: more tightly than the vehicle's control point can, {ell:g} m "
-            f"ahead; raise rounding"
+            f"ahead; turn more widely, with a longer rounding"
         )
     u = (B + sqrt(B * B - A * C)) / A
     v, w = -sway * u, heave * u
@@ -465,22 +465,62 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
 
 def _check_moment(parameters: Parameters, number: int, moment: Reference) -> None:
     """Refuse a moment that asks for too much, near the waypoint of a number."""
-    _, vehicle, ell, (least, most), speed_max, turn_max = parameters
-    speed, turn, (tau_u, tau_q, tau_r) = demand(vehicle, ell, moment)
-    y_d = moment.y_d
-    _hold("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
-    _hold("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
-    _hold("a surge force", tau_u, least[0], most[0], "N", number, y_d)
-    _hold("a moment in pitch", tau_q, least[1], most[1], "N.m", number, y_d)
-    _hold("a moment in yaw", tau_r, least[2], most[2], "N.m", number, y_d)
+    _, vehicle, ell, limits, speed_max, turn_max = parameters
+    asked = demand(vehicle, ell, moment)
+    hold_moment(asked, limits, speed_max, turn_max, number, moment.y_d)
 
 
-def _hold(
+def hold_moment(
+    asked: Demand, limits: Limits, speed_max: float, turn_max: float, number: int, y_d: Vector3
+) -> None:
+    """Refuse a moment that asks for too much.
+
+    Args:
+        asked: of the vehicle.
+        limits: of its actuators.
+        speed_max: that is let pass [m/s].
+        turn_max: that is let pass [rad/s].
+        number: of the waypoint near which that is, from 1; 0: there are none.
+        y_d: the control point [m].
+
+    Raises:
+        ImpossiblePath: it asks for more than a limit.
+
+    """
+    speed, turn, (tau_u, tau_q, tau_r) = asked
+    least, most = limits
+    hold_bounds("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
+    hold_bounds("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
+    hold_bounds("a surge force", tau_u, least[0], most[0], "N", number, y_d)
+    hold_bounds("a moment in pitch", tau_q, least[1], most[1], "N.m", number, y_d)
+    hold_bounds("a moment in yaw", tau_r, least[2], most[2], "N.m", number, y_d)
+
+
+def hold_bounds(
     what: str, asked: float, least: float, most: float, unit: str, number: int, y_d: Vector3
 ) -> None:
-    """Refuse what is out of bounds."""
+    """Refuse what is out of bounds.
+
+    Args:
+        what: is asked for.
+        asked: how much of it.
+        least, most: its bounds.
+        unit: of these.
+        number: of the waypoint near which that is, from 1; 0: there are none.
+        y_d: the control point [m].
+
+    Raises:
+        ImpossiblePath: it is.
+
+    """
     if not least <= asked <= most:
         limit = least if asked < least else most
+        if number == 0:
+            raise ImpossiblePath(
+                f"at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m the reference asks for {what} of "
+                f"{asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of {limit:.3g}; "
+                f"lead more slowly or in wider turns, or take a place nearer to the leader"
+            )
         raise ImpossiblePath(
             f"near waypoint {number:d}, at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m, the path "
             f"asks for {what} of {asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of "

@@ -132,7 +132,7 @@ def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantStat
     """The same motion over ground, in water that moves at another velocity.
 
     Water whose velocity changes at an instant changes the velocity through the water, as a vehicle
-    with a mass keeps its own.
+    with a mass keeps its own. What :func:`carried` knows of the change is no longer part of it.
 
     Args:
         state: of the vehicle, in whatever water it has been.
@@ -146,6 +146,37 @@ def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantStat
         return state
     nu_r = over_ground(state.nu_r, rotation, change)
     return PlantState(state.position, state.quaternion, nu_r, state.tau, water)
+
+
+def carried(state: PlantState, dwater: Vector3, h: float) -> PlantState:
+    """The state after a step in which the water has speeded up, from that after a step without.
+
+    Water that speeds up takes a neutrally buoyant vehicle along, as it would take itself. With the
+    mass m of the vehicle and of the water that it displaces, the added mass A and the acceleration
+    a of the water, both forces of the water (Froude-Krylov m a, added mass A (a - dv/dt)) give
+
+        m dv/dt = m a + A (a - dv/dt) + ...,   so   (m + A) d(v - water)/dt = ...
+
+    So (2) holds for the velocity through the water as in still water, and m + A, which is the M of
+    (2), need not be known in its parts. Only the velocity over ground changes, by that of the
+    water: over the step by h a, and the position by h^2 a / 2 more.
+
+    Args:
+        state: of the vehicle after the step, with the water as it was at the beginning.
+        dwater: acceleration of the water [m/s2], earth frame.
+        h: step [s].
+
+    """
+    a_x, a_y, a_z = dwater
+    if not (a_x or a_y or a_z):
+        return state
+    return PlantState(
+        plus_scaled(state.position, 0.5 * h * h, dwater),
+        state.quaternion,
+        state.nu_r,
+        state.tau,
+        plus_scaled(state.water, h, dwater),
+    )
 
 
 def accelerations_6dof(
@@ -362,6 +393,7 @@ def steps(
     tau: Vector3,
     tau_w: Vector6,
     water: Vector3,
+    dwater: Vector3,
     h: float,
     n: int,
 ) -> tuple[PlantState, Rotation]:
@@ -372,21 +404,23 @@ def steps(
         state, rotation: at the beginning.
         tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
-        water: velocity of the water [m/s], earth frame.
+        water: velocity of the water at the beginning of each of them [m/s], earth frame.
+        dwater: its acceleration [m/s2], earth frame.
         h: step [s].
         n: how many.
 
     """
     T_u, T_q, T_r = parameters.T
     acting = Drive(tau, tau, tau, tau)
-    state = immersed(state, rotation, water)
     while n > 0:
+        state = immersed(state, rotation, water)
         if T_u or T_q or T_r:
             acting = drive(state.tau, tau, parameters.T, h)
         if parameters.integrator == RK4:
             state = step_rk4(parameters, state, rotation, acting, tau_w, h)
         else:
             state = step(parameters, state, rotation, acting, tau_w, h)
+        state = carried(state, dwater, h)
         rotation = rotation_from_quaternion(state.quaternion)
         n -= 1
     return state, rotation

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Sequence
-from ctypes import CDLL, Structure, byref, c_char, c_char_p, c_double, c_int
+from ctypes import CDLL, Array, Structure, byref, c_char, c_char_p, c_double, c_int
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
 from types import ModuleType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
 from fmus.discovery import components, source_of
 from fmus.native.translator import translated
+from fmus.ports.groups import count_values, hints_of, is_record, parts_of
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = ROOT / "fmus/native/runtime"
@@ -51,6 +52,11 @@ class Error(Structure):
     _fields_ = (("raised", c_int), ("why", c_char * WHY))
 
 
+def is_series(kind: Any) -> bool:
+    """Whether a type is a tuple, a vector or a matrix, the parts of which have no names."""
+    return parts_of(kind) is not None and not is_record(kind)
+
+
 @cache
 def structure(kind: Any) -> Any:
     """A type of the equations as ctypes has it."""
@@ -58,11 +64,26 @@ def structure(kind: Any) -> Any:
         return c_double
     if kind in (int, bool):
         return c_int
-    if get_origin(kind) is tuple:
-        parts = [(f"x{i}", structure(k)) for i, k in enumerate(get_args(kind))]
+    if is_series(kind):
+        parts = [(f"x{i}", structure(k)) for i, k in enumerate(parts_of(kind) or ())]
     else:
-        parts = [(name, structure(k)) for name, k in get_type_hints(kind).items()]
+        parts = [(name, structure(k)) for name, k in hints_of(kind).items()]
     return type("Part", (Structure,), {"_fields_": parts})
+
+
+@cache
+def series(kind: Any) -> Any:
+    """A type as states and outputs are kept: all its numbers as doubles."""
+    parts = hints_of(kind).values() if isinstance(kind, type) else [kind]
+    size = sum(map(count_values, parts))
+    return type("Series", (Structure,), {"_fields_": [("v", c_double * size)]})
+
+
+def listed(kind: Any, value: Any) -> Any:
+    """A value as states and outputs are kept."""
+    made = series(kind)()
+    made.v[:] = flat(value)
+    return made
 
 
 def filled(kind: Any, value: Any) -> Any:
@@ -70,7 +91,8 @@ def filled(kind: Any, value: Any) -> Any:
     made = structure(kind)
     if not issubclass(made, Structure):
         return made(value)
-    kinds = get_args(kind) if get_origin(kind) is tuple else get_type_hints(kind).values()
+    kinds = parts_of(kind) if is_series(kind) else hints_of(kind).values()
+    assert kinds is not None
     values = value.values() if isinstance(value, dict) else value
     return made(*(filled(k, v) for k, v in zip(kinds, values, strict=True)))
 
@@ -79,6 +101,8 @@ def flat(value: Any) -> list[float]:
     """All numbers of a value, of a structure of ctypes or of a tuple."""
     if isinstance(value, Structure):
         value = [getattr(value, name) for name, *_ in value._fields_]
+    elif isinstance(value, Array):
+        value = list(value)
     elif isinstance(value, dict):
         value = value.values()
     if isinstance(value, (float, int)):
@@ -99,23 +123,20 @@ class Equations:
         subprocess.run([*command, "-o", library, folder / "shim.c", "-lm"], check=True)
         self.library = CDLL(str(library))
         self.library.restarted.restype = c_char_p
-        hints = {
-            **get_type_hints(self.behaviour.begin),
-            **get_type_hints(self.behaviour.advance),
-        }
+        hints = {**hints_of(self.behaviour.begin), **hints_of(self.behaviour.advance)}
         self.parameters, self.state = hints["parameters"], hints["state"]
         self.inputs = hints.get("inputs", tuple[()])
         self.derived = hints.get("derived")
         self.outputs = self.behaviour.Outputs
-        kinds = [self.state, self.derived] if self.derived else [self.state]
-        parts = [(f"x{i}", structure(kind)) for i, kind in enumerate(kinds)]
+        derived = [structure(self.derived)] if self.derived else []
+        parts = [(f"x{i}", kind) for i, kind in enumerate([series(self.state), *derived])]
         self._kept = type("Kept", (Structure,), {"_fields_": parts})
 
     def kept(self, state: Any = None) -> Any:
         """The state as the component keeps it: what is derived from it is not filled in."""
         made = self._kept()
         if state is not None:
-            made.x0 = filled(self.state, state)
+            made.x0 = listed(self.state, state)
         return made
 
     def result(self, name: str, *arguments: Any) -> int:

@@ -19,8 +19,9 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names
 from orchestrator.runs.simulate import simulate
 from orchestrator.system.component import read_component
+from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System, unfed_inputs
+from orchestrator.system.structure import Connection, System
 from support.others import build
 
 SCENARIO = """

@@ -54,6 +54,7 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
     both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", before.tau_w)
     group("disturbance.nu", "uvwpqr", before.scene.plant.nu_r)
     group("plant.water", XYZ, (0.0, 0.0, 0.0))
+    group("plant.dwater", XYZ, (0.0, 0.0, 0.0))
     group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*vehicle.position, *seen.euler))
     group("plant.nu", "uvwpqr", seen.nu)
     group("plant.nu_r", "uvwpqr", seen.nu_r)

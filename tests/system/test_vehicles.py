@@ -117,7 +117,8 @@ def test_each_vehicle_is_drawn(results):
             f"two-{name}{part}.{kind}" for part in ("", "-velocity") for kind in ("png", "svg")
         )
         assert names.issuperset(figures)
-    assert "two.png" not in names
+    # Both together have one, and no second of what is of one vehicle.
+    assert "two.png" in names and "two-velocity.png" not in names
     # What is drawn of one is not drawn of the other.
     assert (
         len({(results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow")}) == 2
@@ -153,3 +154,134 @@ def test_a_study_has_columns_of_each(results, tmp_path):
     assert len(set(result["plant.l2_effort.u"])) == 1
     assert len(set(result["tow.l2_effort.u"])) == 2
     assert np.isfinite(result["tow.late_error"]).all()
+
+
+# Vehicles that a scenario counts
+
+
+@pytest.mark.parametrize("kind", ["native", "python"])
+def test_one_vehicle_of_a_fleet_has_the_numbers_of_the_single_loop(kind):
+    single = simulate("fig4", stop_time=2.0, kind=kind)
+    of_fleet = simulate({"vehicles": 1}, stop_time=2.0, kind=kind)
+    assert of_fleet.columns == tuple(f"auv1.{name}" for name in single.columns)
+    assert (of_fleet.rows == single.rows).all()
+
+
+def test_each_vehicle_of_a_fleet_has_the_numbers_that_it_has_alone():
+    seeds = {"auv*.plant.noise.seed": {"first": 5, "step": 1}}
+    three = simulate({"vehicles": 3, "parameters": seeds}, stop_time=1.0, kind="native")
+    for number in (1, 2, 3):
+        alone = simulate("fig4", {"plant.noise.seed": 4 + number}, stop_time=1.0, kind="native")
+        for name in alone.columns:
+            assert (three[f"auv{number}.{name}"] == alone[name]).all()
+
+
+FLEET = """
+vehicles = 3
+figure = "comparison"
+compare = "fleet-pd.toml"
+stop_time = 2.0
+
+[components]
+lead = "MotionPlanner"
+"auv1.disturbance" = false
+
+[wires]
+"auv*.controller.y_d" = "lead.y_d"
+
+[parameters]
+"auv*.plant.eta0.y" = { first = 6.0, step = 4.0 }
+auv2.controller.eps_t = 3.0
+
+[[events]]
+at = 1.0
+override = { "auv*.controller.tau.u" = 0.0 }
+"""
+
+FLEET_PD = """
+label = "PD"
+vehicles = 3
+
+[components]
+"auv*.controller" = "PdController"
+
+[wires]
+"auv*.controller.dy" = "auv*.plant.dy"
+"""
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("fleet")
+    (folder / "fleet.toml").write_text(FLEET, encoding="utf-8")
+    (folder / "fleet-pd.toml").write_text(FLEET_PD, encoding="utf-8")
+    return folder
+
+
+def test_a_star_in_a_scenario_is_each_vehicle(fleet):
+    system = load(fleet / "fleet.toml", "native")
+    wires = {str(wire.target): str(wire.source) for wire in system.connections}
+    for number in (1, 2, 3):
+        vehicle = f"auv{number}"
+        assert wires[f"{vehicle}.controller.y_d.x"] == "lead.y_d.x"
+        assert wires[f"{vehicle}.controller.dy_d.x"] == f"{vehicle}.planner.dy_d.x"
+        y = PortName(f"{vehicle}.plant", "eta0.y")
+        assert system.value(y) == 2.0 + 4.0 * number
+    assert "auv1.disturbance" not in system.components
+    assert "auv1.plant.tau_w.u" not in wires and "auv2.plant.tau_w.u" in wires
+    assert [loop.name for loop in loops_of(system)] == ["auv1", "auv2", "auv3"]
+    assert loops_of(system)[1] == Loop("auv2.plant", "auv2.controller", "lead", "auv2.disturbance")
+
+
+def test_a_fleet_is_compared_with_another_controller_in_its_place(fleet, tmp_path):
+    pytest.importorskip("matplotlib")
+    assert main(["run", str(fleet / "fleet.toml"), "--kind", "native", "--out", str(tmp_path)]) == 0
+    columns = [
+        path.read_text(encoding="utf-8").partition("\n")[0].split(",")
+        for path in (tmp_path / "result.csv", tmp_path / "fleet-pd" / "result.csv")
+    ]
+    assert "auv1.disturbance.tau_w.u" not in {*columns[0], *columns[1]}
+    assert "auv3.controller.dy.x" in columns[1] and "lead.y_d.x" in columns[1]
+    tables = [
+        np.genfromtxt(folder / "result.csv", delimiter=",", names=True, deletechars="")
+        for folder in (tmp_path, tmp_path / "fleet-pd")
+    ]
+    for table in tables:
+        is_after = table["time"] > 1.01
+        for number in (1, 2, 3):
+            assert (table[f"auv{number}.plant.tau.u"][is_after] == 0.0).all()
+        # Rows of positions of three vehicles, taken apart without the code under test.
+        places = np.array([[table[f"auv{i}.plant.eta.{k}"] for k in "xyz"] for i in (1, 2, 3)])
+        apart = [np.linalg.norm(places[i] - places[j], axis=0) for i, j in ((0, 1), (0, 2), (1, 2))]
+        folder = tmp_path if table is tables[0] else tmp_path / "fleet-pd"
+        metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+        assert metrics["smallest_distance"] == pytest.approx(np.min(apart), rel=1e-12)
+        assert metrics[VEHICLES].keys() == {"auv1", "auv2", "auv3"}
+    assert {"fleet.png", "fleet-auv1.png", "fleet-auv3.svg"} <= {p.name for p in tmp_path.iterdir()}
+
+
+def test_many_vehicles_have_only_one_figure_together(tmp_path, capsys):
+    many = tmp_path / "many.toml"
+    many.write_text("vehicles = 11\nstop_time = 0.1\n", encoding="utf-8")
+    assert main(["run", str(many), "--kind", "native", "--out", str(tmp_path / "out")]) == 0
+    assert {p.name for p in (tmp_path / "out").glob("*.png")} == {"many.png"}
+    assert "11 vehicles" in capsys.readouterr().err
+
+
+def test_values_of_each_vehicle_on_the_command_line_and_in_studies(fleet, tmp_path):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
+    from orchestrator import sweep  # noqa: PLC0415
+
+    study = {
+        "scenario": str(fleet / "fleet.toml"), "stop_time": 0.5,
+        "vary": {"auv*.controller.eps_t": [1.0, 30.0]},
+    }  # fmt: skip
+    result = sweep(study, kind="native", out=tmp_path / "s", workers=1)
+    assert list(result["auv*.controller.eps_t"]) == [1.0, 30.0]
+    assert len(set(result["auv3.total_variation.u"])) == 2
+    assert np.isfinite(result["smallest_distance"]).all()
+    same = simulate(
+        fleet / "fleet.toml", {"auv*.controller.eps_t": 30.0}, stop_time=0.5, kind="native"
+    )
+    varied = same.metrics()[VEHICLES]["auv3"]["total_variation"][0]
+    assert result["auv3.total_variation.u"][1] == varied

@@ -6,9 +6,10 @@ from pkgutil import walk_packages
 import pytest
 
 import auv_fmu
-from auv_fmu import control_point, euler, plant
+from auv_fmu import control_point, euler, formation, plant
 from auv_fmu.observer import EULER
 from auv_fmu.saturation import TANH
+from auv_fmu.waves import JONSWAP
 
 TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {
@@ -50,6 +51,7 @@ SECTION_4_1 = {
         "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
     },
     "path_planner.Parameters": {"ell": 0.35},
+    "formation.Parameters": {"ell": 0.35},
     "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
     "Setting": {"h": 0.02},
 }
@@ -71,6 +73,55 @@ OURS = {
         "rounding": 6.0,
     },
     "path_planner.Parameters": {"speed_max": 2.5, "turn_max": 4.0},
+    "Waves": {
+        "spectrum": JONSWAP,
+        "Hs": 1.0,
+        "Tp": 7.0,
+        "gamma": 3.3,
+        "highest": 4.0,
+        "direction": 0.0,
+        "s": 10.0,
+        "n": 32,
+        "seed": 1,
+    },
+    "Current": {
+        "speed": 0.1,
+        "direction": 0.0,
+        "root": 7.0,
+        "mu": 0.005,
+        "sigma": 0.02,
+        "seed": 1,
+    },
+    "Sea": {"depth": 50.0, "g": 9.81},
+    "Stages": {
+        "n": 1,
+        "shape": (formation.LINE,) * 4,
+        "spacing": (5.0,) * 4,
+        "x": ZERO_4,
+        "y": ZERO_4,
+        "z": ZERO_4,
+        "t": (30.0, 60.0, 90.0),
+        "duration": (20.0,) * 3,
+    },
+    "Estimator": {"lambda_": 0.5, "k_d": 0.5, "age_max": 4.0, "z_max": 2.0},
+    "formation.Parameters": {
+        "number": 2,
+        "vehicles": 3,
+        "omega_chi": 0.3,
+        "turn_chi": 0.2,
+        "estimated": False,
+        "speed_max": 2.5,
+        "turn_max": 4.0,
+    },
+    "acoustic_link.Parameters": {
+        "period": 1.0,
+        "sound_speed": 1500.0,
+        "latency": 0.2,
+        "loss": 0.0,
+        "seed": 1,
+        "outage_start": 0.0,
+        "outage_duration": 0.0,
+    },
 }
 
 

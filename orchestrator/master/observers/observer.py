@@ -12,6 +12,7 @@ from contextlib import AbstractContextManager, nullcontext
 from ctypes import Structure, c_size_t, c_void_p
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from functools import cached_property
 from importlib import import_module
 from importlib.util import find_spec
 from time import monotonic
@@ -51,6 +52,16 @@ class Header:
     loop: str = field(default="python", compare=False)
     standing: Mapping[str, Standing] = field(default_factory=dict, compare=False)
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
+
+    @cached_property
+    def place(self) -> Mapping[str, int]:
+        """Where each column is in a row, time first."""
+        return {name: i for i, name in enumerate(self.columns, start=1)}
+
+    @cached_property
+    def parameter_names(self) -> frozenset[str]:
+        """`component.name` of every parameter."""
+        return frozenset(map(str, self.parameters))
 
     def places(self) -> list[tuple[int, Standing]]:
         """Where these are in a row, time first, and what their numbers stand for."""

@@ -56,7 +56,6 @@ class Table:
 
     def _enter(self, header: Header, rows: np.ndarray) -> None:
         self.header, self._rows = header, rows
-        self._index = {name: i for i, name in enumerate(header.columns, start=1)}
 
     def begin(self, header: Header) -> None:
         """Make room for all rows."""
@@ -84,7 +83,7 @@ class Table:
 
     def __contains__(self, column: str) -> bool:
         """Whether there is a column `component.port`."""
-        return column == "time" or column in self._index
+        return column == "time" or column in self.header.place
 
     def __getitem__(self, column: str) -> np.ndarray:
         """The values of one column: texts of a String, integers of 64 bits, else doubles.
@@ -95,9 +94,9 @@ class Table:
         """
         if column == "time":
             return self.time
-        if column not in self._index:
-            raise KeyError(f"no column {column!r}{did_you_mean(str(column), self._index)}")
-        values = self.rows[:, self._index[column]]
+        if column not in self.header.place:
+            raise KeyError(f"no column {column!r}{did_you_mean(str(column), self.header.place)}")
+        values = self.rows[:, self.header.place[column]]
         standing = self.header.standing.get(column)
         if standing is None:
             return values
@@ -134,7 +133,7 @@ class Table:
 
     def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
         """The columns and parameters, `component.name`, that are wanted and not there."""
-        known = {*map(str, self.parameters)}
+        known = self.header.parameter_names
         return [column for column in columns if column not in self] + [
             name for name in parameters if name not in known
         ]

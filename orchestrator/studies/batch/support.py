@@ -29,6 +29,7 @@ Place = tuple[str | int, ...]
 
 #: Inputs of the plant that the loop leaves open.
 _WATER = [PortName("plant", f"water.{axis}") for axis in AXES]
+_SPEEDING_UP = [PortName("plant", f"dwater.{axis}") for axis in AXES]
 
 #: The controller that is told the velocity, and the wires for it.
 _TOLD = "PdController"
@@ -116,9 +117,12 @@ def setting_of(
         step: of the run [s].
 
     Raises:
-        InputError: a component would refuse a value.
+        InputError: a component would refuse a value, or the equations here have no place for it.
 
     """
+    for name in _SPEEDING_UP:
+        if parameters.get(name):
+            raise InputError(f"{name}: the water of the batch engine does not speed up; leave it 0")
     components = {name: _COMPONENTS[fmu] for name, fmu in fmus.items()}
     sets = {name: component.starts for name, component in components.items()}
     longest: dict[str, Any] = {}

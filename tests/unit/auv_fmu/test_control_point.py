@@ -91,7 +91,8 @@ def test_velocity_is_the_derivative_of_the_position_of_a_vehicle_that_rolls_in_a
     state, rotation = begin(parameters, undriven, current)
 
     def moved_y(dt):
-        moved = steps(parameters, state, rotation, undriven, (0.0,) * 6, current, dt, 1)
+        still = (0.0,) * 6, current, (0.0,) * 3
+        moved = steps(parameters, state, rotation, undriven, *still, dt, 1)
         return outputs(*moved, 0.35, True).y
 
     difference = np.subtract(moved_y(h), moved_y(-h)) / (2 * h)

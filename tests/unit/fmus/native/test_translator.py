@@ -10,17 +10,22 @@ from ctypes import byref, c_double, c_ulong
 from importlib import import_module
 from pathlib import Path
 from random import Random
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_origin
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.sea import Sea
+from auv_fmu.waves import MOST as MOST_WAVES
+from auv_fmu.waves import SPECTRA, Waves
 from fmus.discovery import components, ports_of, source_of
 from fmus.native.shapes import strip_sphinx_marks
 from fmus.native.tables import tables
 from fmus.native.translator import translated
+from fmus.ports.groups import class_of, hints_of, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.callbacks import describe_error
 from support.equations import (
@@ -33,6 +38,9 @@ from support.equations import (
     equations,
     filled,
     flat,
+    is_series,
+    listed,
+    series,
     structure,
 )
 from support.settings import NAMES, behaviour_of, parameters_of
@@ -256,9 +264,10 @@ def value(kind: Any, random: Random, wild: float = 0.3) -> Any:
         return number(random) if random.random() < wild else random.uniform(-3.0, 3.0)
     if kind in (int, bool):
         return random.randrange(3 if kind is int else 2)
-    if get_origin(kind) is tuple:
-        return tuple(value(k, random, wild) for k in get_args(kind))
-    parts = {name: value(k, random, wild) for name, k in get_type_hints(kind).items()}
+    if is_series(kind):
+        numbers = tuple(value(k, random, wild) for k in parts_of(kind) or ())
+        return class_of(kind)(numbers) if get_origin(kind) is Annotated else numbers
+    parts = {name: value(k, random, wild) for name, k in hints_of(kind).items()}
     return parts if issubclass(kind, dict) else kind(**parts)
 
 
@@ -281,7 +290,7 @@ def test_begin(name, random):
     parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
     t = number(random)
     given = {"parameters": parameters, "inputs": inputs, "t": t}
-    state, outputs = both.kept(), structure(both.outputs)()
+    state, outputs = both.kept(), series(both.outputs)()
     why = both.call(
         "begin",
         filled(both.parameters, parameters),
@@ -302,7 +311,7 @@ def test_advance(name, random):
     state = value(both.state, random, wild)
     t, h, n = number(random), random.random(), random.randrange(1, 5)
     given = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": n}
-    kept, outputs = both.kept(state), structure(both.outputs)()
+    kept, outputs = both.kept(state), series(both.outputs)()
     why = both.call("derive", filled(both.parameters, parameters), kept)
     if both.derived:
         derived = raised(lambda: both.python("derive", **given))
@@ -332,12 +341,12 @@ def test_expected(name, random):
     outputs = value(both.outputs, random, wild)
     if hasattr(state, "quaternion") and random.random() < 0.5:
         state = state._replace(quaternion=(0.6, 0.0, 0.8, 0.0))
-    found = structure(both.outputs)()
+    found = series(both.outputs)()
     why = both.call(
         "expected",
         filled(both.parameters, parameters),
         both.kept(state),
-        filled(both.outputs, outputs),
+        listed(both.outputs, outputs),
         found,
     )
     given = {"parameters": parameters, "state": state, "outputs": outputs}
@@ -383,12 +392,53 @@ def test_paths_are_refused_alike(random, n, timed):
     assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
 
 
+@given(
+    random=randoms,
+    spectrum=st.sampled_from([*SPECTRA.values()]),
+    n=st.integers(1, MOST_WAVES),
+    depth=st.sampled_from((0.0, 2.0, 30.0, 6000.0)),
+)
+def test_seas_are_alike(random, spectrum, n, depth):
+    """Such as a user may want, at places above the surface, in the water and in the bottom."""
+    both = equations("Sea")
+    parameters = Sea(
+        Waves(
+            spectrum,
+            Hs=random.uniform(0.0, 10.0),
+            Tp=random.uniform(2.0, 20.0),
+            gamma=random.uniform(1.0, 7.0),
+            direction=random.uniform(-4.0, 4.0),
+            s=random.choice((0.0, random.uniform(0.0, 100.0))),
+            n=n,
+            seed=random.randrange(-(2**31), 2**31),
+        ),
+        Current(speed=random.uniform(0.0, 3.0), seed=random.randrange(-(2**31), 2**31)),
+        depth=depth,
+    )
+    given = filled(both.parameters, parameters)
+    why = both.call("check", given)
+    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+    kept, outputs, t = both.kept(), structure(both.outputs)(), random.uniform(0.0, 1e5)
+    inputs = both.inputs((random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), 0.0))
+    assert not both.call("begin", given, filled(both.inputs, inputs), t, kept, outputs)
+    state, derived, seen = both.python("begin", parameters=parameters, inputs=inputs, t=t)
+    assert outcome([kept, outputs]) == outcome([[state, derived], seen])
+    for _ in range(3):
+        h, z = random.uniform(0.0, 10.0), random.uniform(-5.0, 40.0)
+        inputs = both.inputs((*inputs.eta[:2], z))
+        arguments = {"parameters": parameters, "state": state, "derived": derived}
+        assert not both.call("advance", given, kept, filled(both.inputs, inputs), t, h, 1, outputs)
+        state, derived, seen = both.python("advance", **arguments, inputs=inputs, t=t, h=h)
+        assert outcome([kept, outputs]) == outcome([[state, derived], seen])
+        t += h
+
+
 @given(random=randoms)
 def test_noise_of_the_localisation(random):
     both, wild = equations("AuvPlant"), 0.3
     parameters, outputs = value(both.parameters, random, wild), value(both.outputs, random, wild)
     n = value(tuple[float, float, float], random, wild)
-    passed = filled(both.outputs, outputs)
+    passed = listed(both.outputs, outputs)
     given = filled(both.parameters, parameters)
     both.library.measure(byref(given), (c_double * 3)(*n), byref(passed), byref(Error()))
     measured = both.behaviour.measured(parameters, outputs["y"], n)

@@ -222,7 +222,8 @@ def test_fault_is_that_of_the_state_that_is_restored(driver):
 
 def test_outputs_before_the_initialisation_are_refused(driver):
     fresh = dict(driver.component(instance_name="fresh")._get_fmu_state())
-    driver.slave._set_fmu_state({**fresh, "outputs": [1.0] * len(fresh["outputs"])})
+    ones = [type(value)(1) for value in fresh["outputs"]]
+    driver.slave._set_fmu_state({**fresh, "outputs": ones})
     assert driver.messages() == ["state refused: it has steps, or outputs, without a state"]
 
 

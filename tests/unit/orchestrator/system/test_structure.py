@@ -137,3 +137,56 @@ def test_array_without_dimensions_is_one_value(several):
     )
     with pytest.raises(InputError, match="a list of 3 values"):
         several.with_parameters({port_name("a.b.v"): np.array(2.0)})
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> System:
+    """Three components of a name in systems of their own, and one that has it by itself."""
+    parameters = [variable(name, "parameter") for name in ("k", "v[1]", "v[2]")]
+    path = fmu(tmp_path_factory.mktemp("fleet") / "a.fmu", *parameters)
+    names = ("auv1.a", "auv2.a", "auv10.a", "a", "auv1.b.a")
+    return System("s", {name: read_component(name, path) for name in names}, ())
+
+
+@pytest.mark.parametrize(
+    ("values", "k"),
+    [
+        ({"auv*.a.k": 3.0}, {"auv1.a": 3.0, "auv2.a": 3.0, "auv10.a": 3.0}),
+        ({"auv2.a.k": 4.0, "auv*.a.k": 3.0}, {"auv1.a": 3.0, "auv2.a": 4.0, "auv10.a": 3.0}),
+        (
+            {"auv*.a.k": {"first": 1, "step": 0.5}},
+            {"auv1.a": 1.0, "auv2.a": 1.5, "auv10.a": 2.0},
+        ),
+        ({"auv*.a.k": {"each": [7, 8, 9]}}, {"auv1.a": 7.0, "auv2.a": 8.0, "auv10.a": 9.0}),
+        ({"*.b.a.k": 2.0}, {"auv1.b.a": 2.0}),
+        ({"*.k": 2.0}, {"a": 2.0}),
+    ],
+)
+def test_a_star_stands_for_a_part_of_a_component_s_name(fleet, values, k):
+    expected = {PortName(component, "k"): value for component, value in k.items()}
+    assert fleet.with_parameters(values).parameters == expected
+    assert fleet.with_parameters({port_name(n): v for n, v in values.items()}).parameters == (
+        expected
+    )
+
+
+def test_a_list_for_a_group_of_several_components_is_of_each(fleet):
+    found = fleet.with_parameters({"auv*.a.v": [1.0, 2.0]}).parameters
+    of_each = {PortName("auv2.a", "v[1]"): 1.0, PortName("auv2.a", "v[2]"): 2.0}
+    assert len(found) == 6 and of_each.items() <= found.items()
+    assert fleet.named(port_name("auv*.a.k")) == PortName("auv1.a", "k")
+    assert not fleet.has(port_name("auv*.c.k"))
+
+
+@pytest.mark.parametrize(
+    ("value", "said"),
+    [
+        ({"each": [1.0]}, "3 values"),
+        ({"each": 1.0}, "3 values"),
+        ({"first": "x", "step": 1.0}, "finite"),
+        ({"first": 1.0, "step": float("nan")}, "finite"),
+    ],
+)
+def test_values_of_several_components_must_be_as_many(fleet, value, said):
+    with pytest.raises(InputError, match=rf"auv\*\.a\.k.*{said}"):
+        fleet.with_parameters({"auv*.a.k": value})

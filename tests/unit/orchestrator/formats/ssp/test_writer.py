@@ -18,8 +18,9 @@ from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.component import read_component
+from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName, plain_file_names
-from orchestrator.system.structure import System, unfed_inputs
+from orchestrator.system.structure import System
 from support.archives import (
     archive,
     binding,

@@ -1,0 +1,1 @@
+"""Messages from one vehicle to another."""

@@ -1,0 +1,1 @@
+"""The reference of a vehicle in a formation."""

@@ -1,0 +1,1 @@
+"""Waves and a current at the vehicle."""

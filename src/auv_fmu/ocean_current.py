@@ -1,0 +1,105 @@
+"""An ocean current: a mean with a profile over depth, and a part that varies at random.
+
+The mean decreases from the surface to the bottom with a power of the height above the bottom, as
+DNV-RP-C205 describes tidal currents, with an exponent of 1/7. The random part is a Gauss-Markov
+process in each horizontal direction,
+
+    dv/dt + mu v = w,
+
+with white noise w, as Fossen (2021) describes the speed of a current. It is given by its standard
+deviation. Its exact solution is what a step takes, so steps of any length have the same statistics.
+"""
+
+from __future__ import annotations
+
+import math
+from math import cos, exp, expm1, sin, sqrt
+from typing import NamedTuple
+
+from auv_fmu.random_numbers import gaussian, start
+from auv_fmu.vectors import Vector3
+
+#: Stream of random numbers.
+_VARIATION = 3
+
+
+class Current(NamedTuple):
+    """A current; the defaults are a weak one that hardly varies."""
+
+    speed: float = 0.1  #: mean at the surface [m/s]
+    direction: float = 0.0  #: that it goes to, from north to east [rad]
+    root: float = 7.0  #: of the profile over depth; 0: the same at all depths
+    mu: float = 0.005  #: rate at which the variation is forgotten [1/s]
+    sigma: float = 0.02  #: standard deviation of the variation in each direction [m/s]
+    seed: int = 1  #: of the variation
+
+
+class Variation(NamedTuple):
+    """The random part of a current at the surface, and what its future is drawn from."""
+
+    north: float  #: [m/s]
+    east: float  #: [m/s]
+    random: float  #: state of the generator
+
+
+def begin(current: Current) -> Variation:
+    """The variation at the start, drawn from its stationary distribution.
+
+    Args:
+        current: parameters.
+
+    """
+    state, north = gaussian(start(current.seed, _VARIATION))
+    state, east = gaussian(state)
+    return Variation(current.sigma * north, current.sigma * east, state)
+
+
+def advance(current: Current, variation: Variation, h: float) -> Variation:
+    """The variation h seconds later.
+
+    Args:
+        current: parameters.
+        variation: before.
+        h: time [s].
+
+    """
+    if not h > 0.0:
+        return variation
+    kept = exp(-current.mu * h)
+    added = current.sigma * sqrt(-expm1(-2.0 * current.mu * h))
+    state, north = gaussian(variation.random)
+    state, east = gaussian(state)
+    return Variation(
+        kept * variation.north + added * north, kept * variation.east + added * east, state
+    )
+
+
+def profile(root: float, z: float, depth: float) -> float:
+    """The current at a depth, as a share of that at the surface.
+
+    Args:
+        root: 1 / exponent of the power law; 0: the current is the same at all depths.
+        z: depth below still water, from 0 to that of the bottom [m].
+        depth: of the water [m]; 0: it is deep, and the current the same at all depths.
+
+    """
+    if depth == 0.0 or root == 0.0:
+        return 1.0
+    return math.pow(1.0 - z / depth, 1.0 / root)
+
+
+def velocity(current: Current, variation: Variation, z: float, depth: float) -> Vector3:
+    """Velocity of the water [m/s], earth frame.
+
+    Args:
+        current, variation: mean and random part.
+        z: depth below still water, from 0 to that of the bottom [m].
+        depth: of the water [m]; 0: it is deep.
+
+    """
+    share = profile(current.root, z, depth)
+    return (
+        share * (current.speed * cos(current.direction) + variation.north),
+        share * (current.speed * sin(current.direction) + variation.east),
+        0.0,
+    )

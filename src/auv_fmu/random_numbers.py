@@ -1,0 +1,111 @@
+"""Random numbers in the language of equations: the minimal standard generator, in floats.
+
+x' = a x mod m with m = 2^31 - 1, after Park and Miller, "Random number generators: good ones are
+hard to find", Communications of the ACM 31 (1988), and with the multiplier a = 48271 that they
+recommended in 1993. C++ has the same generator as `std::minstd_rand`. a x is below 2^47, so floats
+hold it exactly, and Python and C give the same numbers on every platform.
+
+The state of a generator is a whole number from 1 to m - 1, to be kept in the state of a component:
+
+    state = start(seed, 1)
+    state, u = uniform(state)
+    state, n = gaussian(state)
+
+It is no generator for secrets, and it repeats after 2^31 - 2 numbers.
+"""
+
+from __future__ import annotations
+
+from math import cos, fmod, log, sqrt, tau
+
+#: m, the prime 2^31 - 1.
+MODULUS = 2147483647.0
+
+#: a, a primitive root of m.
+MULTIPLIER = 48271.0
+
+#: What splits a seed, and a state, into two halves.
+_HALF = 65536.0
+
+#: Makes every 32-bit integer positive.
+_SHIFT = 2147483648.0
+
+
+def after(state: float) -> float:
+    """The state after another one.
+
+    Args:
+        state: a whole number from 1 to m - 1.
+
+    """
+    return fmod(MULTIPLIER * state, MODULUS)
+
+
+def mixed(state: float) -> float:
+    """A state that is no linear function of another one.
+
+    The generator multiplies: from states that differ little, or by a small factor, come sequences
+    that belong together. A product of a state and its own lower half does not.
+
+    Args:
+        state: a whole number from 1 to m - 1.
+
+    """
+    k = 0
+    while k < 4:
+        state = fmod(after(state) * (1.0 + fmod(state, _HALF)), MODULUS)
+        k = k + 1
+    return state
+
+
+def start(seed: int, stream: int) -> float:
+    """The state of a generator at its start.
+
+    Args:
+        seed: any 32-bit integer; another one gives another sequence.
+        stream: from 0 to 32767; another one gives another sequence of the same seed, so that one
+            seed does for several purposes.
+
+    """
+    number = seed + _SHIFT
+    lower = fmod(number, _HALF)
+    upper = (number - lower) / _HALF
+    state = mixed(1.0 + lower)
+    state = mixed(fmod(state + upper, MODULUS - 1.0) + 1.0)
+    return mixed(fmod(state + stream, MODULUS - 1.0) + 1.0)
+
+
+def uniform(state: float) -> tuple[float, float]:
+    """The state after another one, and a number between 0 and 1, never 0 or 1.
+
+    Args:
+        state: a whole number from 1 to m - 1.
+
+    """
+    state = after(state)
+    return state, state / MODULUS
+
+
+def normal(u: float, v: float) -> float:
+    """A standard normal number from two that are uniform, after Box and Muller (1958).
+
+    Args:
+        u: decides the angle; between 0 and 1.
+        v: decides the radius; between 0 and 1. Of two numbers of one generator it is the later one:
+            the successor of a small number is a times it, and would always give the largest radii
+            the same angles.
+
+    """
+    return sqrt(-2.0 * log(v)) * cos(tau * u)
+
+
+def gaussian(state: float) -> tuple[float, float]:
+    """The state after two numbers, and a standard normal number made of them.
+
+    Args:
+        state: a whole number from 1 to m - 1.
+
+    """
+    state, u = uniform(state)
+    state, v = uniform(state)
+    return state, normal(u, v)

@@ -1,0 +1,85 @@
+"""Waves and a current in the loop of FMUs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auv_fmu import sea
+from auv_fmu.ocean_current import Variation
+from auv_fmu.sea import Sea
+from orchestrator.runs.scenario import read_scenario
+from orchestrator.runs.wiring import closed_loop
+from orchestrator.system.names import PortName
+from orchestrator.vehicle.signals import tracking_error
+from support.runs import run
+
+
+@pytest.mark.parametrize(
+    ("name", "distances", "peak"), [("sea", (0.85, 0.28), 66.0), ("sea-pd", (1.05, 0.30), 35.0)]
+)
+def test_controllers_follow_the_survey_below_waves_as_its_remark_says(
+    native: Path, name, distances, peak
+):
+    """In the first 25 s and in the last 40 s."""
+    result = run(closed_loop(native, read_scenario(name)), 100.0, 0.02)
+    assert result.failure is None
+    away = np.linalg.norm(tracking_error(result), axis=1)
+    found = [away[result.time < 25.0].max(), away[result.time > 60.0].max()]
+    assert found == pytest.approx(distances, abs=0.006)
+    assert np.abs(result["controller.tau.u"]).max() == pytest.approx(peak, abs=0.5)
+    water = result.group(*(f"sea.water.{axis}" for axis in "xyz"))
+    assert np.abs(water).max() == pytest.approx(0.38, abs=0.006)
+
+
+@pytest.mark.parametrize("kind", ["dist", "native"])
+@pytest.mark.parametrize("step", [0.02, 0.3])
+def test_vehicle_is_told_the_water_where_it_is(request, kind: str, step: float):
+    """What Sea says at the beginning of a step acts during it."""
+    folder = request.getfixturevalue(kind)
+    system = closed_loop(folder, read_scenario("sea")).with_parameters(
+        {PortName("sea", "current.sigma"): 0.0}
+    )
+    result = run(system, 6.0, step)
+    assert result.failure is None
+    default = Sea()
+    rows = sea.regular_waves(default)
+    for i in range(0, len(result.time) - 1, 3):
+        place = tuple(map(float, result.group(*(f"plant.eta.{axis}" for axis in "xyz"))[i]))
+        still = Variation(0.0, 0.0, 1.0)
+        expected = sea.water(default, rows, still, place, float(result.time[i]))
+        for group, values in zip(("water", "dwater"), expected[:2], strict=True):
+            found = result.group(*(f"plant.{group}.{axis}" for axis in "xyz"))[i + 1]
+            np.testing.assert_allclose(found, values, rtol=1e-9, atol=1e-12)
+
+
+def test_a_calm_sea_is_no_sea(native: Path):
+    """Bit for bit the same run as without the component."""
+    scenario = read_scenario("sea")
+    calm = {
+        PortName("sea", "waves.spectrum"): "none",
+        PortName("sea", "current.speed"): 0.0,
+        PortName("sea", "current.sigma"): 0.0,
+    }
+    beside = closed_loop(native, scenario).with_parameters(calm)
+    with_sea = run(beside, 20.0, 0.02)
+    components = {k: v for k, v in beside.components.items() if k != "sea"}
+    without = run(
+        replace(
+            beside,
+            components=components,
+            connections=tuple(
+                c
+                for c in beside.connections
+                if "sea" not in (c.source.component, c.target.component)
+            ),
+            parameters={k: v for k, v in beside.parameters.items() if k.component != "sea"},
+        ),
+        20.0,
+        0.02,
+    )
+    for name in without.columns:
+        assert np.array_equal(without[name], with_sea[name]), name
