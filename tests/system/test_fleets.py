@@ -111,8 +111,8 @@ def test_nested_values_vary_in_a_study(ssp: Path, tmp_path: Path):
         "vary": {"auv1.controller.eps_t": [10.0, 30.0], "auv2.plant.eta0.x": [0.0, 1.0]},
     }  # fmt: skip
     result = sweep(study, out=tmp_path / "s", workers=1)
-    assert len(set(result["auv1.plant.l2_effort.u"])) == 2
-    assert len(set(result["auv2.plant.l2_effort.u"])) == 2
+    assert len(set(result["auv1.l2_effort.u"])) == 2
+    assert len(set(result["auv2.l2_effort.u"])) == 2
 
 
 @pytest.mark.parametrize(

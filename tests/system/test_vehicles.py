@@ -11,6 +11,7 @@ import pytest
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
+from orchestrator.system.names import PortName
 from orchestrator.system.renaming import renamed
 from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import velocities_reaching
