@@ -209,6 +209,14 @@ class System:
             found.setdefault(connection.target.component, []).append(connection)
         return found
 
+    @cached_property
+    def fed(self) -> dict[str, list[Connection]]:
+        """The connections that begin at each component."""
+        found: dict[str, list[Connection]] = {name: [] for name in self.components}
+        for connection in self.connections:
+            found.setdefault(connection.source.component, []).append(connection)
+        return found
+
     def fmus(self, *taken: str) -> dict[Path, str]:
         """All FMUs, each with a file name that no other has, nor any file that is taken."""
         fmus = sorted({component.fmu for component in self.components.values()})

@@ -203,7 +203,7 @@ def velocities_reaching(system: System, component: str = STANDARD.controller) ->
 
     The vehicle is what the component feeds. Empty for a controller without velocity sensors.
     """
-    vehicles = {c.target.component for c in system.connections if c.source.component == component}
+    vehicles = {connection.target.component for connection in system.fed.get(component, ())}
     sources = (connection.source for connection in reaching(system, component, until=vehicles))
     return sorted(
         {
