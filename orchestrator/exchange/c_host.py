@@ -195,6 +195,6 @@ def run_host(
     )  # fmt: skip
     if process.returncode != 0:
         raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
-    columns = read_columns(folder / TABLE_FILE)
+    place = {name: i for i, name in enumerate(read_columns(folder / TABLE_FILE), start=1)}
     rows = np.vstack([*read_rows(folder / TABLE_FILE)])
-    return rows[:, [1 + columns.index(name) for name in names]], float(process.stdout)
+    return rows[:, [place[name] for name in names]], float(process.stdout)

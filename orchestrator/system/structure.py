@@ -163,14 +163,26 @@ class System:
     def named(self, name: PortName) -> PortName:
         """The port that a name means, which may have dots in its component's name as well.
 
-        It is one of the longest component that the text begins with and that has such a port; a
-        name that means none is left as it is. With a star, it is the first of those it means.
+        It is one of the longest component that the text begins with and that has such a port. Where
+        there is none, it is of the component that was most likely meant. With a star, it is the
+        first of those it means.
         """
         name, components = self.meant(name)[0], self.components
+        likely = None
         for component, port in splits(str(name)):
-            if component in components and port in components[component].variables:
-                return PortName(component, port)
-        return name
+            if component in components:
+                if port in components[component].variables:
+                    return PortName(component, port)
+                likely = likely or PortName(component, port)
+        return likely or self._likely(name)
+
+    def _likely(self, name: PortName) -> PortName:
+        """A name that begins with no component, taken apart after the systems it begins with."""
+        outer, inner = name.component, name.port
+        while "." in inner and any(one.startswith(f"{outer}.") for one in self.components):
+            part, _, inner = inner.partition(".")
+            outer = f"{outer}.{part}"
+        return PortName(outer, inner)
 
     def has(self, name: PortName) -> bool:
         """Whether there is such a port or parameter."""
@@ -195,6 +207,14 @@ class System:
         found: dict[str, list[Connection]] = {name: [] for name in self.components}
         for connection in self.connections:
             found.setdefault(connection.target.component, []).append(connection)
+        return found
+
+    @cached_property
+    def fed(self) -> dict[str, list[Connection]]:
+        """The connections that begin at each component."""
+        found: dict[str, list[Connection]] = {name: [] for name in self.components}
+        for connection in self.connections:
+            found.setdefault(connection.source.component, []).append(connection)
         return found
 
     def fmus(self, *taken: str) -> dict[Path, str]:
@@ -233,7 +253,7 @@ class System:
         """
         if name not in self.components:
             raise InputError(
-                f"the system has no component {name!r}; it has {', '.join(self.components)}"
+                f"the system has no component {name!r}; it has {listed([*self.components])}"
                 f"{did_you_mean(name, self.components)}"
             )
         return self.components[name]

@@ -63,7 +63,9 @@ def test_loop_is_found_and_its_commands_are_those_that_the_allocation_takes(name
     assert loop == AllocatedLoop()
     assert loop.commanded == tuple(f"allocation.tau.{k}" for k in "uqr")
     assert loop.applied == tuple(f"plant.tau_applied.{k}" for k in "uqr")
-    assert velocities_reaching(system) == [f"plant.dy.{k}" for k in "xyz"] * (name == "remus-pd")
+    assert velocities_reaching(system, loops_of(system)[0]) == [f"plant.dy.{k}" for k in "xyz"] * (
+        name == "remus-pd"
+    )
 
 
 def test_a_run_is_measured_drawn_and_read_again(tmp_path, capsys):

@@ -63,8 +63,25 @@ def test_two_ports_of_one_name_are_refused(system, tmp_path: Path):
 
 def test_name_of_no_port_is_refused(system):
     assert not system.has(port_name("a.b.x"))
-    with pytest.raises(InputError, match=r"a has no port or parameter 'b\.x'"):
+    with pytest.raises(InputError, match=r"a\.b has no port or parameter 'x'"):
         system.with_parameters({port_name("a.b.x"): 1})
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("auv1.plnt.eta.x", r"no component 'auv1\.plnt'; .*; did you mean auv1\.plant"),
+        ("auv1.plant.eta.w", r"auv1\.plant has no port or parameter 'eta\.w'"),
+        ("auv2.k", r"no component 'auv2'; it has auv1\.a, .* and 1 more"),
+        ("other.plant.k", r"no component 'other'; it has"),
+    ],
+)
+def test_what_was_meant_is_said_of_components_in_systems(tmp_path: Path, text: str, words: str):
+    path = fmu(tmp_path / "a.fmu", variable("k", "parameter"), variable("eta.x", "parameter"))
+    names = [f"auv1.{name}" for name in ("a", "b", "c", "d", "e", "plant")]
+    system = System("s", {name: read_component(name, path) for name in names}, ())
+    with pytest.raises(InputError, match=words):
+        system.with_parameters({text: 1})
 
 
 def test_name_without_a_component_is_refused_with_those_that_have_it(system):
