@@ -12,8 +12,7 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.system.names import PortName
-from orchestrator.system.renaming import renamed
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, renamed
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.proof import certificates, gain_check

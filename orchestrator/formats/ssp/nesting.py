@@ -16,8 +16,9 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.formats.ssp.hierarchy import Way
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.variables import array_of, element_names
 
 
