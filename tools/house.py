@@ -37,6 +37,8 @@ REASONS = {
     "orchestrator/commands/listing.py": "imports nothing that takes longer than the command",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/exchange/hosts/drivers.py": "a function for each tool, and nothing of ours",
+    "orchestrator/figures/body.py": "pages need it without matplotlib, and films without a page",
+    "orchestrator/figures/view.py": "puts a page together, of parts that are modules",
     "orchestrator/paper/claims.py": "a function for each claim of the paper",
 }
 
