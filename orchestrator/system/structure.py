@@ -313,7 +313,7 @@ def renamed(system: System, names: Mapping[str, str]) -> System:
 
 
 def flattened(system: System) -> System:
-    """The same system for tools that know no systems in systems: `auv1.plant` is `auv1_plant`."""
+    """The same system for tools that know no systems in systems: `one.part` is `one_part`."""
     taken = {name for name in system.components if "." not in name}
     names = {}
     for name in system.components:
