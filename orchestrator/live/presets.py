@@ -46,7 +46,7 @@ from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, loops_of
 
 
 class _Controller(NamedTuple):
@@ -56,17 +56,19 @@ class _Controller(NamedTuple):
         label: where a scenario names none.
         other: a scenario with the other controller and nothing else of its own, for scenarios that
             name no comparison.
+        allocated: the same for a vehicle whose actuators are allocated.
 
     """
 
     label: str
     other: str
+    allocated: str
 
 
 #: In the order in which they are drawn.
 _CONTROLLERS = {
-    "ObserverController": _Controller("proposed", "path-pd"),
-    "PdController": _Controller("PD", "path"),
+    "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
+    "PdController": _Controller("PD", "path", "remus"),
 }
 
 #: Groups of signals that have charts, with the units of their members.
@@ -164,7 +166,10 @@ def runs_of(name: str) -> list[Prepared]:
 def _other(system: System) -> str:
     """The scenario with the controller that a system does not have; empty: it has neither."""
     controller = _controller(system)
-    return controller.other if controller else ""
+    if controller is None:
+        return ""
+    is_allocated = isinstance(loops_of(system)[0], AllocatedLoop)
+    return controller.allocated if is_allocated else controller.other
 
 
 def _controller(system: System) -> _Controller | None:
