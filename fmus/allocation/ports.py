@@ -38,7 +38,7 @@ PARAMETERS = ParameterSet(
     measured=setting(
         "measured",
         _DEFAULTS.measured,
-        "Whether the speed is that of nu_r; if not, it is the nominal one",
+        "Whether nu_r gives the speed; if not, it is the nominal one",
     ),
 )
 

@@ -52,7 +52,7 @@ PARAMETERS = ParameterSet(
             "added_roll",
             _HULL.added_roll,
             "1",
-            "Added moment of inertia in roll, per that of the hull",
+            "Added moment of inertia in roll, per inertia of the hull",
             minimum=0.0,
         ),
     ),

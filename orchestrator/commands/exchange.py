@@ -63,6 +63,12 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         help="output format: ssp (SSP archive), osp (folder for libcosim) or container (one FMU, "
         "needs auv-fmu[hosts]); default: ssp",
     )
+    parser.add_argument(
+        "--flat",
+        action="store_true",
+        help="write an SSP without systems in it, for tools that read none (libcosim, ecos): "
+        "auv1.plant becomes auv1_plant, and each component has a copy of its FMU",
+    )
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
     add_fmi(parser)
@@ -195,8 +201,13 @@ def _export(options: argparse.Namespace) -> int:
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
     folder = options.out or Path("exports", prepared.scenario.stem)
+    write = EXPORT_FORMATS[options.format]
+    if options.flat:
+        if options.format != "ssp":
+            raise InputError("--flat applies only to --format ssp: leave it out")
+        write = partial(write_ssp, flat=True)
     with replace_files(folder, force=options.force) as unfinished:
-        written = EXPORT_FORMATS[options.format](system, unfinished)
+        written = write(system, unfinished)
     for path in written:
         show(folder / path.relative_to(unfinished))
     return OK

@@ -17,8 +17,9 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import binary_of
 from orchestrator.master.plan import gathered_connections, stages
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 
 #: The program.
@@ -195,6 +196,6 @@ def run_host(
     )  # fmt: skip
     if process.returncode != 0:
         raise InputError(last_line(process.stderr, f"exit status {process.returncode}"))
-    columns = read_columns(folder / TABLE_FILE)
+    place = {name: i for i, name in enumerate(read_columns(folder / TABLE_FILE), start=1)}
     rows = np.vstack([*read_rows(folder / TABLE_FILE)])
-    return rows[:, [1 + columns.index(name) for name in names]], float(process.stdout)
+    return rows[:, [place[name] for name in names]], float(process.stdout)

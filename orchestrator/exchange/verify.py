@@ -220,7 +220,7 @@ class _Samples:
 
     def begin(self, header: Header) -> None:
         """Find out where the columns are."""
-        self._places = [1 + header.columns.index(name) for name in self._columns]
+        self._places = [header.place[name] for name in self._columns]
         self._integers = [(i, standing) for i, standing in header.places() if standing.c_type]
         self._last = np.empty((0, 1 + len(header.columns)))
 

@@ -27,7 +27,6 @@ from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import matches, matching
 from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop
 
 #: Height of a panel, and of what stands above and below all of them [in].
@@ -117,7 +116,10 @@ def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]
 
     """
     names = [run.label for run in runs]
-    given = [run.result.header.parameters for run in runs]
+    # A record does not say where a name is taken apart.
+    given = [
+        {str(name): value for name, value in run.result.header.parameters.items()} for run in runs
+    ]
     differing = [
         name
         for name in dict.fromkeys(name for values in given for name in values)
@@ -150,7 +152,7 @@ def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]
     return [run._replace(label=label) for run, label in zip(runs, labels, strict=True)]
 
 
-def _text(values: Mapping[PortName, Any], name: PortName) -> str:
+def _text(values: Mapping[str, Any], name: str) -> str:
     value = values.get(name, "none")
     return f"{value:g}" if isinstance(value, float) else str(value)
 

@@ -19,8 +19,9 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
-from orchestrator.system.names import PortName, file_name
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.connection import Connection
+from orchestrator.system.names import PortName, file_name, plain_file_names
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
 
@@ -292,10 +293,10 @@ def write_container(system: System, folder: Path) -> list[Path]:
             "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
         )
     container = f"{file_name(system.name)}.fmu"
-    names = system.fmus(container, _CONTENT)
-    fmus = {component.name: names[component.fmu] for component in system.components.values()}
-    if len(names) < len(fmus):
-        raise InputError("a container takes each FMU once; this system has one twice")
+    # It knows instances by the names of their files, so each has a copy of its own.
+    files = [component.fmu.name for component in system.components.values()]
+    names = plain_file_names(files, container, _CONTENT)
+    fmus = dict(zip(system.components, names, strict=True))
     content: dict[str, Any] = {
         "name": container,
         "step_size": system.step,
@@ -317,8 +318,8 @@ def write_container(system: System, folder: Path) -> list[Path]:
         ],
     }
     with TemporaryDirectory(dir=process_folder()) as work:
-        for fmu, name in names.items():
-            shutil.copyfile(fmu, Path(work, name))
+        for component, name in fmus.items():
+            shutil.copyfile(system.components[component].fmu, Path(work, name))
         Path(work, _CONTENT).write_text(json.dumps(content), encoding="utf-8")
         versions = {component.description.fmiVersion for component in system.components.values()}
         fmi = max(versions).partition(".")[0]

@@ -17,6 +17,7 @@ first in the system, which takes what feeds it at t_k.
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
@@ -29,9 +30,10 @@ from platform import python_version
 
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.master.experiment import JACOBI, LINEAR, ORDERS, Experiment, Order, decimations
+from orchestrator.system.connection import Connection
 from orchestrator.system.graph import delayed_connections, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 
 #: Packages whose versions the rows depend on.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
@@ -147,8 +149,9 @@ def check_order(system: System, order: Order) -> None:
         return
     for name in order:
         system.component(name)
-    twice = [name for i, name in enumerate(order) if name in order[:i]]
-    missing = [name for name in system.components if name not in order]
+    stated = Counter(order)
+    twice = [name for name, n in stated.items() if n > 1]
+    missing = [name for name in system.components if name not in stated]
     for names, what in ((twice, "twice"), (missing, "not at all")):
         if names:
             raise InputError(

@@ -7,8 +7,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fmpy.model_description import ModelVariable
 
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection, can_feed
 from orchestrator.system.names import PortName, listed
-from orchestrator.system.structure import Connection, System, can_feed
+from orchestrator.system.structure import System
 
 #: What each component waits for: the components whose direct feedthrough feeds it.
 _Sources = Mapping[str, Collection[str]]
@@ -322,6 +323,10 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
     taken = {*fed, *system.parameters, *system.left_open, *settled}
     labels: list[str] = []
     wires: list[str] = []
+    giving: dict[str, list[str]] = {}
+    for name, component in system.components.items():
+        for output in component.having("output"):
+            giving.setdefault(output.name, []).append(name)
     for name, component in system.components.items():
         groups: dict[str, list[ModelVariable]] = {}
         for variable in component.having("input"):
@@ -333,15 +338,16 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
                 continue
             labels.append(f"{name}.{group}.*")
             # What feeds the same inputs of another component is that one's.
-            sources = [
+            sources = (
                 other
-                for other, source in system.components.items()
+                for other in giving.get(members[0].name, ())
                 if other != name
-                and all(_could_feed(source, variable) for variable in members)
+                and all(_could_feed(system.components[other], variable) for variable in members)
                 and not any((other, variable.name) in feeding for variable in members)
-            ]
-            if len(sources) == 1:
-                wires.append(f'"{name}.{group}" = "{sources[0]}.{group}"')
+            )
+            first, second = next(sources, None), next(sources, None)
+            if first is not None and second is None:
+                wires.append(f'"{name}.{group}" = "{first}.{group}"')
     if not labels:
         return None
     wanted = f"; wire {listed(wires)}" if wires else ""

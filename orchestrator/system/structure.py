@@ -7,17 +7,15 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from sys import float_info
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection, check_connection
 from orchestrator.system.names import PortName, listed, plain_file_names, port_name, splits
-from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.system.values import EXACT, TYPES, Value, is_finite, typed, unit_of
+from orchestrator.system.values import Value, is_finite, typed
 
 #: Values by the names of ports or of groups, taken apart or as text.
 Values = Mapping[PortName, object] | Mapping[str, object]
@@ -27,25 +25,6 @@ STAR = "*"
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
-
-#: What can be fed from another family of types, besides from its own.
-_FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
-
-
-@dataclass(frozen=True)
-class Connection:
-    """One value that goes from an output to an input.
-
-    Attributes:
-        source, target: its ends.
-        transformation: what happens to the value on its way; None: it arrives bit for bit, and the
-            units of its ends must be the same.
-
-    """
-
-    source: PortName
-    target: PortName
-    transformation: Transformation | None = None
 
 
 @dataclass(frozen=True)
@@ -163,14 +142,26 @@ class System:
     def named(self, name: PortName) -> PortName:
         """The port that a name means, which may have dots in its component's name as well.
 
-        It is one of the longest component that the text begins with and that has such a port; a
-        name that means none is left as it is. With a star, it is the first of those it means.
+        It is one of the longest component that the text begins with and that has such a port. Where
+        there is none, it is of the component that was most likely meant. With a star, it is the
+        first of those it means.
         """
         name, components = self.meant(name)[0], self.components
+        likely = None
         for component, port in splits(str(name)):
-            if component in components and port in components[component].variables:
-                return PortName(component, port)
-        return name
+            if component in components:
+                if port in components[component].variables:
+                    return PortName(component, port)
+                likely = likely or PortName(component, port)
+        return likely or self._likely(name)
+
+    def _likely(self, name: PortName) -> PortName:
+        """A name that begins with no component, taken apart after the systems it begins with."""
+        outer, inner = name.component, name.port
+        while "." in inner and any(one.startswith(f"{outer}.") for one in self.components):
+            part, _, inner = inner.partition(".")
+            outer = f"{outer}.{part}"
+        return PortName(outer, inner)
 
     def has(self, name: PortName) -> bool:
         """Whether there is such a port or parameter."""
@@ -195,6 +186,14 @@ class System:
         found: dict[str, list[Connection]] = {name: [] for name in self.components}
         for connection in self.connections:
             found.setdefault(connection.target.component, []).append(connection)
+        return found
+
+    @cached_property
+    def fed(self) -> dict[str, list[Connection]]:
+        """The connections that begin at each component."""
+        found: dict[str, list[Connection]] = {name: [] for name in self.components}
+        for connection in self.connections:
+            found.setdefault(connection.source.component, []).append(connection)
         return found
 
     def fmus(self, *taken: str) -> dict[Path, str]:
@@ -233,7 +232,7 @@ class System:
         """
         if name not in self.components:
             raise InputError(
-                f"the system has no component {name!r}; it has {', '.join(self.components)}"
+                f"the system has no component {name!r}; it has {listed([*self.components])}"
                 f"{did_you_mean(name, self.components)}"
             )
         return self.components[name]
@@ -254,7 +253,7 @@ class System:
         fed: dict[PortName, PortName] = {}
         for connection in self.connections:
             try:
-                self._check_connection(connection)
+                check_connection(connection, self.component)
             except InputError as error:
                 yield str(error)
             source, target = connection.source, connection.target
@@ -287,29 +286,44 @@ class System:
                         if f"{rest}.{port}" in others:
                             yield f"two ports are named {name}.{port}"
 
-    def _check_connection(self, connection: Connection) -> None:
-        source, target = connection.source, connection.target
-        starts, ends = self.component(source.component), self.component(target.component)
-        a, b = starts.variable(source.port), ends.variable(target.port)
-        for end, variable, wanted in ((source, a, "output"), (target, b, "input")):
-            if variable.causality != wanted:
-                raise InputError(
-                    f"{source} -> {target}: {end} has causality {variable.causality}, not {wanted}"
-                )
-        if not can_feed(a, b):
-            raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
-        if connection.transformation not in (None, Linear()):
-            _check_transformed(connection, b.type)
-        if connection.transformation is not None or unit_of(a) == unit_of(b):
-            return
-        units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
-        try:
-            converted = conversion(*units)
-        except InputError as error:
-            raise InputError(f"{source} -> {target}: {error}") from None
-        if converted is not None:
-            names = " and ".join(unit.name for unit in units if unit)
-            raise InputError(f"{source} -> {target}: units differ, {names}")
+
+def renamed(system: System, names: Mapping[str, str]) -> System:
+    """The same system with other names for some components, which are all different."""
+
+    def name_of(component: str) -> str:
+        return names.get(component, component)
+
+    def port_of(port: PortName) -> PortName:
+        return PortName(name_of(port.component), port.port)
+
+    return replace(
+        system,
+        components={
+            name_of(name): replace(component, name=name_of(name))
+            for name, component in system.components.items()
+        },
+        connections=tuple(
+            replace(wire, source=port_of(wire.source), target=port_of(wire.target))
+            for wire in system.connections
+        ),
+        parameters={port_of(port): value for port, value in system.parameters.items()},
+        steps={name_of(name): step for name, step in system.steps.items()},
+        left_open={port_of(port) for port in system.left_open},
+    )
+
+
+def flattened(system: System) -> System:
+    """The same system for tools that know no systems in systems: `auv1.plant` is `auv1_plant`."""
+    taken = {name for name in system.components if "." not in name}
+    names = {}
+    for name in system.components:
+        if "." in name:
+            plain = name.replace(".", "_")
+            while plain in taken:
+                plain += "_"
+            names[name] = plain
+            taken.add(plain)
+    return renamed(system, names) if names else system
 
 
 def paired(
@@ -361,36 +375,3 @@ def _several(value: object) -> list[Any] | None:
         # An array without dimensions is one value.
         return list(value) if value.ndim else None
     return list(value) if isinstance(value, list | tuple) else None
-
-
-def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
-    """Whether a variable takes all values of another, and none is lost on the way."""
-    start, end = TYPES[source.type], TYPES[target.type]
-    if start.family not in (end.family, *_FED_FROM.get(end.family, ())):
-        return False
-    if (start.family, end.family) == ("Integer", "Real"):
-        return bool(start.most < 2 ** np.finfo(np.dtype(end.c_type)).nmant)
-    return end.least <= start.least and start.most <= end.most
-
-
-def _check_transformed(connection: Connection, fmi_type: str) -> None:
-    """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
-    linear = isinstance(connection.transformation, Linear)
-    of = TYPES[fmi_type]
-    is_real = of.family == "Real"
-    if of.family == "String" or (linear and not is_real):
-        how = "transformed linearly" if linear else "mapped"
-        raise InputError(
-            f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
-            f"{how}"
-        )
-    if isinstance(connection.transformation, Mapped):
-        # Mappings are written in doubles.
-        exact = float_info.max if is_real else EXACT
-        least, most = max(of.least, -exact), min(of.most, exact)
-        for _, value in connection.transformation.pairs:
-            if not least <= value <= most or (not is_real and value != int(value)):
-                raise InputError(
-                    f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
-                    f"FMI type {fmi_type} cannot hold"
-                )

@@ -107,7 +107,7 @@ class UndefinedUnit(InputError):
 Units = Mapping[str, Unit]
 
 
-def _defined(component: Component, name: str) -> Unit:
+def defined(component: Component, name: str) -> Unit:
     """A unit as an FMU defines it."""
     for unit in component.description.unitDefinitions:
         if unit.name == name and unit.baseUnit is not None:
@@ -130,7 +130,7 @@ def unit_of_port(component: Component, port: str, otherwise: Units | None = None
     name = unit_of(variable)
     if not name:
         return None
-    unit = _defined(component, name)
+    unit = defined(component, name)
     if unit.exponents is None:
         unit = (otherwise or {}).get(name, unit)
     declared = variable.declaredType

@@ -206,17 +206,18 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
     ]
 
 
-def velocities_reaching(system: System, component: str = STANDARD.controller) -> list[str]:
-    """Velocities of the vehicle that reach a component, directly or through others.
+def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
+    """Velocities of the vehicle that reach its controller, directly or through others.
 
-    The vehicle is what the component feeds, itself or through an allocation. Empty for a
+    The vehicle is what the controller feeds, itself or through an allocation. Empty for a
     controller without velocity sensors.
     """
-    vehicles = {c.target.component for c in system.connections if c.source.component == component}
-    for loop in loops_of(system):
-        if isinstance(loop, AllocatedLoop) and loop.controller == component:
-            vehicles = vehicles - {loop.allocation} | {loop.vehicle}
-    sources = (connection.source for connection in reaching(system, component, until=vehicles))
+    vehicles = {connection.target.component for connection in system.fed.get(loop.controller, ())}
+    if isinstance(loop, AllocatedLoop):
+        vehicles = vehicles - {loop.allocation} | {loop.vehicle}
+    sources = (
+        connection.source for connection in reaching(system, loop.controller, until=vehicles)
+    )
     return sorted(
         {
             str(source)

@@ -381,7 +381,7 @@ class Metrics(Indices):
             if index.name in found
         }
         if loop.controller in system.components:
-            reaching = velocities_reaching(system, loop.controller)
+            reaching = velocities_reaching(system, loop)
             content["velocities_reaching_controller"] = reaching
         return content
 

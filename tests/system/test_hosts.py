@@ -28,6 +28,7 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from support.fleets import fleet_of
 from support.tiers import slow
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
@@ -60,6 +61,38 @@ def test_host_gives_the_numbers_of_our_master_in_its_order(dist: Path, host: str
     if scenario != "fig4" and host in (*WITHOUT_PARAMETERS, *APART):
         pytest.skip("it applies no parameters")
     check(closed_loop(dist, read_scenario(scenario)), host, 500)
+
+
+def fleet(dist: Path) -> System:
+    """Two vehicles in systems of their own, of which the second follows the first one's reference.
+
+    Its disturbance reaches nothing: the two differ also where a host applies no parameters.
+    """
+    system = fleet_of(closed_loop(dist), 2)
+    wires = [c for c in system.connections if c.source.component != "auv2.disturbance"]
+    wires = [
+        replace(c, source=replace(c.source, component="auv1.planner"))
+        if c.source.component == "auv2.planner" else c for c in wires
+    ]  # fmt: skip
+    lost = {c.target for c in system.connections} - {c.target for c in wires}
+    return replace(system, connections=tuple(wires), left_open={*system.left_open, *lost})
+
+
+@pytest.mark.parametrize(
+    "host", ["libcosim-ssp", "ecos", "fmpy-ssp", *slow("libcosim-osp", "container", "c-program")]
+)
+def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: str):
+    """Some are given a flat archive: what they read of a nested one is not all of it."""
+    system = fleet(dist)
+    if host not in WITHOUT_PARAMETERS:
+        system = system.with_parameters({PortName("auv2.plant", "eta0.y"): 2.0})
+    check(system, host, 100)
+
+
+@pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")
+def test_ecos_has_as_many_instances_as_components_with_fmi_3(dist3: Path):
+    system = fleet(dist3).with_parameters({PortName("auv2.plant", "eta0.y"): 2.0})
+    check(system, "ecos", 50)
 
 
 @pytest.mark.slow

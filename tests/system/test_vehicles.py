@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, renamed
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.proof import certificates, gain_check
@@ -31,7 +30,7 @@ CHANGES = {
 ROLES = dict(zip(vars(STANDARD).values(), vars(OTHER).values(), strict=True))
 
 
-def renamed(name: str) -> str:
+def of_other(name: str) -> str:
     """A port of the standard loop as the other loop has it."""
     component, port = name.split(".", 1)
     return f"{ROLES[component]}.{port}"
@@ -52,11 +51,11 @@ def results(tmp_path_factory):
     folder, standard = tmp_path_factory.mktemp("vehicles"), read_wiring()
     components = {ROLES[name]: fmu for name, fmu in standard["components"].items()}
     wires = {
-        renamed(to): source and renamed(source)
+        of_other(to): source and of_other(source)
         for to, source in standard["wires"].items()
         if source
     }
-    values = {renamed(name): value for name, value in CHANGES.items()}
+    values = {of_other(name): value for name, value in CHANGES.items()}
     both = scenario(folder / "two.toml", components, wires, values)
     alone = scenario(folder / "one.toml", {}, {}, CHANGES)
     for name in (both, alone, "fig4"):
@@ -95,20 +94,7 @@ def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
 
 def inner(system: System) -> System:
     """The same with components named as in a nested system, of which several may have a plant."""
-
-    def nested(port: PortName) -> PortName:
-        return PortName(f"auv1.{port.component}", port.port)
-
-    components = {
-        f"auv1.{name}": replace(part, name=f"auv1.{name}")
-        for name, part in system.components.items()
-    }
-    connections = tuple(
-        replace(wire, source=nested(wire.source), target=nested(wire.target))
-        for wire in system.connections
-    )
-    values = {nested(port): value for port, value in system.parameters.items()}
-    return replace(system, components=components, connections=connections, parameters=values)
+    return renamed(system, {name: f"auv1.{name}" for name in system.components})
 
 
 def test_names_of_components_may_have_dots():
@@ -120,7 +106,7 @@ def test_names_of_components_may_have_dots():
     for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
         assert found.metrics()[key] == flat.metrics()[key]
     assert (certificates(found, loop) == certificates(flat)).all()
-    reaching = velocities_reaching(inner(load("fig5-pd", "native")), "auv1.controller")
+    reaching = velocities_reaching(inner(load("fig5-pd", "native")), loop)
     assert reaching == [f"auv1.plant.dy.{axis}" for axis in "xyz"]
 
 

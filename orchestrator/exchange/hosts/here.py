@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 import importlib
 import pickle
+import shutil
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -25,7 +26,7 @@ from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, flattened
 
 #: In the folder: what is run, and where files for the tool go.
 GIVEN, _EXPORT = "given", "export"
@@ -128,7 +129,9 @@ def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) 
 
 
 def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
-    [path] = write_ssp(system, folder)
+    # Of an SSP it reads the components of the outermost system only, as does ecos.
+    system = flattened(system)
+    [path] = write_ssp(system, folder, flat=True)
     return _libcosim(system, experiment, "from_ssp_file", ssp_path=str(path))
 
 
@@ -145,6 +148,7 @@ def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy = importlib.import_module("ecospy")
+    system = flattened(system)
     names = _names(system, "::")
     parameter_set = {"parameter_set": PARAMETER_SET} if system.parameters else {}
     with _ecos_simulation(ecospy, system, experiment, folder) as simulation:
@@ -155,11 +159,12 @@ def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
 def _ecos_simulation(ecospy: Any, system: System, experiment: Experiment, folder: Path) -> Any:
     """A simulation of ecos: it reads no SSP 2.0, so with FMI 3.0 its calls say what is in one."""
     if fmi_of(system) == "2.0":
-        [path] = write_ssp(system, folder)
+        # It makes one instance of a file, whatever refers to it.
+        [path] = write_ssp(system, folder, flat=True)
         return ecospy.EcosSimulation(experiment.step, ssp_path=str(path))
     structure = ecospy.EcosSimulationStructure()
     for name, component in system.components.items():
-        structure.add_model(name, component.fmu)
+        structure.add_model(name, shutil.copyfile(component.fmu, folder / f"{name}.fmu"))
     for wire in system.connections:
         source, target = (f"{end.component}::{end.port}" for end in (wire.source, wire.target))
         structure.make_real_connection(source, target)

@@ -20,5 +20,8 @@ OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/
 #: The annotation of ours that names the inputs that are open on purpose.
 LEFT_OPEN = "LeftOpen"
 
+#: The one that names the components in their order, where nesting changes it.
+ORDER = "Order"
+
 #: Namespaces of the standard's own elements.
 NAMESPACES = (SSD, SSC, SSV, SSM, SSB)

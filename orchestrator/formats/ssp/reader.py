@@ -9,14 +9,15 @@ from pathlib import Path
 from urllib.parse import quote
 from xml.etree.ElementTree import Element, SubElement
 
-from orchestrator.formats.ssp import LEFT_OPEN
+from orchestrator.formats.ssp import LEFT_OPEN, ORDER
 from orchestrator.formats.ssp.archive import Archive
 from orchestrator.formats.ssp.hierarchy import Builder, Definitions, Leaf, Node, Way, definitions_of
 from orchestrator.formats.ssp.origins import Bindings, Segment, Values, segments_of
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, listed
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Transformation, Unit, combine
 from orchestrator.system.values import BOOLEANS, Value, real, typed
 
@@ -99,6 +100,9 @@ def _read(archive: Archive, root: Element, content: Element) -> System:
             archive.problem(f"two components are named {name}")
         if leaf.component is not None:
             components[name] = leaf.component
+    stated = _annotated(experiment, ORDER)
+    ordered = [element.get("name", "") for order in stated for element in order]
+    components = {name: components[name] for name in (*ordered, *components) if name in components}
     # A component whose step is zero has no wish.
     steps = {
         ".".join(way): step

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
-from dataclasses import replace
+from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
+from operator import itemgetter
 from pathlib import Path
+from typing import NamedTuple
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 from zipfile import ZipFile, ZipInfo
 
 from fmpy.model_description import ModelVariable
 
-from orchestrator.formats.ssp import LEFT_OPEN, OMS, OSP, SSC, SSD, SSV, STRUCTURE
+from orchestrator.formats.ssp import LEFT_OPEN, OMS, ORDER, OSP, SSC, SSD, SSV, STRUCTURE
+from orchestrator.formats.ssp.nesting import End, Line, Nest, nested, order_of
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
-from orchestrator.system.structure import Connection, System
-from orchestrator.system.units import BASE_UNITS, Linear, Mapped
+from orchestrator.system.structure import System, flattened
+from orchestrator.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
 from orchestrator.system.values import Value, items_of, literal, type_of
 from orchestrator.system.variables import array_of
 
@@ -40,29 +42,55 @@ _BOX, _GAP = (40.0, 60.0), 30.0
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def write_ssp(system: System, folder: Path) -> list[Path]:
-    """Write `NAME.ssp`; the step is part of the system."""
+def write_ssp(system: System, folder: Path, flat: bool = False) -> list[Path]:
+    """Write `NAME.ssp`; the step is part of the system; arguments as of :func:`ssp_bytes`."""
     path = folder / f"{file_name(system.name)}.ssp"
-    path.write_bytes(ssp_bytes(system))
+    path.write_bytes(ssp_bytes(system, flat))
     return [path]
 
 
-def ssp_bytes(system: System) -> bytes:
-    """The archive of a system: its structure and its FMUs, the same bytes every time."""
+def ssp_bytes(system: System, flat: bool = False) -> bytes:
+    """The archive of a system: its structure and its FMUs, the same bytes every time.
+
+    Args:
+        system: to write.
+        flat: for tools that know no systems in systems, or make one instance of an FMU only: names
+            have no dots, and each component has a copy of its FMU.
+
+    """
+    system = flattened(system) if flat else system
+    sources = _sources(system, flat)
     archive = BytesIO()
     with ZipFile(archive, "w") as content:
-        content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system))
+        content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system, sources))
         for name, source in _parameter_sources(system).items():
             values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
-        for fmu, source in _sources(system).items():
+        fmus = {sources[name]: component.fmu for name, component in system.components.items()}
+        # In the order of their paths, as before there were copies.
+        for source, fmu in sorted(fmus.items(), key=itemgetter(1)):
             content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
     return archive.getvalue()
 
 
-def _sources(system: System) -> dict[Path, str]:
-    """Where the archive has each FMU."""
-    return {fmu: f"resources/{name}" for fmu, name in system.fmus().items()}
+def _sources(system: System, copied: bool = False) -> dict[str, str]:
+    """Where the archive has the FMU of each component.
+
+    Args:
+        system: whose FMUs they are.
+        copied: whether each component has one of its own.
+
+    """
+    names = system.fmus()
+    taken, found = list(names.values()), dict[str, str]()
+    first: dict[Path, str] = {}
+    for name, component in system.components.items():
+        file = names[component.fmu]
+        if first.setdefault(component.fmu, name) != name and copied:
+            [file] = plain_file_names([f"{name}.fmu"], *taken)
+            taken.append(file)
+        found[name] = f"resources/{file}"
+    return found
 
 
 def _parameter_sources(system: System) -> dict[str, str]:
@@ -125,82 +153,109 @@ def _serialised(root: Element) -> bytes:
     return content
 
 
-def structure_xml(system: System) -> bytes:
+def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> bytes:
     """SystemStructure.ssd; connectors and units come from the FMUs' own descriptions.
 
     libcosim and OMSimulator each need the step in an annotation of their own.
+
+    Args:
+        system: to write.
+        sources: where the archive has the FMU of each component; None: each FMU once.
+
     """
     version = max(map(_version, system.components.values()))
     root = Element(_tag("ssd:SystemStructureDescription"), name=system.name, version=version)
-    structure = _add(root, "ssd:System", name=system.name)
+    structure, nest = _add(root, "ssd:System", name=system.name), nested(system)
+    given = _Given(
+        system, sources or _sources(system), _parameter_sources(system), _clear_units(system)
+    )
+    _fill(structure, nest, given)
+    if system.step is not None:
+        _add_master(structure, system.step)
+    _add_enumerations(root, system)
+    _add_units(root, system)
+    _add_experiment(root, system, order_of(nest))
+    return _serialised(root)
+
+
+class _Given(NamedTuple):
+    """What all systems of a description are written from.
+
+    Attributes:
+        system: all of it.
+        sources: of the FMUs of components.
+        parameter_sources: of the parameter sets of components.
+        units: that the description can define.
+
+    """
+
+    system: System
+    sources: Mapping[str, str]
+    parameter_sources: Mapping[str, str]
+    units: Collection[Unit]
+
+
+def _fill(structure: Element, nest: Nest, given: _Given) -> None:
+    """Write what is in a system, and in those in it; its element has its connectors already."""
+    system = given.system
     elements = _add(structure, "ssd:Elements")
-    sources, parameter_sources = _sources(system), _parameter_sources(system)
-    for position, component in enumerate(system.components.values()):
-        source = sources[component.fmu]
-        element = _add_component(elements, component, position, source, system.left_open)
-        if component.name in parameter_sources:
+    for position, (name, component) in enumerate(nest.elements.items()):
+        if isinstance(component, Nest):
+            inner = _add(elements, "ssd:System", name=name)
+            _add_border(inner, component, given.units)
+            _add_geometry(inner, position)
+            _fill(inner, component, given)
+            continue
+        source = given.sources[component.name]
+        element = _add_component(elements, name, component, position, source, system.left_open)
+        if component.name in given.parameter_sources:
             bindings = _add(element, "ssd:ParameterBindings")
-            source = parameter_sources[component.name]
+            source = given.parameter_sources[component.name]
             media_type = "application/x-ssp-parameter-set"
             _add(bindings, "ssd:ParameterBinding", source=source, type=media_type)
         if component.name in system.steps:
             hint = str(system.steps[component.name])
             _add(_annotation(element, _LIBCOSIM), "osp:StepSizeHint", value=hint)
     # The schema has no empty list of connections.
-    if system.connections:
-        connections, written = _add(structure, "ssd:Connections"), set[Connection]()
-        connected = set(system.connections)
-        for connection in system.connections:
-            if connection not in written:
-                whole = _whole(connection, system, connected)
-                written |= whole
-                _add_connection(connections, connection, system, bool(whole))
-    if system.step is not None:
-        _add_master(structure, system.step)
-    _add_enumerations(root, system)
-    _add_units(root, system)
-    _add_experiment(root, system)
-    return _serialised(root)
+    if nest.lines:
+        connections = _add(structure, "ssd:Connections")
+        for line in nest.lines:
+            _add_line(connections, line, system)
 
 
-def _whole(
-    connection: Connection, system: System, connected: Collection[Connection]
-) -> set[Connection]:
-    """All connections between two arrays that are connected as a whole; empty: they are not."""
-    start, end = connection.source, connection.target
-    starts, ends = system.component(start.component), system.component(end.component)
-    source, target = starts.variable(start.port), ends.variable(end.port)
-    if not source.shape or source.shape != target.shape:
-        return set()
-    members = zip(starts.elements(array_of(source)), ends.elements(array_of(target)), strict=True)
-    found = {
-        replace(
-            connection,
-            source=PortName(start.component, a.name),
-            target=PortName(end.component, b.name),
+def _add_border(structure: Element, nest: Nest, units: Collection[Unit]) -> None:
+    """The connectors of a system in another one."""
+    if not nest.connectors:
+        return
+    connectors = _add(structure, "ssd:Connectors")
+    for name, (kind, component, variable) in nest.connectors.items():
+        unit = unit_of_port(component, variable.name)
+        _add_connector(
+            connectors, name, kind, variable, unit.name if unit and unit in units else None
         )
-        for a, b in members
-    }
-    return found if found.issubset(connected) else set()
 
 
-def _end(which: str, port: PortName, system: System, is_whole: bool) -> dict[str, str]:
+def _clear_units(system: System) -> set[Unit]:
+    """The units that all FMUs define alike, with which values can be stated beside the FMUs."""
+    found: dict[str, set[Unit]] = {}
+    for component in {part.fmu: part for part in system.components.values()}.values():
+        for unit in component.description.unitDefinitions:
+            found.setdefault(unit.name, set()).add(defined(component, unit.name))
+    return {unit for units in found.values() if len(units) == 1 for unit in units}
+
+
+def _end(which: str, end: End) -> dict[str, str]:
     """The attributes of an end of a connection, which may be an element of an array."""
-    variable = system.component(port.component).variable(port.port)
-    end = {f"{which}Element": port.component, f"{which}Connector": array_of(variable)}
-    if variable.shape and not is_whole:
-        indices = port.port.removeprefix(array_of(variable))[1:-1]
-        end[f"{which}Indices"] = indices.replace(",", " ")
-    return end
+    stated = {"Element": end.element, "Connector": end.connector, "Indices": end.indices}
+    return {f"{which}{name}": text for name, text in stated.items() if text is not None}
 
 
-def _add_connection(
-    connections: Element, connection: Connection, system: System, is_whole: bool
-) -> None:
-    source, target, made = connection.source, connection.target, connection.transformation
-    start = _end("start", source, system, is_whole)
-    end = _end("end", target, system, is_whole)
+def _add_line(connections: Element, line: Line, system: System) -> None:
+    start, end = _end("start", line.start), _end("end", line.end)
     element = _add(connections, "ssd:Connection", **start, **end)
+    if line.connection is None:
+        return
+    source, made = line.connection.source, line.connection.transformation
     if made is not None:
         # Where units differ, it has been made of them.
         element.set("suppressUnitConversion", "true")
@@ -247,13 +302,14 @@ def _version(component: Component) -> str:
 
 def _add_component(
     elements: Element,
+    own_name: str,
     component: Component,
     position: int,
     source: str,
     left_open: Collection[PortName],
 ) -> Element:
     media_type = "application/x-fmu-sharedlibrary"
-    element = _add(elements, "ssd:Component", name=component.name, source=source, type=media_type)
+    element = _add(elements, "ssd:Component", name=own_name, source=source, type=media_type)
     connectors = _add(element, "ssd:Connectors")
     written = set[str]()
     for variable in component.variables.values():
@@ -265,17 +321,27 @@ def _add_component(
         left_out = is_text or is_open or name in written
         if variable.causality in ("input", "output", "parameter") and not left_out:
             written.add(name)
-            connector = _add(connectors, "ssd:Connector", name=name, kind=variable.causality)
-            stated = {"unit": variable.unit} if variable.unit else {}
-            if type_of(variable) == "Enumeration" and variable.declaredType is not None:
-                stated = {"name": variable.declaredType.name}
-            _add(connector, f"ssc:{variable.type}", **stated)
-            _add_dimensions(connector, variable)
+            _add_connector(connectors, name, variable.causality, variable, variable.unit)
+    _add_geometry(element, position)
+    return element
+
+
+def _add_connector(
+    connectors: Element, name: str, kind: str, variable: ModelVariable, unit: str | None
+) -> None:
+    connector = _add(connectors, "ssd:Connector", name=name, kind=kind)
+    stated = {"unit": unit} if unit else {}
+    if type_of(variable) == "Enumeration" and variable.declaredType is not None:
+        stated = {"name": variable.declaredType.name}
+    _add(connector, f"ssc:{variable.type}", **stated)
+    _add_dimensions(connector, variable)
+
+
+def _add_geometry(element: Element, position: int) -> None:
     width, height = _BOX
     left = position * (width + _GAP)
     corners = {"x1": str(left), "y1": "0.0", "x2": str(left + width), "y2": str(height)}
     _add(element, "ssd:ElementGeometry", **corners)
-    return element
 
 
 def _add_enumerations(root: Element, system: System) -> None:
@@ -311,7 +377,7 @@ def _add_units(root: Element, system: System) -> None:
                 base.set(attribute, str(stated))
 
 
-def _add_experiment(root: Element, system: System) -> None:
+def _add_experiment(root: Element, system: System, order: Sequence[str]) -> None:
     start_time = str(system.start_time or 0.0)
     experiment = _add(root, "ssd:DefaultExperiment", startTime=start_time)
     if system.stop_time is not None:
@@ -324,3 +390,7 @@ def _add_experiment(root: Element, system: System) -> None:
         left_open = _add(_annotation(experiment, _OURS), LEFT_OPEN)
         for component, name in sorted((port.component, port.port) for port in system.left_open):
             _add(left_open, "Input", component=component, name=name)
+    if list(system.components) != order:
+        stated = _add(_annotation(experiment, _OURS), ORDER)
+        for component in system.components:
+            _add(stated, "Component", name=component)

@@ -270,7 +270,7 @@ class Selection:
         """Find out where the columns are."""
         kept = header.columns if self._columns is None else tuple(self._columns)
         self._every = every(self._interval, header)
-        self._places = [0, *(1 + header.columns.index(name) for name in kept)]
+        self._places = [0, *(header.place[name] for name in kept)]
         self._observer.begin(replace(header, columns=kept))
 
     def take(self, rows: np.ndarray) -> None:

@@ -4,18 +4,22 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from matplotlib.figure import Figure
 from PIL import Image
 
-from orchestrator.figures.animation import _Camera, animate, check_film
-from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import body
+from orchestrator.figures.animation import animate, check_film
+from orchestrator.figures.body import body
+from orchestrator.figures.film_scene import Camera, Scene
+from orchestrator.figures.style import Drawn, vehicle_colours
 from orchestrator.machine.errors import InputError
-from support.tables import loop_table
+from support.tables import fleet, fleet_table, loop_table
 
 
 def test_camera_sees_what_it_looks_at_in_the_middle():
     middle = np.array([3.0, -2.0, 5.0])
-    camera = _Camera.at(middle, 7.0)
+    camera = Camera.at(middle, 7.0)
     seen, ahead = camera.project(middle[np.newaxis])
     np.testing.assert_allclose(seen, [[0.0, 0.0]], atol=1e-12)
     # One width to the right is one wide; up is against z, which points down.
@@ -28,7 +32,7 @@ def test_camera_sees_what_it_looks_at_in_the_middle():
 
 
 def test_what_is_twice_as_far_away_is_half_as_large():
-    camera = _Camera.at(np.zeros(3), 1.0)
+    camera = Camera.at(np.zeros(3), 1.0)
     right, _, ahead = camera.axes
     points = np.array([camera.place + d * ahead + 0.1 * right for d in (1.0, 2.0)])
     (near, far), distance = camera.project(points)
@@ -37,7 +41,7 @@ def test_what_is_twice_as_far_away_is_half_as_large():
 
 
 def test_lines_behind_the_camera_are_not_drawn():
-    camera = _Camera.at(np.zeros(3), 1.0)
+    camera = Camera.at(np.zeros(3), 1.0)
     ahead = camera.axes[2]
     t = np.linspace(-1.0, 3.0, 41)
     pieces = camera.line(camera.place + t[:, np.newaxis] * ahead)
@@ -55,14 +59,19 @@ def test_body_is_as_long_as_one_and_its_upper_fin_is_above():
     np.testing.assert_allclose(upper[:, 1], 0.0)
 
 
-def test_film_has_a_frame_for_each_instant(tmp_path):
-    path = tmp_path / "film.gif"
-    animate("title", Drawn("run", loop_table()), path, fps=2)
+def frames_of(path):
     with Image.open(path) as film:
         frames = []
         for k in range(film.n_frames):
             film.seek(k)
             frames.append(np.asarray(film.convert("RGB"), dtype=int))
+    return frames
+
+
+def test_film_has_a_frame_for_each_instant(tmp_path):
+    path = tmp_path / "film.gif"
+    animate("title", Drawn("run", loop_table()), path, fps=2)
+    frames = frames_of(path)
     assert len(frames) == 20
     assert all((a != b).any() for a, b in pairwise(frames))
 
@@ -73,3 +82,63 @@ def test_film_has_a_frame_for_each_instant(tmp_path):
 def test_films_that_cannot_be_written_are_refused(tmp_path, name, fps, text):
     with pytest.raises(InputError, match=text):
         check_film(tmp_path / name, fps)
+
+
+# Several vehicles
+
+
+@settings(max_examples=25)
+@given(
+    st.lists(st.tuples(*[st.floats(-200.0, 200.0)] * 3), min_size=2, max_size=5),
+    st.floats(0.0, 50.0),
+    st.booleans(),
+)
+# One is between the camera and the other.
+@example([(75.0, 50.0, 45.0), (-75.0, -50.0, -45.0)], 0.0, False)
+def test_camera_has_all_vehicles_and_references_in_sight(places, amplitude, z_up):
+    """In each row all control points and references are in the picture, and none too near."""
+    n = len(places)
+    table = fleet_table(n, 100)
+    for i, place in enumerate(places, 1):
+        for axis, offset in zip("xyz", place, strict=True):
+            for column in (f"auv{i}.plant.eta.{axis}", f"auv{i}.planner.y_d.{axis}"):
+                table[column][:] = offset + amplitude * table[column]
+    run = Drawn("run", table, z_up, fleet(n))
+    scene = Scene(Figure().add_subplot(), run, np.arange(100))
+    turn = [1.0, -1.0, -1.0] if z_up else [1.0, 1.0, 1.0]
+    for row in range(100):
+        values = {name: table[name][row] for name in table.columns}
+        points = [
+            [values[f"auv{i}.{group}.{axis}"] for axis in "xyz"]
+            for i in range(1, n + 1)
+            for group in ("plant.eta", "planner.y_d")
+        ]
+        camera = scene.camera(row)
+        # The control point is 0.35 m from the centre, and half the picture is 0.5 wide.
+        seen, ahead = camera.project(np.array(points) * turn)
+        x, y = np.abs(seen).T
+        assert max(x) < 0.5
+        assert max(y) < 0.56
+        # What is a tenth as far away as the middle would be ten times as large.
+        assert min(ahead) > 0.2 * camera.width
+
+
+def test_film_of_several_has_one_picture_with_the_colours_of_all(tmp_path):
+    path = tmp_path / "film.gif"
+    animate("title", Drawn("run", fleet_table(3), loops=fleet(3)), path, fps=2)
+    frames = frames_of(path)
+    assert len(frames) == 20
+    assert all((a != b).any() for a, b in pairwise(frames))
+    # Left of the panels and above the legend.
+    scene = frames[-1][40:380, :380]
+    for colour in vehicle_colours(3):
+        rgb = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+        is_near = (np.abs(scene - rgb) < 12).all(axis=2)
+        assert is_near.sum() > 20
+
+
+def test_vehicle_without_a_reference_is_filmed_with_the_others(tmp_path):
+    missing = fleet(2)[0].y_d
+    run = Drawn("run", fleet_table(2, without=missing), loops=fleet(2))
+    animate("title", run, tmp_path / "film.gif", fps=1)
+    assert len(frames_of(tmp_path / "film.gif")) == 10

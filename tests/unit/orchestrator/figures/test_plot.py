@@ -11,6 +11,7 @@ from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.observer import Ending, Occurrence
 from orchestrator.master.observers.table import Table
+from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop
 from support.tables import loop_table, table_of
 
@@ -114,6 +115,16 @@ def test_runs_that_differ_in_their_events_only_are_told_apart_by_these():
     assert [run.label for run in told_apart(runs)] == ["no event", "no position at 2 s"]
     numbered = ["fig4 (1)", "fig4 (2)", "fig4 (3)"]
     assert [run.label for run in told_apart([*runs, runs[0]])] == numbered
+
+
+def test_a_stored_run_of_dotted_components_differs_in_what_differs_only():
+    """Its record does not say where the component ends in the name of a parameter."""
+    split = (
+        {PortName("a", "b.k"): 1.0, PortName("a", "b.n"): 3},
+        {PortName("a.b", "k"): 2.0, PortName("a.b", "n"): 3},
+    )
+    runs = [Drawn("s", table_of(TIME, values, a__b__y=0.0)) for values in split]
+    assert [run.label for run in told_apart(runs)] == ["a.b.k = 1", "a.b.k = 2"]
 
 
 def test_what_cannot_be_chosen_is_explained():

@@ -15,6 +15,7 @@ from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS
 from orchestrator.studies.study_file import study_of
+from orchestrator.system.structure import renamed
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 
@@ -55,6 +56,21 @@ def test_list_for_a_group_is_a_value_for_each_member():
     assert dict(runs[1].parameters) == shared | gains
     with pytest.raises(InputError, match=r"controller\.K1: takes 3 values, not 2"):
         space(parameters={"controller.K1": [1, 2]}, vary={"plant.ell": [0.3, 0.4]})
+
+
+def test_values_of_components_in_systems_vary():
+    """Units are those of their variables."""
+    scenario, system = load_scenario("fig5")
+    nested = renamed(system, {name: f"auv1.{name}" for name in system.components})
+    content = {
+        "scenario": "fig5", "parameters": {"auv1.planner.eta0": [0, 1, -3, 0, 0.5]},
+        "vary": {"auv1.plant.ell": [0.3, 0.4], "auv1.controller.saturation": ["tanh"]},
+    }  # fmt: skip
+    runs = Space(study_of("mine", content), {"fig5": (scenario, nested)})
+    assert runs.columns == {"auv1.plant.ell": float, "auv1.controller.saturation": str}
+    assert runs[1].parameters["auv1.plant.ell"] == 0.4
+    assert runs[1].parameters["auv1.planner.eta0.psi"] == 0.5
+    assert runs.units["auv1.plant.ell"] == "m"
 
 
 def test_each_point_is_run_with_each_scenario_that_has_what_it_has():

@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, flattened, renamed
+from orchestrator.system.units import Linear
 from support.archives import fmu, variable
 
 
@@ -63,8 +65,25 @@ def test_two_ports_of_one_name_are_refused(system, tmp_path: Path):
 
 def test_name_of_no_port_is_refused(system):
     assert not system.has(port_name("a.b.x"))
-    with pytest.raises(InputError, match=r"a has no port or parameter 'b\.x'"):
+    with pytest.raises(InputError, match=r"a\.b has no port or parameter 'x'"):
         system.with_parameters({port_name("a.b.x"): 1})
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("auv1.plnt.eta.x", r"no component 'auv1\.plnt'; .*; did you mean auv1\.plant"),
+        ("auv1.plant.eta.w", r"auv1\.plant has no port or parameter 'eta\.w'"),
+        ("auv2.k", r"no component 'auv2'; it has auv1\.a, .* and 1 more"),
+        ("other.plant.k", r"no component 'other'; it has"),
+    ],
+)
+def test_what_was_meant_is_said_of_components_in_systems(tmp_path: Path, text: str, words: str):
+    path = fmu(tmp_path / "a.fmu", variable("k", "parameter"), variable("eta.x", "parameter"))
+    names = [f"auv1.{name}" for name in ("a", "b", "c", "d", "e", "plant")]
+    system = System("s", {name: read_component(name, path) for name in names}, ())
+    with pytest.raises(InputError, match=words):
+        system.with_parameters({text: 1})
 
 
 def test_name_without_a_component_is_refused_with_those_that_have_it(system):
@@ -173,3 +192,42 @@ def test_a_list_for_a_group_of_several_components_is_of_each(fleet):
 def test_values_of_several_components_must_be_as_many(fleet, value, said):
     with pytest.raises(InputError, match=rf"auv\*\.a\.k.*{said}"):
         fleet.with_parameters({"auv*.a.k": value})
+
+
+# Other names for components
+
+
+def chain_of(folder: Path, *names: str) -> System:
+    ports = variable("u.x", "input"), variable("y", "output"), variable("k", "parameter")
+    path = fmu(folder / "a.fmu", *ports)
+    first, last = names[0], names[-1]
+    return System(
+        "s",
+        {name: read_component(name, path) for name in names},
+        (Connection(PortName(first, "y"), PortName(last, "u.x"), Linear(2.0)),),
+        {PortName(last, "k"): 3.0},
+        steps={first: 0.5},
+        left_open={PortName(first, "u.x")},
+    )
+
+
+def test_all_that_names_a_component_has_its_new_name(tmp_path: Path):
+    system = renamed(chain_of(tmp_path, "a", "b", "c"), {"a": "v.a", "c": "a"})
+    assert [(name, part.name) for name, part in system.components.items()] == [
+        ("v.a", "v.a"), ("b", "b"), ("a", "a"),
+    ]  # fmt: skip
+    assert system.connections == (
+        Connection(PortName("v.a", "y"), PortName("a", "u.x"), Linear(2.0)),
+    )
+    assert system.parameters == {PortName("a", "k"): 3.0}
+    assert system.steps == {"v.a": 0.5}
+    assert system.left_open == {PortName("v.a", "u.x")}
+    assert system.parameters_of("a") == {"k": 3.0} and system.open_inputs("a") == []
+
+
+def test_flat_names_are_distinct(tmp_path: Path):
+    names = ["v.a", "v_a", "v.a_", "w", "v_.a", "v.b.c", "v.b_c"]
+    system = flattened(chain_of(tmp_path, *names))
+    assert list(system.components) == ["v_a_", "v_a", "v_a__", "w", "v__a", "v_b_c", "v_b_c_"]
+    flat = chain_of(tmp_path, "a", "b_c")
+    assert flattened(flat) is flat

@@ -1,0 +1,108 @@
+"""Many vehicles in one process: `python benchmarks/vehicles.py`.
+
+Each vehicle is the closed loop of Fig. 4, four FMUs; nothing connects one with another. Every run
+is a process of its own, whose rows are dropped. Printed are
+
+- `load`: from the scenario to the system,
+- `start`: plan, instances, initialisation and first exchange of values,
+- `step`: of one vehicle, in the compiled loop and in the Python loop, in time of the processor,
+- `memory`: that each vehicle adds to the process until its first step; the first one has what a run
+  before it has left.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import sys
+from time import perf_counter, process_time
+
+import measuring
+import numpy as np
+
+from auv_fmu.euler import STEP
+from fmus.kinds import NATIVE, PYTHON, KindName
+from orchestrator.master.loop import LoopName
+from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import prepare
+from orchestrator.runs.request import Request
+from orchestrator.runs.scenario import Scenario
+
+#: How many vehicles, by the kind of their FMUs.
+SIZES: dict[KindName, tuple[int, ...]] = {NATIVE: (1, 10, 100, 1000), PYTHON: (1, 10, 100)}
+
+#: Steps of all vehicles together, and the fewest of each.
+VEHICLE_STEPS, FEWEST = {NATIVE: 100_000, PYTHON: 2_000}, 20
+
+#: Both loops, and the one that `load`, `start` and `memory` are of.
+LOOPS: tuple[LoopName, ...] = ("compiled", "python")
+COMPILED = LOOPS[0]
+
+#: How long a process may take [s].
+LIMIT = 600.0
+
+
+class Watch:
+    """An observer that drops the rows, and knows when the first exchange was over."""
+
+    began, memory, spent, ended = 0.0, 0.0, 0.0, 0.0
+
+    def begin(self, header: Header) -> None:
+        self.began = perf_counter()
+        gc.collect()
+        self.memory, self.spent = measuring.resident(), process_time()
+
+    def take(self, rows: np.ndarray) -> None:
+        self.ended = process_time()
+
+    def end(self, ending: Ending) -> None:
+        pass
+
+
+def found(n: int, kind: KindName, loop: LoopName, steps: int) -> list[float]:
+    """Seconds to load and to start, microseconds of a vehicle's step, and its memory [MB]."""
+    # What the first system takes, and the libraries, is there before.
+    prepare(Scenario("warm"), load("fig4", kind), Request(stop_time=STEP, loop=loop)).run([Watch()])
+    gc.collect()
+    before, begun, watch = measuring.resident(), perf_counter(), Watch()
+    system = load({"vehicles": n}, kind)
+    loaded = perf_counter()
+    prepared = prepare(Scenario(system.name), system, Request(stop_time=steps * STEP, loop=loop))
+    ending = prepared.run([watch])
+    if ending.failure is not None:
+        raise SystemExit(ending.failure)
+    microseconds = 1e6 * (watch.ended - watch.spent) / (steps * n)
+    return [loaded - begun, watch.began - loaded, microseconds, (watch.memory - before) / n]
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sizes", nargs="+", type=int, metavar="N", help="default: up to 1000")
+    parser.add_argument("--kinds", nargs="+", choices=SIZES, default=list(SIZES))
+    given = parser.parse_args()
+    print(measuring.python())
+    steps_of = "".join(f"{f'step, {loop}':>18}" for loop in LOOPS)
+    print(f"{'kind':8}{'vehicles':>9}{'load':>10}{'start':>10}{steps_of}{'memory':>14}")
+    for kind in given.kinds:
+        for n in given.sizes or SIZES[kind]:
+            steps = max(VEHICLE_STEPS[kind] // n, FEWEST)
+            all_found = {
+                loop: measuring.found_apart(__file__, n, kind, loop, steps, limit=LIMIT)
+                for loop in LOOPS
+            }
+            loading, start, _, memory = all_found[COMPILED]
+            of_loops = "".join(f"{all_found[loop][2]:15.2f} us" for loop in LOOPS)
+            print(
+                f"{kind:8}{n:9,}{loading:8.2f} s{start:8.2f} s{of_loops}{memory:11.3f} MB",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    if sys.argv[1:2] == [measuring.ONE]:
+        number, kind, loop, steps = sys.argv[2:]
+        measuring.tell(found(int(number), kind, loop, int(steps)))
+    else:
+        main()
