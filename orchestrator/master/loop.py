@@ -5,7 +5,7 @@ Both make the same calls of FMI in the same order, and the same rows bit for bit
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from ctypes import CDLL
 from functools import partial
@@ -27,6 +27,10 @@ LOOPS: tuple[LoopName, ...] = get_args(LoopName)
 #: To set the compiled loop up takes as long as so many steps in Python, and to compile it as long
 #: as so many.
 _SET_UP, _COMPILED = 20, 10_000
+
+#: Of more values than these numpy's library shares products among threads, which takes milliseconds
+#: where the other cores are busy.
+_MOST_MULTIPLIED = 4_096
 
 
 class Steps(Protocol):
@@ -55,8 +59,7 @@ def step_interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
     values, shown, append = run.row.values, run.row.shown, run.blocks.append
     experiment, stages, steps = run.experiment, run.stages, run.experiment.rows - 1
-    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
-    is_not_finite = partial(np.vdot, shown, np.zeros_like(shown))
+    is_not_finite = _watch(shown)
     for k, t, h, end in experiment.steps(run.made):
         for gather, members, decimation in stages:
             if decimation is None:
@@ -74,6 +77,14 @@ def step_interpreted(run: Run) -> Iterator[None]:
         append(end, shown)
         run.made = k
         yield
+
+
+def _watch(values: np.ndarray) -> Callable[[], object]:
+    """What says whether one of some values is not finite."""
+    if len(values) > _MOST_MULTIPLIED:
+        return lambda: not np.isfinite(values).all()
+    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
+    return partial(np.vdot, values, np.zeros_like(values))
 
 
 #: The loop that is always there.

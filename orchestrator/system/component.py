@@ -288,15 +288,10 @@ class Component:
             return None
         return typed(f"{self.name}.{name}", variable, variable.start)
 
-    @cached_property
-    def starts(self) -> dict[str, Value]:
+    @property
+    def starts(self) -> Mapping[str, Value]:
         """Start values that the description names, except nonsense, which is of no use."""
-        values: dict[str, Value] = {}
-        for name in self.variables:
-            with suppress(InputError):
-                value = self.start(name)
-                values |= {} if value is None else {name: value}
-        return values
+        return _starts_of(self.description)
 
     def experiment(self, name: str) -> float | None:
         """What its DefaultExperiment says, such as `stopTime` [s]; None: no number, or nothing."""
@@ -331,14 +326,35 @@ class Component:
 
     @cached_property
     def _feedthrough(self) -> frozenset[str]:
-        """An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8)."""
-        free = {
-            unknown.variable.name
-            for unknown in self.description.outputs
-            if unknown.dependencies is not None
-            and not any(variable.causality == "input" for variable in unknown.dependencies)
-        }
-        return frozenset(v.name for v in self.having("output") if array_of(v) not in free)
+        return _feedthrough_of(self.description)
+
+
+# What all components of an FMU share is found once: there may be thousands of them.
+
+
+@lru_cache(maxsize=256)
+def _starts_of(description: ModelDescription) -> Mapping[str, Value]:
+    values: dict[str, Value] = {}
+    for name, variable in variables_of(description).known.items():
+        if variable.start is not None:
+            with suppress(InputError):
+                values[name] = typed(name, variable, variable.start)
+    return values
+
+
+@lru_cache(maxsize=256)
+def _feedthrough_of(description: ModelDescription) -> frozenset[str]:
+    """An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8)."""
+    free = {
+        unknown.variable.name
+        for unknown in description.outputs
+        if unknown.dependencies is not None
+        and not any(variable.causality == "input" for variable in unknown.dependencies)
+    }
+    variables = variables_of(description).known.values()
+    return frozenset(
+        v.name for v in variables if v.causality == "output" and array_of(v) not in free
+    )
 
 
 def read_component(

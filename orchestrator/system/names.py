@@ -58,6 +58,29 @@ def splits(text: str) -> Iterator[tuple[str, str]]:
         dot = text.rfind(".", 0, dot)
 
 
+def likely_port(name: PortName, components: Collection[str]) -> PortName:
+    """A name that begins with no component, taken apart after the systems that it begins with."""
+    outer, inner = name.component, name.port
+    while "." in inner and any(one.startswith(f"{outer}.") for one in components):
+        part, _, inner = inner.partition(".")
+        outer = f"{outer}.{part}"
+    return PortName(outer, inner)
+
+
+def paired(
+    name: object, ports: Sequence[PortName], values: Sequence[Any]
+) -> Iterator[tuple[PortName, Any]]:
+    """The ports of a group, each with its value.
+
+    Raises:
+        InputError: there are more of one than of the other.
+
+    """
+    if len(values) != len(ports):
+        raise InputError(f"{name}: takes {len(ports)} values, not {len(values)}")
+    return zip(ports, values, strict=True)
+
+
 def flatten(
     table: Mapping[str, Any], is_value: Callable[[Any], bool] = lambda _: False, prefix: str = ""
 ) -> Iterator[tuple[str, Any]]:

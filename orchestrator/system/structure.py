@@ -14,7 +14,15 @@ import numpy as np
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection, check_connection
-from orchestrator.system.names import PortName, listed, plain_file_names, port_name, splits
+from orchestrator.system.names import (
+    PortName,
+    likely_port,
+    listed,
+    paired,
+    plain_file_names,
+    port_name,
+    splits,
+)  # fmt: skip
 from orchestrator.system.values import Value, is_finite, typed
 
 #: Values by the names of ports or of groups, taken apart or as text.
@@ -142,26 +150,16 @@ class System:
     def named(self, name: PortName) -> PortName:
         """The port that a name means, which may have dots in its component's name as well.
 
-        It is one of the longest component that the text begins with and that has such a port. Where
-        there is none, it is of the component that was most likely meant. With a star, it is the
-        first of those it means.
+        It is one of the longest component that the text begins with and that has such a port, else
+        of the one that was likely meant. With a star, it is the first of those it means.
         """
-        name, components = self.meant(name)[0], self.components
-        likely = None
+        name, components, likely = self.meant(name)[0], self.components, None
         for component, port in splits(str(name)):
             if component in components:
                 if port in components[component].variables:
                     return PortName(component, port)
                 likely = likely or PortName(component, port)
-        return likely or self._likely(name)
-
-    def _likely(self, name: PortName) -> PortName:
-        """A name that begins with no component, taken apart after the systems it begins with."""
-        outer, inner = name.component, name.port
-        while "." in inner and any(one.startswith(f"{outer}.") for one in self.components):
-            part, _, inner = inner.partition(".")
-            outer = f"{outer}.{part}"
-        return PortName(outer, inner)
+        return likely or likely_port(name, components)
 
     def has(self, name: PortName) -> bool:
         """Whether there is such a port or parameter."""
@@ -324,20 +322,6 @@ def flattened(system: System) -> System:
             names[name] = plain
             taken.add(plain)
     return renamed(system, names) if names else system
-
-
-def paired(
-    name: object, ports: Sequence[PortName], values: Sequence[Any]
-) -> Iterator[tuple[PortName, Any]]:
-    """The ports of a group, each with its value.
-
-    Raises:
-        InputError: there are more of one than of the other.
-
-    """
-    if len(values) != len(ports):
-        raise InputError(f"{name}: takes {len(ports)} values, not {len(values)}")
-    return zip(ports, values, strict=True)
 
 
 def is_spread(value: object) -> bool:

@@ -18,9 +18,9 @@ from orchestrator.master.schedule import Decimation, Stage, StageCall
 SHORT, LONG = Experiment(10.0, 1.0), Experiment(1e6, 1.0)
 
 
-def made(limit: float, experiment: Experiment) -> SimpleNamespace:
+def made(limit: float, experiment: Experiment, width: int = 3) -> SimpleNamespace:
     """A run of two values: y = t + h, and x, which takes y after it; every third step shows x."""
-    values = np.zeros(3)
+    values = np.zeros(width)
 
     def act(t: float, h: float) -> None:
         values[0] = t + h if t + h < limit else np.nan
@@ -49,8 +49,10 @@ def test_stages_come_one_after_the_other_and_slow_ones_when_they_are_due():
     assert run.rows == [[0.5, 0.5, 0, 0], [1, 1, 0.5, 0], [1.5, 1.5, 1, 1], [2, 2, 1.5, 1.5]]
 
 
-def test_a_row_that_is_not_finite_is_not_kept():
-    run = made(1.5, Experiment(2.0, 0.5))
+@pytest.mark.parametrize("width", [3, 4_096, 4_097, 20_000])
+def test_a_row_that_is_not_finite_is_not_kept(width: int):
+    """Long rows are looked through in another way."""
+    run = made(1.5, Experiment(2.0, 0.5), width)
     list(step_interpreted(run))
     assert run.made == len(run.rows) == 2
     assert np.isnan(run.row.values[0])
