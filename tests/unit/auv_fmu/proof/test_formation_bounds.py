@@ -18,13 +18,17 @@ from auv_fmu.proof.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAI
 from support.formations import follow, known, tables
 
 
+def trapezoid(y: np.ndarray, t: np.ndarray) -> float:
+    return float(np.sum((y[1:] + y[:-1]) / 2 * np.diff(t)))
+
+
 def test_gains_of_the_filter_are_the_integrals_of_its_responses():
     """By the trapezoidal rule over a response, and over the slope of it, of 100 time constants."""
     t = np.linspace(0.0, 100.0, 2_000_001)
     rate, lag = (3 * t - t * t) * np.exp(-t), (1 + t - t * t) * np.exp(-t)
-    assert np.trapezoid(np.abs(rate), t) == pytest.approx(RATE_GAIN, rel=1e-8)
+    assert trapezoid(np.abs(rate), t) == pytest.approx(RATE_GAIN, rel=1e-8)
     assert np.abs(np.diff(rate)).sum() == pytest.approx(ACCELERATION_GAIN, rel=1e-8)
-    assert np.trapezoid(np.abs(lag), t) == pytest.approx(LAG_GAIN, rel=1e-8)
+    assert trapezoid(np.abs(lag), t) == pytest.approx(LAG_GAIN, rel=1e-8)
 
 
 @given(
@@ -118,7 +122,8 @@ LINKS = [
     (Estimator(), formation_bounds.Messages(1.0, (0.2, 0.2), 2), 0.02),
     (Estimator(k_d=1.0), formation_bounds.Messages(1.0, (0.2, 0.2), 2), 0.02),
 ]
-_BOUNDS = [formation_bounds.estimate_bounds(*link) for link in LINKS]
+H = 0.1
+BOUNDS = [formation_bounds.estimate_bounds(*link, h=H) for link in LINKS]
 
 
 @given(
@@ -128,8 +133,7 @@ _BOUNDS = [formation_bounds.estimate_bounds(*link) for link in LINKS]
 )
 def test_no_leader_is_farther_from_its_estimate_than_proven(which, pushes, random):
     """Leaders from rest, pushed to and fro as hard as they may be, and messages that get lost."""
-    (estimator, messages, most), bound = LINKS[which], _BOUNDS[which]
-    h = 0.1
+    (estimator, messages, most), bound, h = LINKS[which], BOUNDS[which], H
     signs = [sign for sign, steps in pushes for _ in range(steps)]
     n = len(signs)
     v = np.concatenate([[0.0], np.cumsum(signs) * most * h])
@@ -148,12 +152,6 @@ def test_no_leader_is_farther_from_its_estimate_than_proven(which, pushes, rando
         now = round(t / h)
         assert abs(y[now] - state.y_hat[0]) <= bound.position
         assert abs(v[now] - state.dy_hat_o[0]) <= bound.velocity
-
-
-def test_bounds_hold_for_steps_of_a_tenth_of_a_second():
-    """The test above takes these; the bounds are those of smaller steps within some per cent."""
-    for link, bound in zip(LINKS, _BOUNDS, strict=True):
-        assert formation_bounds.estimate_bounds(*link, h=0.1).position >= 0.9 * bound.position
 
 
 def test_bounds_are_infinite_where_the_proof_does_not_reach():
