@@ -91,12 +91,13 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
 
 def _left_open(chosen: Mapping[str, str], wiring: Mapping[str, Any]) -> Iterator[str]:
     """The groups of inputs that the closed loop leaves open, of all components of the same FMU."""
+    found = set()
     for target, source in wiring["wires"].items():
         if source is False:
             component = component_of(target, wiring["components"])
-            group = target.removeprefix(component)
-            standard = wiring["components"][component]
-            yield from (f"{name}{group}" for name, fmu in chosen.items() if fmu == standard)
+            found.add((wiring["components"][component], target.removeprefix(component)))
+    for standard, group in found:
+        yield from (f"{name}{group}" for name, fmu in chosen.items() if fmu == standard)
 
 
 def _changed(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from orchestrator.figures.run_figures import FLEET
 from orchestrator.figures.study_values import Values
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.studies.study import Study, ready_studies
@@ -19,6 +20,8 @@ SEEN = {
     "the commands and their limits, and the estimated parameters",
     "comparison": "paths of both vehicles and their reference in space; over time the commands and "
     "their limits, and the tracking errors, also on a logarithmic scale",
+    FLEET: "paths of all vehicles and their references in space and from above; over time the sizes "
+    "of their tracking errors, and the distances between them",
     "comparison-errors": "tracking errors of both controllers over time, also on a logarithmic "
     "scale",
     "open-loop-surge": "path of the vehicle in space; over time its surge velocity and "
@@ -69,7 +72,8 @@ def seen(study: Study, figure: str) -> str:
 
 def _scenario(scenario: Scenario) -> str:
     title = scenario.title
-    shown = f"{title}: {SEEN[scenario.figure]}", f"{PICTURES}/{scenario.name}.png"
+    figure = FLEET if scenario.vehicles else scenario.figure
+    shown = f"{title}: {SEEN[figure]}", f"{PICTURES}/{scenario.name}.png"
     return _entry(title, shown, _sentence(scenario.remark), f"run {scenario.name}", scenario.name)
 
 
