@@ -35,8 +35,9 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 
 STEP, STEPS = 0.01, 10
 

@@ -31,13 +31,15 @@ BY_SUBJECT = ("src/auv_fmu", *(page.parent.as_posix() for page in COMPONENTS))
 REASONS = {
     "fmus/ports/controllers.py": "in the FMUs of controllers only",
     "fmus/ports/quantities.py": "ports and groups need it, and it needs nothing",
+    "fmus/ports/tail.py": "in the FMUs of Remus100 and Allocation only",
     "fmus/ports/vehicle.py": "in the FMUs of plant and planners only",
     "fmus/python/own.py": "slaves of PythonFMU only, which no component needs",
     "orchestrator/commands/listing.py": "imports nothing that takes longer than the command",
     "orchestrator/commands/streams.py": "all commands need it before they import anything large",
     "orchestrator/exchange/hosts/drivers.py": "a function for each tool, and nothing of ours",
+    "orchestrator/figures/body.py": "pages need it without matplotlib, and films without a page",
+    "orchestrator/figures/view.py": "puts a page together, of parts that are modules",
     "orchestrator/paper/claims.py": "a function for each claim of the paper",
-    "orchestrator/system/renaming.py": "a change of names only, which no system needs",
 }
 
 

@@ -8,7 +8,7 @@ from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, setting
 from fmus.ports.quantities import ACCELERATION, POSITION, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, LIMITS, PAPER, VEHICLE, reference
 
-DESCRIPTION = "Formation planner: reference of a vehicle in its place beside a leader"
+DESCRIPTION = "Formation planner: reference of a vehicle that keeps its place beside a leader"
 ORIGIN = PAPER
 
 #: Fields of its inputs that bear another name than their group of ports.

@@ -15,7 +15,7 @@ ORIGIN = PAPER
 
 _WAVES, _CURRENT, _SEA = Waves(), Current(), Sea()
 
-#: Largest exponent of the spreading, as a multiple of which its integration is still fine.
+#: Largest exponent of the spreading: narrower ones need finer angles than it is integrated over.
 _NARROWEST = 100.0
 
 _POSITION = inputs("eta", POSITION, "Position of the vehicle, z down from still water")

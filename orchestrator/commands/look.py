@@ -29,7 +29,7 @@ from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
-from orchestrator.vehicle.signals import Loop, loops_of, suffixes
+from orchestrator.vehicle.signals import loops_of
 
 #: The scenario that a live page opens unless another is named.
 _OPENED = "fig4"
@@ -60,8 +60,8 @@ def add_view(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu view`."""
     describe(
         parser,
-        "Write one self-contained page that plays a stored result: the path in 3D, and signals "
-        "over time.",
+        "Write one self-contained page that plays a stored result: the paths of its vehicles in "
+        "3D, and signals over time.",
         "view results/fig4",
     )
     parser.add_argument("result", type=Path, metavar="RESULT", help="result folder or table")
@@ -93,7 +93,8 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
     describe(
         parser,
-        "Run a scenario and write a film of the vehicle with its errors and commands.",
+        "Run a scenario and write a film of the vehicle with its errors and commands, or of "
+        "several vehicles with the sizes of their errors and their smallest distance.",
         "animate fig4 --out fig4.gif",
     )
     add_system(parser)
@@ -127,7 +128,7 @@ def _plot(options: argparse.Namespace) -> int:
     wanted = partial(wanted_columns, patterns=patterns)
     runs = _named([read_result(path, wanted) for path in paths], paths)
     figure = plot(told_apart(runs, paths), patterns)
-    with _written([options.out], options.force) as folder:
+    with _written(options.out, options.force) as folder:
         save(figure, folder / options.out.name)
     return OK
 
@@ -169,14 +170,12 @@ def _view(options: argparse.Namespace) -> int:
     # A title may name all runs that a scenario compares; the page shows one.
     if label := record.get("label"):
         title += f" (shown: {label})"
-    shown = list(_of_vehicles(run, out, title))
     try:
-        pages = {file.name: view_page(heading, one) for one, file, heading in shown}
+        text = view_page(title, run)
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
-    with _written([file for _, file, _ in shown], options.force) as folder:
-        for name, text in pages.items():
-            (folder / name).write_text(text, encoding="utf-8")
+    with _written(out, options.force) as folder:
+        (folder / out.name).write_text(text, encoding="utf-8")
     return OK
 
 
@@ -188,16 +187,9 @@ def _live(options: argparse.Namespace) -> int:
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
     text = live_page(options.scenario, say)
-    with _written([out], options.force) as folder:
+    with _written(out, options.force) as folder:
         (folder / out.name).write_text(text, encoding="utf-8")
     return OK
-
-
-def _of_vehicles(run: Drawn, path: Path, title: str) -> Iterator[tuple[Drawn, Path, str]]:
-    """A run once for each of its vehicles, with the file and the heading of each."""
-    for loop, vehicle in suffixes(run.loops).items():
-        file = path.with_name(f"{path.stem}{vehicle}{path.suffix}")
-        yield run._replace(loops=[loop]), file, f"{title}, {loop.name}" if vehicle else title
 
 
 def _animate(options: argparse.Namespace) -> int:
@@ -209,21 +201,18 @@ def _animate(options: argparse.Namespace) -> int:
     seen = VisibleRows({name for loop in loops for name in loop.drawn()})
     observers: list[Observer] = [seen, Progress(scenario.name)]
     run = Drawn(scenario.name, seen, scenario.z_up, loops)
-    films = list(_of_vehicles(run, out, scenario.title or scenario.name))
-    with _written([file for _, file, _ in films], options.force) as folder:
+    with _written(out, options.force) as folder:
         ending = prepared.run(observers)
-        for one, file, heading in films:
-            if missing := one.lacks(Loop.for_control_point):
+        for loop in loops:
+            if missing := seen.missing(*loop.for_control_point()):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-            animate(heading, one, folder / file.name, options.fps)
+        animate(scenario.title or scenario.name, run, folder / out.name, options.fps)
     return status(scenario.name, ending)
 
 
 @contextmanager
-def _written(files: Sequence[Path], force: bool) -> Iterator[Path]:
-    """A folder to write files into that then lie in theirs, whole or not at all; says where."""
-    names = [file.name for file in files]
-    with replace_files(files[0].parent, names, force=force) as unfinished:
+def _written(file: Path, force: bool) -> Iterator[Path]:
+    """A folder to write a file into that then lies in its own, whole or not at all; says where."""
+    with replace_files(file.parent, [file.name], force=force) as unfinished:
         yield unfinished
-    for file in files:
-        show(file)
+    show(file)

@@ -17,8 +17,9 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.binary import binary_of
 from orchestrator.master.plan import gathered_connections, stages
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 
 #: The program.

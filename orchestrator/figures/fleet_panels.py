@@ -67,7 +67,9 @@ def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
     instants = np.linspace(time[0], time[-1], _INSTANTS)
     for row in np.searchsorted(time, instants).clip(0, len(time) - 1).tolist():
         points = np.array([path[row] for path in paths])
-        axes.plot(points[:, 1], points[:, 0], color="black", linewidth=0.8, zorder=3)
+        # Lines from the first to each other one: a V looks like a V.
+        spokes = np.array([(points[0], point) for point in points[1:]]).reshape(-1, 2, 3)
+        axes.plot(*spokes[:, :, 1::-1].T, color="black", linewidth=0.8, zorder=3)
         axes.scatter(points[:, 1], points[:, 0], color=[c for _, c in shown], s=14, zorder=4)
     between = (time[-1] - time[0]) / (_INSTANTS - 1)
     title(axes, f"from above, joined every {between:.3g} s")

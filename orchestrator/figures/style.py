@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import colorsys
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from itertools import cycle
 from typing import Any, NamedTuple
@@ -15,6 +17,9 @@ from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 STYLES = ("-", "--", "-.", ":")
 REFERENCE = "#555555"
+
+#: Hues of more vehicles than there are colours: their lightnesses in turn, and their saturation.
+_LIGHTNESSES, _SATURATION = (0.32, 0.6), 0.75
 
 #: Width of the page [in]: two columns of a journal, and a phone still shows its letters.
 FIGURE_WIDTH = 7.2
@@ -83,6 +88,24 @@ class Drawn(NamedTuple):
     def lacks(self, needs: Callable[[Loop], Needs]) -> list[str]:
         """What of that which something needs is not there."""
         return self.result.missing(*needs(self.loop))
+
+
+def vehicle_colours(n: int) -> list[str]:
+    """A colour for each of n vehicles, all different; of more than seven, many are alike."""
+    colours = list(COLOURS[:n])
+    more = n - len(colours)
+    for i in range(more):
+        lightness = _LIGHTNESSES[i % len(_LIGHTNESSES)]
+        rgb = colorsys.hls_to_rgb(i / more, lightness, _SATURATION)
+        colours.append("#" + "".join(f"{round(255 * part):02X}" for part in rgb))
+    return colours
+
+
+def reference_colours(loops: Sequence[Loop]) -> list[str]:
+    """The colour of each vehicle's reference: its own, or grey where several have the same."""
+    followed = Counter(loop.y_d for loop in loops)
+    colours = zip(loops, vehicle_colours(len(loops)), strict=True)
+    return [REFERENCE if followed[loop.y_d] > 1 else colour for loop, colour in colours]
 
 
 def earth_axes(z_up: bool) -> tuple[str, str, str]:

@@ -19,8 +19,9 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import check_file, is_folder
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, file_name, plain_file_names
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
 

@@ -39,13 +39,14 @@ from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, loops_of
 
 
 class _Controller(NamedTuple):
@@ -55,17 +56,19 @@ class _Controller(NamedTuple):
         label: where a scenario names none.
         other: a scenario with the other controller and nothing else of its own, for scenarios that
             name no comparison.
+        allocated: the same for a vehicle whose actuators are allocated.
 
     """
 
     label: str
     other: str
+    allocated: str
 
 
 #: In the order in which they are drawn.
 _CONTROLLERS = {
-    "ObserverController": _Controller("proposed", "path-pd"),
-    "PdController": _Controller("PD", "path"),
+    "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
+    "PdController": _Controller("PD", "path", "remus"),
 }
 
 #: Groups of signals that have charts, with the units of their members.
@@ -163,7 +166,10 @@ def runs_of(name: str) -> list[Prepared]:
 def _other(system: System) -> str:
     """The scenario with the controller that a system does not have; empty: it has neither."""
     controller = _controller(system)
-    return controller.other if controller else ""
+    if controller is None:
+        return ""
+    is_allocated = isinstance(loops_of(system)[0], AllocatedLoop)
+    return controller.allocated if is_allocated else controller.other
 
 
 def _controller(system: System) -> _Controller | None:

@@ -30,9 +30,10 @@ from platform import python_version
 
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.master.experiment import JACOBI, LINEAR, ORDERS, Experiment, Order, decimations
+from orchestrator.system.connection import Connection
 from orchestrator.system.graph import delayed_connections, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 
 #: Packages whose versions the rows depend on.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")

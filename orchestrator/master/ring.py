@@ -19,8 +19,9 @@ from orchestrator.machine.errors import shortened
 from orchestrator.master.fmi.instance import ComponentFailed, Instance
 from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.values import real, type_of
 
 #: A ring is at rest where what arrives at each input differs by no more than this, relatively or

@@ -11,8 +11,9 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.master.fmi.instance import Instance, Part
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped
 from orchestrator.system.values import TYPES, Standing, StringTable, Value, are_of
 from orchestrator.system.variables import references_of

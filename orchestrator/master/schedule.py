@@ -27,8 +27,8 @@ from orchestrator.master.plan import Plan, gathered_connections
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection
 
 
 class Member(NamedTuple):

@@ -270,17 +270,21 @@ def _beside(
         only = [*scenario.only, *(name for name in theirs if name not in ours)]
     companion = replace(
         companion,
-        components={**theirs, **{name: ours[name] for name in shared}},
+        components={
+            **{name: fmu for name, fmu in theirs.items() if name in ours or name not in planners},
+            **{name: ours[name] for name in shared},
+        },
         wires=wires,
         only=only,
         parameters={},
     )
     new = closed_loop(current_fmus(kind), companion)
+    fed = {connection.target for connection in new.connections}
     values = {
         name: system.value(name) if is_planned else value
         for name, value in given.items()
         for is_planned in [new.named(name).component in planners]
-        if new.has(name) and (system.has(name) or not is_planned)
+        if new.has(name) and (system.has(name) or not is_planned) and new.named(name) not in fed
     }
     steps = {
         name: step

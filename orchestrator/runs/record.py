@@ -33,7 +33,7 @@ from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.signals import STANDARD, Loop
+from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
 
 #: The indices of a run.
 METRICS = "metrics.json"
@@ -182,7 +182,7 @@ def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
 
 def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
     """The loops of the vehicles of a run, from its record; of one without, the standard one."""
-    return tuple(Loop(**names) for names in record.get("vehicles", ())) or (STANDARD,)
+    return tuple(loop_of(names) for names in record.get("vehicles", ())) or (STANDARD,)
 
 
 def read_result(

@@ -20,8 +20,9 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, flatten, paired, port_name
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped
 from orchestrator.system.values import TYPES, Value, finite, is_finite, literal, type_of, typed
 

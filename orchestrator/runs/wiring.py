@@ -11,8 +11,9 @@ from typing import Any
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, vehicle_names
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, for_each, listed, port_name, splits
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.variables import BUS, COMPLETE, Terminal
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")

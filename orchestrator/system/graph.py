@@ -7,8 +7,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from fmpy.model_description import ModelVariable
 
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection, can_feed
 from orchestrator.system.names import PortName, listed
-from orchestrator.system.structure import Connection, System, can_feed
+from orchestrator.system.structure import System
 
 #: What each component waits for: the components whose direct feedthrough feeds it.
 _Sources = Mapping[str, Collection[str]]

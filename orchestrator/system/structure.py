@@ -7,14 +7,13 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from sys import float_info
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection, check_connection
 from orchestrator.system.names import (
     PortName,
     likely_port,
@@ -24,8 +23,7 @@ from orchestrator.system.names import (
     port_name,
     splits,
 )  # fmt: skip
-from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.system.values import EXACT, TYPES, Value, is_finite, typed, unit_of
+from orchestrator.system.values import Value, is_finite, typed
 
 #: Values by the names of ports or of groups, taken apart or as text.
 Values = Mapping[PortName, object] | Mapping[str, object]
@@ -35,25 +33,6 @@ STAR = "*"
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
-
-#: What can be fed from another family of types, besides from its own.
-_FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
-
-
-@dataclass(frozen=True)
-class Connection:
-    """One value that goes from an output to an input.
-
-    Attributes:
-        source, target: its ends.
-        transformation: what happens to the value on its way; None: it arrives bit for bit, and the
-            units of its ends must be the same.
-
-    """
-
-    source: PortName
-    target: PortName
-    transformation: Transformation | None = None
 
 
 @dataclass(frozen=True)
@@ -272,7 +251,7 @@ class System:
         fed: dict[PortName, PortName] = {}
         for connection in self.connections:
             try:
-                self._check_connection(connection)
+                check_connection(connection, self.component)
             except InputError as error:
                 yield str(error)
             source, target = connection.source, connection.target
@@ -305,29 +284,44 @@ class System:
                         if f"{rest}.{port}" in others:
                             yield f"two ports are named {name}.{port}"
 
-    def _check_connection(self, connection: Connection) -> None:
-        source, target = connection.source, connection.target
-        starts, ends = self.component(source.component), self.component(target.component)
-        a, b = starts.variable(source.port), ends.variable(target.port)
-        for end, variable, wanted in ((source, a, "output"), (target, b, "input")):
-            if variable.causality != wanted:
-                raise InputError(
-                    f"{source} -> {target}: {end} has causality {variable.causality}, not {wanted}"
-                )
-        if not can_feed(a, b):
-            raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
-        if connection.transformation not in (None, Linear()):
-            _check_transformed(connection, b.type)
-        if connection.transformation is not None or unit_of(a) == unit_of(b):
-            return
-        units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
-        try:
-            converted = conversion(*units)
-        except InputError as error:
-            raise InputError(f"{source} -> {target}: {error}") from None
-        if converted is not None:
-            names = " and ".join(unit.name for unit in units if unit)
-            raise InputError(f"{source} -> {target}: units differ, {names}")
+
+def renamed(system: System, names: Mapping[str, str]) -> System:
+    """The same system with other names for some components, which are all different."""
+
+    def name_of(component: str) -> str:
+        return names.get(component, component)
+
+    def port_of(port: PortName) -> PortName:
+        return PortName(name_of(port.component), port.port)
+
+    return replace(
+        system,
+        components={
+            name_of(name): replace(component, name=name_of(name))
+            for name, component in system.components.items()
+        },
+        connections=tuple(
+            replace(wire, source=port_of(wire.source), target=port_of(wire.target))
+            for wire in system.connections
+        ),
+        parameters={port_of(port): value for port, value in system.parameters.items()},
+        steps={name_of(name): step for name, step in system.steps.items()},
+        left_open={port_of(port) for port in system.left_open},
+    )
+
+
+def flattened(system: System) -> System:
+    """The same system for tools that know no systems in systems: `one.part` is `one_part`."""
+    taken = {name for name in system.components if "." not in name}
+    names = {}
+    for name in system.components:
+        if "." in name:
+            plain = name.replace(".", "_")
+            while plain in taken:
+                plain += "_"
+            names[name] = plain
+            taken.add(plain)
+    return renamed(system, names) if names else system
 
 
 def is_spread(value: object) -> bool:
@@ -365,36 +359,3 @@ def _several(value: object) -> list[Any] | None:
         # An array without dimensions is one value.
         return list(value) if value.ndim else None
     return list(value) if isinstance(value, list | tuple) else None
-
-
-def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
-    """Whether a variable takes all values of another, and none is lost on the way."""
-    start, end = TYPES[source.type], TYPES[target.type]
-    if start.family not in (end.family, *_FED_FROM.get(end.family, ())):
-        return False
-    if (start.family, end.family) == ("Integer", "Real"):
-        return bool(start.most < 2 ** np.finfo(np.dtype(end.c_type)).nmant)
-    return end.least <= start.least and start.most <= end.most
-
-
-def _check_transformed(connection: Connection, fmi_type: str) -> None:
-    """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
-    linear = isinstance(connection.transformation, Linear)
-    of = TYPES[fmi_type]
-    is_real = of.family == "Real"
-    if of.family == "String" or (linear and not is_real):
-        how = "transformed linearly" if linear else "mapped"
-        raise InputError(
-            f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
-            f"{how}"
-        )
-    if isinstance(connection.transformation, Mapped):
-        # Mappings are written in doubles.
-        exact = float_info.max if is_real else EXACT
-        least, most = max(of.least, -exact), min(of.most, exact)
-        for _, value in connection.transformation.pairs:
-            if not least <= value <= most or (not is_real and value != int(value)):
-                raise InputError(
-                    f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
-                    f"FMI type {fmi_type} cannot hold"
-                )

@@ -17,7 +17,15 @@ from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import literal, type_of, unit_of
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of, real_parameter, value_of, vehicle
+from orchestrator.vehicle.signals import (
+    STANDARD,
+    AllocatedLoop,
+    Loop,
+    loops_of,
+    real_parameter,
+    value_of,
+    vehicle,
+)
 
 #: References that are farther apart are not the same [m].
 _SAME = 1e-6
@@ -198,13 +206,18 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
     ]
 
 
-def velocities_reaching(system: System, component: str = STANDARD.controller) -> list[str]:
-    """Velocities of the vehicle that reach a component, directly or through others.
+def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
+    """Velocities of the vehicle that reach its controller, directly or through others.
 
-    The vehicle is what the component feeds. Empty for a controller without velocity sensors.
+    The vehicle is what the controller feeds, itself or through an allocation. Empty for a
+    controller without velocity sensors.
     """
-    vehicles = {connection.target.component for connection in system.fed.get(component, ())}
-    sources = (connection.source for connection in reaching(system, component, until=vehicles))
+    vehicles = {connection.target.component for connection in system.fed.get(loop.controller, ())}
+    if isinstance(loop, AllocatedLoop):
+        vehicles = vehicles - {loop.allocation} | {loop.vehicle}
+    sources = (
+        connection.source for connection in reaching(system, loop.controller, until=vehicles)
+    )
     return sorted(
         {
             str(source)

@@ -99,7 +99,7 @@ def _root_mean(squares: np.ndarray, n: int, end: float) -> np.ndarray:
 
 
 def _actuation(loop: Loop) -> Needs:
-    return (*loop.commanded, *loop.applied), loop.limits
+    return loop.applied, ()
 
 
 #: Two indices are made of it.
@@ -140,7 +140,7 @@ INDICES: tuple[Index, ...] = (
         "peak command",
         TAU,
         "largest absolute value of the commanded signal",
-        _actuation,
+        Loop.for_commands,
         partial(Fold, lambda rows: np.abs(rows.ends(*rows.loop.commanded)), largest),
         "peak",
         is_metric=True,
@@ -150,7 +150,7 @@ INDICES: tuple[Index, ...] = (
         "share of saturated steps",
         dict.fromkeys(TAU, ""),
         "share of the steps whose command is outside the limits",
-        _actuation,
+        lambda loop: (loop.commanded, loop.limits),
         partial(Fold, LoopRows.outside, total),
         "outside",
         lambda found, n, end: found / n,
@@ -381,7 +381,7 @@ class Metrics(Indices):
             if index.name in found
         }
         if loop.controller in system.components:
-            reaching = velocities_reaching(system, loop.controller)
+            reaching = velocities_reaching(system, loop)
             content["velocities_reaching_controller"] = reaching
         return content
 

@@ -6,7 +6,7 @@ needs some of them; `Table.missing` tells which a run does not have.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,16 +126,31 @@ class Loop:
         return (*self.dy, *self.dy_hat), ()
 
 
+@dataclass(frozen=True)
+class AllocatedLoop(Loop):
+    """A loop whose vehicle takes no tau: an allocation does, and commands what drives it."""
+
+    allocation: str = "allocation"
+
+    commanded = _Group("allocation", "tau", ACTUATORS)
+
+
 #: The loop of closed_loop.toml, the paper's Fig. 2.
 STANDARD = Loop()
+
+
+def loop_of(names: Mapping[str, str]) -> Loop:
+    """The loop whose components have these names, by their roles."""
+    return AllocatedLoop(**names) if "allocation" in names else Loop(**names)
 
 
 def loops_of(system: System) -> tuple[Loop, ...]:
     """The loops of a system, one for each vehicle, found by ports and wires.
 
-    A vehicle takes tau and gives eta; of what feeds it, directly or through others, the controller
-    takes y_d, which the planner gives. What one vehicle lacks has the standard name; what one of
-    several lacks has a name that no component has.
+    A vehicle gives eta, and takes tau or gives tau_applied. Of what feeds it, directly or through
+    others, the controller takes y_d, which the planner gives, and an allocation takes tau if the
+    vehicle does not. What one vehicle lacks has the standard name; what one of several lacks has a
+    name that no component has.
 
     Returns:
         At least one loop: where no vehicle is found, the standard one.
@@ -144,7 +159,8 @@ def loops_of(system: System) -> tuple[Loop, ...]:
     vehicles = [
         name
         for name in system.components
-        if _has(system, name, "input", "tau.u") and _has(system, name, "output", "eta.psi")
+        if _has(system, name, "output", "eta.psi")
+        and (_has(system, name, "input", "tau.u") or _has(system, name, "output", "tau_applied.u"))
     ]
     return tuple(_loop(system, vehicle, vehicles) for vehicle in vehicles) or (STANDARD,)
 
@@ -179,7 +195,10 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
     controller = feeding(vehicle, "tau", "controller", "input", "y_d.x")
     planner = feeding(controller, "y_d", "planner", "output", "y_d.x")
     disturbance = feeding(vehicle, "tau_w", "disturbance", "output", "tau_w.u")
-    return Loop(vehicle, controller, planner, disturbance)
+    if _has(system, vehicle, "input", "tau.u"):
+        return Loop(vehicle, controller, planner, disturbance)
+    allocation = feeding(vehicle, "tau", "allocation", "input", "tau.u")
+    return AllocatedLoop(vehicle, controller, planner, disturbance, allocation)
 
 
 def value_of(table: Table, name: str) -> Value | None:

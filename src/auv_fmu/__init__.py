@@ -13,6 +13,10 @@ module                      what it states
 :mod:`.control_point`       (9) to (13): the control point and its Jacobian
 :mod:`.motion_planner`      Definition 1: the reference and its derivatives in closed form
 :mod:`.path_planner`        a reference through waypoints, not in the paper
+:mod:`.remus100`            the REMUS 100, not in the paper; its :mod:`.hull` and :mod:`.tail`
+:mod:`.allocation`          fins and propeller of the REMUS 100 from force and moments
+:mod:`.formation`           a reference beside a leader's, not in the paper
+:mod:`.acoustic_link`       messages between vehicles, not in the paper
 :mod:`.disturbance`         (56): friction, waves and currents
 :mod:`.saturation`          Definition 2: saturation functions, Lemma 1
 :mod:`.observer`            (24), (51): the state of the velocity observer

@@ -488,12 +488,12 @@ def hold_moment(
 
     """
     speed, turn, (tau_u, tau_q, tau_r) = asked
-    least, most = limits
+    tau_min, tau_max = limits
     hold_bounds("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
     hold_bounds("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
-    hold_bounds("a surge force", tau_u, least[0], most[0], "N", number, y_d)
-    hold_bounds("a moment in pitch", tau_q, least[1], most[1], "N.m", number, y_d)
-    hold_bounds("a moment in yaw", tau_r, least[2], most[2], "N.m", number, y_d)
+    hold_bounds("a surge force", tau_u, tau_min[0], tau_max[0], "N", number, y_d)
+    hold_bounds("a moment in pitch", tau_q, tau_min[1], tau_max[1], "N.m", number, y_d)
+    hold_bounds("a moment in yaw", tau_r, tau_min[2], tau_max[2], "N.m", number, y_d)
 
 
 def hold_bounds(

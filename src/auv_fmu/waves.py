@@ -16,13 +16,13 @@ shares of the spreading, in the order of a Weyl sequence: neighbours in frequenc
 The energy below omega is exp(-5/4 (omega_p / omega)^4) for Pierson and Moskowitz. It is what
 the spectrum of JONSWAP is integrated over: then nothing has to be cut off below the peak.
 
-A regular wave of amplitude a, at the depth z below the still surface of water of depth h, moves it
-with, in the direction that the wave goes to, and up,
+A regular wave of amplitude a moves water of depth h, at the depth z below its still surface, with
 
-    velocity a omega cosh(k (h - z)) / sinh(k h) cos(chi), a omega sinh(k (h - z)) / sinh(k h) sin(chi)
-    elevation of the surface a cos(chi), with chi = k (distance in its direction) - omega t + phase
-    omega^2 = g k tanh(k h)                                              (dispersion)
-"""  # noqa: E501
+    a omega cosh(k (h - z)) / sinh(k h) cos(chi)    in the direction that the wave goes to,
+    a omega sinh(k (h - z)) / sinh(k h) sin(chi)    upwards, where the surface has risen by
+    a cos(chi),  chi = k (distance in its direction) - omega t + phase,  and
+    omega^2 = g k tanh(k h)                         is the dispersion relation.
+"""
 
 from __future__ import annotations
 
@@ -59,6 +59,9 @@ Components = Annotated[Matrix, 64, 5]
 _DECAY = 1.25
 _WIDTH_BELOW = 0.07
 _WIDTH_ABOVE = 0.09
+
+#: Largest height of a wave of permanent form in deep water, as a share of its length.
+_STEEPEST = 0.142
 
 #: Intervals of equal energy that a spectrum is integrated over, and of equal angle a spreading.
 _CELLS = 1024
@@ -136,10 +139,6 @@ def highest_regular(omega: float, depth: float, g: float) -> float:
     k = wave_number(omega, depth, g)
     steepest = _STEEPEST * tau / k
     return steepest if depth == 0.0 else steepest * tanh(k * depth)
-
-
-#: Largest height of a wave of permanent form in deep water, as a share of its length.
-_STEEPEST = 0.142
 
 
 def frequency(share: float) -> float:

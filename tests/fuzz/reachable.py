@@ -17,7 +17,7 @@ from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.plant import PlantState
 from fmus.discovery import ports_of
-from fmus.ports.groups import slices
+from fmus.ports.groups import reals_first, slices
 from fmus.ports.port import Refusal
 from support import states
 from support.raw import Description, Variable
@@ -68,7 +68,8 @@ def _faults(
     if not _is_number(said["start_time"]):
         yield "the start time is no number"
     for key, causality in (("inputs", "input"), ("outputs", "output")):
-        ports, values = description.of(causality, "Real"), said[key]
+        all_ports = [port for port in description.of(causality) if port.name != "fault"]
+        ports, values = reals_first(all_ports), said[key]
         if not isinstance(values, list) or len(values) != len(ports):
             yield f"other {key}"
         else:

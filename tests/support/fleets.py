@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orchestrator.system.renaming import renamed
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, renamed
 
 
 def fleet_of(one: System, n: int, between: str = ".") -> System:

@@ -13,8 +13,9 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import make_plan
 from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from support.small_fmus import description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("linear.c")

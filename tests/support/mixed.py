@@ -10,7 +10,8 @@ from typing import NamedTuple
 from hypothesis import strategies as st
 
 from orchestrator.master.hooks.events import Alter, Event
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.connection import Connection
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped
 from support.small_fmus import (
     connected,

@@ -6,9 +6,10 @@ import struct
 from binascii import crc32
 from collections.abc import Sequence
 from functools import cache
-from typing import Any, NamedTuple, get_args, get_type_hints
+from typing import Any, NamedTuple
 
 from fmus.discovery import ports_of
+from fmus.ports.groups import hints_of, parts_of, reals_first
 from fmus.ports.port import Port
 from support.settings import behaviour_of
 from support.status_table import MODES
@@ -30,12 +31,12 @@ class Unwritable(ValueError):
 
 
 class _Layout(NamedTuple):
-    #: Lengths of the groups of numbers that a state consists of, 0: of a number in no group.
-    shape: Sequence[int]
+    #: Types of the parts of a state.
+    state: Sequence[Any]
     is_noisy: bool
     parameters: Sequence[Port]
-    inputs: int
-    outputs: int
+    inputs: Sequence[Any]
+    outputs: Sequence[Any]
 
 
 @cache
@@ -46,9 +47,13 @@ def _layout(name: str) -> _Layout:
         for causality in ("input", "output", "parameter")
     }
     behaviour = behaviour_of(name)
-    shape = [len(get_args(kind)) for kind in get_type_hints(behaviour.state).values()]
-    noisy, n, m = bool(behaviour.noisy), len(of["input"]), len(of["output"])
-    return _Layout(shape, noisy, of["parameter"], n, m)
+    kinds = {"Real": float, "Integer": int, "Boolean": bool}
+    inputs, outputs = (
+        [kinds[port.type] for port in reals_first(of[causality])]
+        for causality in ("input", "output")
+    )
+    state = [*hints_of(behaviour.state).values()]
+    return _Layout(state, bool(behaviour.noisy), of["parameter"], inputs, outputs)
 
 
 class _Reader:
@@ -73,6 +78,16 @@ class _Reader:
 
     def real(self) -> float:
         return self.reals(1)[0]
+
+    def value(self, kind: Any) -> Any:
+        """A number of a type, or the list of its parts."""
+        parts = parts_of(kind)
+        if parts is not None:
+            return [self.value(part) for part in parts]
+        if kind is float:
+            return self.real()
+        [number] = struct.unpack("<i", self.bytes(4))
+        return bool(number) if kind is bool else number
 
     def text(self) -> str:
         return self.bytes(self.word()).decode()
@@ -99,13 +114,13 @@ def _read(source: _Reader) -> NativeState | None:
         start_time=start_time,
         time=time,
         parameters=parameters,
-        inputs=source.reals(layout.inputs),
-        outputs=source.reals(layout.outputs),
+        inputs=[source.value(kind) for kind in layout.inputs],
+        outputs=[source.value(kind) for kind in layout.outputs],
         state=None,
         hidden=None,
     )
     if source.word():
-        said["state"] = [source.reals(n) if n else source.real() for n in layout.shape]
+        said["state"] = [source.value(kind) for kind in layout.state]
         if layout.is_noisy:
             words, has_next, following = source.words(_WORDS), source.word(), source.real()
             said["hidden"] = [_VERSION, words, following if has_next else None]
@@ -163,14 +178,22 @@ def _written(said: NativeState) -> bytes:
         if port.type == "String":
             value = [*port.choices].index(value)
         parts.append(_reals(value) if port.type == "Real" else struct.pack("<i", value))
-    parts += [_reals(*said["inputs"]), _reals(*said["outputs"]), _words(said["state"] is not None)]
+    for key, kinds in (("inputs", layout.inputs), ("outputs", layout.outputs)):
+        parts += [_value(kind, value) for kind, value in zip(kinds, said[key], strict=True)]
+    parts.append(_words(said["state"] is not None))
     if said["state"] is not None:
-        for group in said["state"]:
-            parts.append(_reals(*group) if isinstance(group, list) else _reals(group))
+        parts += [_value(k, value) for k, value in zip(layout.state, said["state"], strict=True)]
         if layout.is_noisy:
             _, words, following = said["hidden"]
             parts += [_words(*words, following is not None), _reals(following or 0.0)]
     return b"".join(parts) + _words(said["fault"], said[CHECKSUM])
+
+
+def _value(kind: Any, value: Any) -> bytes:
+    parts = parts_of(kind)
+    if parts is not None:
+        return b"".join(_value(part, one) for part, one in zip(parts, value, strict=True))
+    return _reals(value) if kind is float else struct.pack("<i", value)
 
 
 def _text(text: str) -> bytes:

@@ -15,8 +15,9 @@ from zipfile import ZipFile
 import pytest
 
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import port_name
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 
 _HERE = Path(__file__).parent

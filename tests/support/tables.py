@@ -12,7 +12,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.vehicle.signals import STANDARD, Loop
 
 COLUMNS = (
     *STANDARD.posture,
@@ -44,6 +44,30 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
     known = {port_name(name): value for name, value in parameters.items() if name not in without}
     experiment = Experiment(max(n - 1, 1) * STEP, STEP)
     return Table.of(Header(columns, experiment, known, units=UNITS), rows)
+
+
+def fleet(n: int) -> tuple[Loop, ...]:
+    """The loops of vehicles auv1, auv2, ..."""
+    return tuple(
+        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values()))
+        for i in range(1, n + 1)
+    )
+
+
+def fleet_table(n: int, rows: int = 400, without: Collection[str] = ()) -> Table:
+    """Several of these loops, each with other phases, by the names that :func:`fleet` has."""
+    of_each = {f"auv{i}": loop_table(rows, seed=i) for i in range(1, n + 1)}
+    columns = [f"{name}.{column}" for name, one in of_each.items() for column in one.columns]
+    values = np.column_stack([one.rows[:, 1:] for one in of_each.values()])
+    kept = [i for i, column in enumerate(columns) if column not in without]
+    parameters = {
+        port_name(f"{name}.{port}"): value
+        for name, one in of_each.items()
+        for port, value in one.parameters.items()
+    }
+    time = of_each["auv1"].time
+    header = Header(tuple(columns[i] for i in kept), Experiment(float(time[-1]), STEP), parameters)
+    return Table.of(header, np.column_stack((time, values[:, kept])))
 
 
 def table_of(

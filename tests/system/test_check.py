@@ -19,9 +19,10 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names
 from orchestrator.runs.simulate import simulate
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from support.others import build
 
 SCENARIO = """

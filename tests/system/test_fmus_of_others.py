@@ -19,8 +19,9 @@ from orchestrator.master.hooks.timing import Playback
 from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Inputs, read_inputs
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
 from support.others import WAYS, build, run, system_of
 from support.texts import mentions, tells

@@ -116,7 +116,7 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         assert difference[looked_at].max() <= TOLERANCE
         if until < table.time[-1]:
             continue
-        wanted = metrics_of(table).found()
+        wanted = metrics_of(table, run.loops).found(run.loops[0])
         assert said["metrics"].keys() == wanted.keys()
         for index, values in wanted.items():
             assert said["metrics"][index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)

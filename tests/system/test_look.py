@@ -6,15 +6,16 @@ import json
 import re
 import subprocess
 from pathlib import Path
-from shutil import which
 
 import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.runs.record import read_result
+from support.browser import BROWSER, browser
 from support.machine import contents
 
-BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")
+#: A scene is drawn without a graphics card.
+SOFTWARE = "--use-angle=swiftshader", "--enable-unsafe-swiftshader"
 
 
 @pytest.fixture(scope="module")
@@ -83,6 +84,62 @@ def test_view_stands_by_itself_and_is_light(results, capsys):
     assert re.search(r'Content-Security-Policy" content="default-src .none.;', text)
 
 
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a scenario of three vehicles, and its result."""
+    folder = tmp_path_factory.mktemp("fleet")
+    scenario = folder / "three.toml"
+    scenario.write_text(
+        "vehicles = 3\nstop_time = 1.0\n[parameters]\n"
+        '"auv*.plant.eta0.y" = { first = 6.0, step = 4.0 }\n',
+        encoding="utf-8",
+    )
+    arguments = ["run", str(scenario), "--no-figures", "--out", str(folder / "result")]
+    assert main(arguments) == 0
+    return folder
+
+
+def test_vehicles_of_a_run_are_on_one_page_and_in_one_film(fleet, tmp_path):
+    pytest.importorskip("plotly", reason="needs the extra `view`")
+    page = tmp_path / "page" / "three.html"
+    assert main(["view", str(fleet / "result"), "--out", str(page)]) == 0
+    film = tmp_path / "film" / "three.gif"
+    assert main(["animate", str(fleet / "three.toml"), "--fps", "1", "--out", str(film)]) == 0
+    assert contents(tmp_path / "page").keys() == {"three.html"}
+    assert contents(tmp_path / "film").keys() == {"three.gif"}
+    text = page.read_text(encoding="utf-8")
+    assert re.findall(r"<option[^>]*>(auv\d)</option>", text) == ["auv1", "auv2", "auv3"]
+    assert len(text) < 8e6
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed")
+def test_a_vehicle_is_chosen_in_a_browser(fleet, tmp_path):
+    """Its panels take the place of the first vehicle's, at the time that is shown."""
+    pytest.importorskip("plotly", reason="needs the extra `view`")
+    page = tmp_path / "three.html"
+    assert main(["view", str(fleet / "result"), "--out", str(page)]) == 0
+    with browser(tmp_path / "profile", *SOFTWARE) as chromium:
+        chromium.open(page)
+        chromium.evaluate(
+            "new Promise(done => { (function wait() {"
+            " series.layout && scene._fullLayout ? done() : setTimeout(wait, 50); })(); })"
+        )
+        titles = "series.layout.annotations.map(one => one.text)"
+        assert chromium.evaluate(titles)[2].startswith("auv1: tracking errors")
+        before = chromium.evaluate("series.data.length")
+        chromium.evaluate("show(30); vehicle.value = 1; vehicle.onchange()")
+        after = chromium.evaluate(titles)
+        assert len(after) > 2 and all(text.startswith("auv2: ") for text in after[2:])
+        assert chromium.evaluate("series.data.length") == before
+        # The cursor, and the three trails up to there.
+        [time, cursor] = chromium.evaluate("[times[30], series.layout.shapes[0].x0]")
+        assert cursor == time > 0.0
+        points = "data.moving.slice(0, 6).map(k => scene.data[k].x.length)"
+        assert chromium.evaluate(points)[::2] == [31, 31, 31]
+        assert not chromium.said
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed")
 def test_view_plays_in_a_browser(results, tmp_path):
@@ -93,7 +150,7 @@ def test_view_plays_in_a_browser(results, tmp_path):
     process = subprocess.run(
         [
             str(BROWSER), "--headless", "--no-sandbox", f"--user-data-dir={tmp_path / 'profile'}",
-            "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--enable-logging=stderr",
+            *SOFTWARE, "--enable-logging=stderr",
             "--timeout=8000", "--dump-dom", f"{page.as_uri()}#play",
         ],
         capture_output=True, text=True, timeout=120, check=True,

@@ -28,8 +28,9 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import make_plan, stages
 from orchestrator.master.simulation import simulate_plan
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from support.machine import LOOPS
 from support.runs import run, write
 from support.texts import mentions

@@ -11,6 +11,8 @@ import pytest
 from auv_fmu import sea
 from auv_fmu.ocean_current import Variation
 from auv_fmu.sea import Sea
+from orchestrator import read
+from orchestrator.commands.main import main
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
@@ -18,21 +20,21 @@ from orchestrator.vehicle.signals import tracking_error
 from support.runs import run
 
 
-@pytest.mark.parametrize(
-    ("name", "distances", "peak"), [("sea", (0.85, 0.28), 66.0), ("sea-pd", (1.05, 0.30), 35.0)]
-)
-def test_controllers_follow_the_survey_below_waves_as_its_remark_says(
-    native: Path, name, distances, peak
-):
+def test_controllers_follow_the_survey_below_waves_as_its_remark_says(tmp_path: Path):
     """In the first 25 s and in the last 40 s."""
-    result = run(closed_loop(native, read_scenario(name)), 100.0, 0.02)
-    assert result.failure is None
-    away = np.linalg.norm(tracking_error(result), axis=1)
-    found = [away[result.time < 25.0].max(), away[result.time > 60.0].max()]
-    assert found == pytest.approx(distances, abs=0.006)
-    assert np.abs(result["controller.tau.u"]).max() == pytest.approx(peak, abs=0.5)
-    water = result.group(*(f"sea.water.{axis}" for axis in "xyz"))
-    assert np.abs(water).max() == pytest.approx(0.38, abs=0.006)
+    options = ["--kind", "native", "--no-figures", "--out", str(tmp_path)]
+    assert main(["run", "sea", *options]) == 0
+    for folder, distances, peak in (
+        (tmp_path, (0.85, 0.28), 66.0),
+        (tmp_path / "path-pd", (1.05, 0.30), 35.0),
+    ):
+        result = read(folder)
+        away = np.linalg.norm(tracking_error(result), axis=1)
+        found = [away[result.time < 25.0].max(), away[result.time > 60.0].max()]
+        assert found == pytest.approx(distances, abs=0.006)
+        assert np.abs(result["controller.tau.u"]).max() == pytest.approx(peak, abs=0.5)
+        water = result.group(*(f"sea.water.{axis}" for axis in "xyz"))
+        assert np.abs(water).max() == pytest.approx(0.38, abs=0.006)
 
 
 @pytest.mark.parametrize("kind", ["dist", "native"])

@@ -12,8 +12,7 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.system.names import PortName
-from orchestrator.system.renaming import renamed
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, renamed
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.proof import certificates, gain_check
@@ -107,7 +106,7 @@ def test_names_of_components_may_have_dots():
     for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
         assert found.metrics()[key] == flat.metrics()[key]
     assert (certificates(found, loop) == certificates(flat)).all()
-    reaching = velocities_reaching(inner(load("fig5-pd", "native")), "auv1.controller")
+    reaching = velocities_reaching(inner(load("fig5-pd", "native")), loop)
     assert reaching == [f"auv1.plant.dy.{axis}" for axis in "xyz"]
 
 

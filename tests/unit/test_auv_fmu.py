@@ -1,8 +1,10 @@
 """Every default of every set of parameters: the values of section 4.1, or our own (reading 7)."""
 
 from importlib import import_module
+from math import pi, radians
 from pkgutil import walk_packages
 
+import numpy as np
 import pytest
 
 import auv_fmu
@@ -124,6 +126,58 @@ OURS = {
     },
 }
 
+#: Those of PythonVehicleSimulator 1.0.1, and what it does not have.
+REMUS_100 = {
+    "Hull": {
+        "length": 1.6,
+        "diameter": 0.19,
+        "mass": pytest.approx(4 / 3 * pi * 1026 * 0.8 * 0.095**2, rel=1e-13),
+        "gravity": 9.81,
+        "r_bg": (0.0, 0.0, 0.02),
+        "added_roll": 0.3,
+    },
+    "Drag": {
+        "c_d": 0.42,
+        "c_d_across": pytest.approx(np.interp(0.5, (0.4933, 0.5585), (1.2108, 1.0836)), rel=1e-12),
+        "wing": 0.7,
+        "oswald": 0.7,
+        "T_surge": 20.0,
+        "T_sway": 20.0,
+        "T_heave": 20.0,
+        "T_yaw": 1.0,
+        "zeta_roll": 0.3,
+        "zeta_pitch": 0.8,
+        "fading": 3.0,
+    },
+    "Tail": {
+        "rho": 1026.0,
+        "area": 2 * 0.00665,
+        "x": -0.8,
+        "lift_r": 0.5,
+        "lift_s": 0.7,
+        "delta_max": radians(15.0),
+        "diameter": 0.14,
+        "deduction": 0.1,
+        "advance": 0.944,
+        "j_1": 0.6632,
+        "kt_0": 0.4566,
+        "kt_1": 0.1798,
+        "kq_0": 0.07,
+        "kq_1": 0.0312,
+        "torque": 0.1,
+        "n_max": pytest.approx(1525 * pi / 30, rel=1e-13),
+    },
+    "remus100.Parameters": {
+        "T_delta": 0.1,
+        "T_n": 1.0,
+        "ell": 0.35,
+        "eta0": ZERO_6,
+        "nu0": ZERO_6,
+        "current": ZERO_3,
+    },
+    "allocation.Parameters": {"speed": 1.5, "measured": False},
+}
+
 
 def name_of(kind: type) -> str:
     """Its name, with its module's where several have it."""
@@ -147,7 +201,11 @@ def test_defaults_are_the_papers_or_named_as_ours(name):
         for field, value in SETS[name]._field_defaults.items()
         if name_of(type(value)) not in SETS
     }
-    assert plain == {**SECTION_4_1.get(name, {}), **OURS.get(name, {})}
+    assert plain == {
+        **SECTION_4_1.get(name, {}),
+        **OURS.get(name, {}),
+        **REMUS_100.get(name, {}),
+    }
 
 
 def nested(value):

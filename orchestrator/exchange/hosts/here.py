@@ -26,8 +26,7 @@ from orchestrator.formats.osp_and_container import write_container, write_osp
 from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
-from orchestrator.system.renaming import flattened
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, flattened
 
 #: In the folder: what is run, and where files for the tool go.
 GIVEN, _EXPORT = "given", "export"

@@ -1,7 +1,7 @@
 """A system as an SSP nests it: systems in systems, and connectors where a value crosses a border.
 
-The dots of a component's name say which systems it is in: `fleet.auv1.plant` is the element `plant`
-of the system `auv1` of the system `fleet`. A value that leaves or enters a system has one connector
+The dots of a component's name say which systems it is in: `fleet.one.part` is the element `part`
+of the system `one` of the system `fleet`. A value that leaves or enters a system has one connector
 there, however many inputs it feeds beyond it. It passes all borders as it is, an array as a whole:
 only the last connection on its way picks an element, or transforms it.
 """
@@ -16,8 +16,9 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.formats.ssp.hierarchy import Way
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.variables import array_of, element_names
 
 

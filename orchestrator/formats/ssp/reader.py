@@ -15,8 +15,9 @@ from orchestrator.formats.ssp.hierarchy import Builder, Definitions, Leaf, Node,
 from orchestrator.formats.ssp.origins import Bindings, Segment, Values, segments_of
 from orchestrator.machine.errors import Findings, InputError, shortened
 from orchestrator.system.component import Component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, listed
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Transformation, Unit, combine
 from orchestrator.system.values import BOOLEANS, Value, real, typed
 

@@ -18,8 +18,7 @@ from orchestrator.formats.ssp.nesting import End, Line, Nest, nested, order_of
 from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
-from orchestrator.system.renaming import flattened
-from orchestrator.system.structure import System
+from orchestrator.system.structure import System, flattened
 from orchestrator.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
 from orchestrator.system.values import Value, items_of, literal, type_of
 from orchestrator.system.variables import array_of

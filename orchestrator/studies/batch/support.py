@@ -19,8 +19,9 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.plan import code_of
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.signals import AXES
 

@@ -86,7 +86,7 @@ class Messages(NamedTuple):
 
     period: float  #: between two that are sent [s]
     delay: tuple[float, float]  #: least and largest age of one that arrives [s]
-    gap: int = 1  #: most periods between two of which none between them is lost
+    gap: int  #: most periods between two of which none between them is lost
 
 
 class Estimate(NamedTuple):
@@ -161,7 +161,7 @@ def estimate_bounds(
         h: step of the planner [s].
 
     """
-    T, (early, late), gap = messages
+    T, (early, late), gap = messages.period, messages.delay, messages.gap
     if gap * T + late <= estimator.age_max:
         for share in _TRIED:
             z_max = share * estimator.z_max
@@ -226,7 +226,7 @@ def _bounds(
     and adds phi and -pull times what the leader's acceleration has made of its velocity within the
     m periods, and what it makes of it until the next message.
     """
-    T, (_, late), gap = messages
+    T, late, gap = messages.period, messages.delay[1], messages.gap
     longest = max(hold.duration for hold in holds)
     oldest, rest = gap * T + late, acceleration * gap * T * (gap * T / 2 + late)
     shape = _Norm(weight, coupling)

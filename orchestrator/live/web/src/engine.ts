@@ -1,7 +1,7 @@
 // The part of the page that needs no document: it runs in Node, too.
 export { type Api, apiWithoutPage, makeApi } from "./api";
 export { Refusal } from "./experiment";
-export { controlPoint, limits, metrics, trackingError } from "./indices";
+export { commandName, controlPoint, limits, metrics, trackingError } from "./indices";
 export { Engine } from "./simulate";
 export { csv } from "./text";
 export type * from "./types";

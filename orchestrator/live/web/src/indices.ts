@@ -40,10 +40,17 @@ export function trackingError(result: Result): Float64Array[] | undefined {
   return error;
 }
 
-/** Lower and upper limits of an actuator. */
-export function limits(result: Result, actuator: string): readonly [number, number] {
-  const of = (end: string) => Number(result.parameters[`plant.tau_${end}.${actuator}`]);
-  return [of("min"), of("max")];
+/** What is commanded: what the vehicle takes, or the allocation of one that takes no tau. */
+export function commandName(result: Result, actuator: string): string {
+  const taken = `plant.tau.${actuator}`;
+  return result.has(taken) ? taken : `allocation.tau.${actuator}`;
+}
+
+/** Lower and upper limits of an actuator; undefined: they are no parameters of the vehicle. */
+export function limits(result: Result, actuator: string): readonly [number, number] | undefined {
+  const of = (end: string) => result.parameters[`plant.tau_${end}.${actuator}`];
+  const [lower, upper] = [of("min"), of("max")];
+  return lower === undefined || upper === undefined ? undefined : [Number(lower), Number(upper)];
 }
 
 /** The indices of a run that has made a step, with its end of so many seconds; of none, nothing. */
@@ -55,8 +62,8 @@ export function metrics(result: Result, lastSeconds: number): Metrics {
   const [square, peak, outside, variation] = [0, 0, 0, 0].map(() => new Array<number>(3).fill(0));
   ACTUATORS.forEach((actuator, i) => {
     const applied = result.column(`plant.tau_applied.${actuator}`);
-    const commanded = result.column(`plant.tau.${actuator}`);
-    const [lower, upper] = limits(result, actuator);
+    const commanded = result.column(commandName(result, actuator));
+    const [lower, upper] = limits(result, actuator) ?? [-Infinity, Infinity];
     for (let k = 1; k < rows; k++) {
       square[i] += applied[k] ** 2 * (time[k] - time[k - 1]);
       peak[i] = Math.max(peak[i], Math.abs(commanded[k]));
@@ -72,7 +79,7 @@ export function metrics(result: Result, lastSeconds: number): Metrics {
     l2_effort: square.map(Math.sqrt),
     rms_effort: square.map((sum) => Math.sqrt(sum / end)),
     peak_command: peak,
-    saturated_fraction: outside.map((n) => n / steps),
+    ...(limits(result, ACTUATORS[0]) ? { saturated_fraction: outside.map((n) => n / steps) } : {}),
     total_variation: variation,
     ...(error === undefined ? {} : { final_error: error.map((values) => largest(late(values))) }),
   };

@@ -1,6 +1,6 @@
 // What the charts show of a run.
 
-import { limits, trackingError } from "./engine";
+import { commandName, limits, trackingError } from "./engine";
 import type { Data, Result } from "./types";
 
 /** Colour and style of a line: of a controller, or of what is true or wanted. */
@@ -103,8 +103,11 @@ export function lines(
   return [
     Object.keys(units.e).map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
     Object.keys(units.tau).map((member) => {
-      const values = results.map((result) => steps(result, `plant.tau.${member}`));
-      return { time: starts, values, ...(whole ? { limits: limits(whole, member) } : {}) };
+      const values = results.map(
+        (result) => result && steps(result, commandName(result, member)),
+      );
+      const ends = whole && limits(whole, member);
+      return { time: starts, values, ...(ends ? { limits: ends } : {}) };
     }),
     Object.keys(units.dy).map((axis) => ({
       time: starts,

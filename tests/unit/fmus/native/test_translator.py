@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu import acoustic_link, formation
 from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.sea import Sea
@@ -431,6 +432,64 @@ def test_seas_are_alike(random, spectrum, n, depth):
         state, derived, seen = both.python("advance", **arguments, inputs=inputs, t=t, h=h)
         assert outcome([kept, outputs]) == outcome([[state, derived], seen])
         t += h
+
+
+@given(random=randoms, shape=st.integers(0, 4), estimated=st.booleans())
+def test_formations_are_the_same_over_many_steps(random, shape, estimated):
+    """Leaders that change their minds; the first one that cannot be followed ends a run."""
+    both = equations("FormationPlanner")
+    stages = formation.Stages(
+        4,
+        (shape, 4, random.randrange(5), shape),
+        *(tuple(random.uniform(1.0, 6.0) for _ in range(4)) for _ in range(4)),
+        (1.0, 3.0, 6.0),
+        (1.5, 2.0, 2.5),
+    )
+    parameters = formation.Parameters(
+        random.randrange(1, 6), 5, stages, random.uniform(0.1, 1.0), estimated=estimated
+    )
+
+    def inputs() -> formation.Known:
+        """Slow, but anywhere and with any heading."""
+        known = value(both.inputs, random, 0.0)
+        slow = {name: tuple(0.05 * x for x in getattr(known, name)) for name in ("dy_0", "ddy_0")}
+        return known._replace(age=abs(known.age), **slow)
+
+    runs(both, parameters, random, inputs, 0.1)
+
+
+@given(random=randoms)
+def test_links_are_the_same_over_many_steps(random):
+    both = equations("AcousticLink")
+    parameters = acoustic_link.Parameters(
+        random.uniform(0.02, 2.0),
+        random.choice((1500.0, 3.0)),
+        random.uniform(0.0, 0.5),
+        random.choice((0.0, 0.5)),
+        random.randrange(-(2**31), 2**31),
+        1.0,
+        random.uniform(0.0, 2.0),
+    )
+    runs(both, parameters, random, lambda: value(both.inputs, random, 0.0), 0.5)
+
+
+def runs(both: Any, parameters: Any, random: Random, inputs_at: Any, h: float) -> None:
+    """Compare 40 steps of both, each from where the last one ended, until one is refused."""
+    given, kept, outputs = filled(both.parameters, parameters), both.kept(), series(both.outputs)()
+    state = None
+    for k in range(41):
+        name, inputs, t = "advance" if k else "begin", inputs_at(), max(0, k - 1) * h
+        told = filled(both.inputs, inputs)
+        if name == "begin":
+            why = both.call(name, given, told, t, kept, outputs)
+        else:
+            why = both.call(name, given, kept, told, t, h, 1, outputs)
+        ours = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": 1}
+        found = (why, []) if why else outcome([kept, outputs])
+        assert found == raised(lambda name=name, ours=ours: both.python(name, **ours))
+        if why:
+            return
+        state, _ = both.python(name, **ours)
 
 
 @given(random=randoms)

@@ -1,4 +1,4 @@
-"""The film's camera is a pinhole, and its vehicle has its parts where they belong."""
+"""A film shows what moves, in all its frames."""
 
 from itertools import pairwise
 
@@ -6,63 +6,25 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from orchestrator.figures.animation import _Camera, animate, check_film
-from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import body
+from orchestrator.figures.animation import animate, check_film
+from orchestrator.figures.style import Drawn, vehicle_colours
 from orchestrator.machine.errors import InputError
-from support.tables import loop_table
+from support.tables import fleet, fleet_table, loop_table
 
 
-def test_camera_sees_what_it_looks_at_in_the_middle():
-    middle = np.array([3.0, -2.0, 5.0])
-    camera = _Camera.at(middle, 7.0)
-    seen, ahead = camera.project(middle[np.newaxis])
-    np.testing.assert_allclose(seen, [[0.0, 0.0]], atol=1e-12)
-    # One width to the right is one wide; up is against z, which points down.
-    right, _, _ = camera.axes
-    [[x, y], [_, above]], _ = camera.project(np.array([middle + 7.0 * right, middle - [0, 0, 1]]))
-    assert (x, y) == pytest.approx((1.0, 0.0))
-    assert above > 0.0
-    assert right[2] == pytest.approx(0.0)
-    np.testing.assert_allclose(camera.axes @ camera.axes.T, np.eye(3), atol=1e-12)
-
-
-def test_what_is_twice_as_far_away_is_half_as_large():
-    camera = _Camera.at(np.zeros(3), 1.0)
-    right, _, ahead = camera.axes
-    points = np.array([camera.place + d * ahead + 0.1 * right for d in (1.0, 2.0)])
-    (near, far), distance = camera.project(points)
-    assert near[0] == pytest.approx(2.0 * far[0])
-    np.testing.assert_allclose(distance, [1.0, 2.0])
-
-
-def test_lines_behind_the_camera_are_not_drawn():
-    camera = _Camera.at(np.zeros(3), 1.0)
-    ahead = camera.axes[2]
-    t = np.linspace(-1.0, 3.0, 41)
-    pieces = camera.line(camera.place + t[:, np.newaxis] * ahead)
-    assert sum(map(len, pieces)) < len(t)
-    assert len(pieces) == 1
-
-
-def test_body_is_as_long_as_one_and_its_upper_fin_is_above():
-    shape = body()
-    x = shape.points[:, 0]
-    assert (x.min(), x.max()) == (-1.0, 0.0)
-    upper = shape.points[np.unique(shape.triangles[shape.part == 1])]
-    # z points down.
-    assert (upper[:, 2] < 0.0).all()
-    np.testing.assert_allclose(upper[:, 1], 0.0)
-
-
-def test_film_has_a_frame_for_each_instant(tmp_path):
-    path = tmp_path / "film.gif"
-    animate("title", Drawn("run", loop_table()), path, fps=2)
+def frames_of(path):
     with Image.open(path) as film:
         frames = []
         for k in range(film.n_frames):
             film.seek(k)
             frames.append(np.asarray(film.convert("RGB"), dtype=int))
+    return frames
+
+
+def test_film_has_a_frame_for_each_instant(tmp_path):
+    path = tmp_path / "film.gif"
+    animate("title", Drawn("run", loop_table()), path, fps=2)
+    frames = frames_of(path)
     assert len(frames) == 20
     assert all((a != b).any() for a, b in pairwise(frames))
 
@@ -73,3 +35,27 @@ def test_film_has_a_frame_for_each_instant(tmp_path):
 def test_films_that_cannot_be_written_are_refused(tmp_path, name, fps, text):
     with pytest.raises(InputError, match=text):
         check_film(tmp_path / name, fps)
+
+
+# Several vehicles
+
+
+def test_film_of_several_has_one_picture_with_the_colours_of_all(tmp_path):
+    path = tmp_path / "film.gif"
+    animate("title", Drawn("run", fleet_table(3), loops=fleet(3)), path, fps=2)
+    frames = frames_of(path)
+    assert len(frames) == 20
+    assert all((a != b).any() for a, b in pairwise(frames))
+    # Left of the panels and above the legend.
+    scene = frames[-1][40:380, :380]
+    for colour in vehicle_colours(3):
+        rgb = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
+        is_near = (np.abs(scene - rgb) < 12).all(axis=2)
+        assert is_near.sum() > 20
+
+
+def test_vehicle_without_a_reference_is_filmed_with_the_others(tmp_path):
+    missing = fleet(2)[0].y_d
+    run = Drawn("run", fleet_table(2, without=missing), loops=fleet(2))
+    animate("title", run, tmp_path / "film.gif", fps=1)
+    assert len(frames_of(tmp_path / "film.gif")) == 10

@@ -11,8 +11,9 @@ import pytest
 
 from orchestrator.master.row import Gathering, Overrides, Row
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped
 from support.archives import fmu, variable
 from support.texts import mentions

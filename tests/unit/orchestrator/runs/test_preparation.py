@@ -13,8 +13,9 @@ from orchestrator.runs.preparation import DEFAULT_STEP, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from support.archives import fmu, variable
 
 K = PortName("a", "k")

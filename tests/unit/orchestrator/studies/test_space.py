@@ -15,7 +15,7 @@ from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS
 from orchestrator.studies.study_file import study_of
-from orchestrator.system.renaming import renamed
+from orchestrator.system.structure import renamed
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 

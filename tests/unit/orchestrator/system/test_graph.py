@@ -10,9 +10,10 @@ from typing import TypeAlias
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.system.connection import Connection
 from orchestrator.system.graph import delayed_connections, derived_order, in_stages, reaching, rings
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 
 NAMES = "abcdefg"
 

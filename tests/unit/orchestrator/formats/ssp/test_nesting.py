@@ -19,8 +19,9 @@ from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import ssp_bytes, structure_xml, write_ssp
 from orchestrator.machine.errors import Findings
 from orchestrator.system.component import Component, read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection, System
+from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped, Transformation
 from support.archives import fmu, fmu3, variable
 

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from orchestrator.formats.ssp import reader
 from orchestrator.formats.ssp.hierarchy import Node
 from orchestrator.machine.errors import Findings, InputError
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection
 from orchestrator.system.units import combine
 from support.archives import (
     archive,

@@ -26,8 +26,8 @@ from orchestrator.master.hooks.events import (
 )
 from orchestrator.master.hooks.hook import NEVER
 from orchestrator.master.row import Gathering, Overrides
+from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
-from orchestrator.system.structure import Connection
 
 OUT, FED, FREE = (PortName("a", name) for name in ("out", "fed", "free"))
 GAIN = PortName("a", "gain")

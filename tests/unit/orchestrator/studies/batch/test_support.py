@@ -42,3 +42,11 @@ def test_each_value_comes_to_its_component_alone():
 def test_text_that_is_no_choice_is_refused_as_the_fmu_does():
     with pytest.raises(InputError, match="controller: saturation = 'x': use one of tanh, alge"):
         setting_of(FMUS, {port_name("controller.saturation"): "x"}, 0.02)
+
+
+def test_water_moves_and_does_not_speed_up():
+    setting = setting_of(FMUS, {port_name("plant.water.y"): 0.2}, 0.02)
+    assert setting.plant.current == (0.0, 0.2, 0.0)
+    assert setting_of(FMUS, {port_name("plant.dwater.x"): 0.0}, PAPER.h) == PAPER
+    with pytest.raises(InputError, match=r"plant\.dwater\.x: the water .* does not speed up"):
+        setting_of(FMUS, {port_name("plant.dwater.x"): 0.1}, 0.02)

@@ -1,0 +1,1 @@
+"""Fins and propeller that give a commanded force and moments."""

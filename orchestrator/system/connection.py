@@ -1,0 +1,103 @@
+"""A connection of two ports: what goes from one to the other, and whether they fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from sys import float_info
+
+import numpy as np
+from fmpy.model_description import ModelVariable
+
+from orchestrator.machine.errors import InputError
+from orchestrator.system.component import Component
+from orchestrator.system.names import PortName
+from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
+from orchestrator.system.values import EXACT, TYPES, unit_of
+
+#: What can be fed from another family of types, besides from its own.
+_FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
+
+
+@dataclass(frozen=True)
+class Connection:
+    """One value that goes from an output to an input.
+
+    Attributes:
+        source, target: its ends.
+        transformation: what happens to the value on its way; None: it arrives bit for bit, and the
+            units of its ends must be the same.
+
+    """
+
+    source: PortName
+    target: PortName
+    transformation: Transformation | None = None
+
+
+def check_connection(connection: Connection, component: Callable[[str], Component]) -> None:
+    """Check that the ends of a connection exist, and fit.
+
+    Args:
+        connection: of a system.
+        component: of that system, by its name.
+
+    Raises:
+        InputError: a port does not exist, or they do not fit.
+
+    """
+    source, target = connection.source, connection.target
+    starts, ends = component(source.component), component(target.component)
+    a, b = starts.variable(source.port), ends.variable(target.port)
+    for end, variable, wanted in ((source, a, "output"), (target, b, "input")):
+        if variable.causality != wanted:
+            raise InputError(
+                f"{source} -> {target}: {end} has causality {variable.causality}, not {wanted}"
+            )
+    if not can_feed(a, b):
+        raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
+    if connection.transformation not in (None, Linear()):
+        _check_transformed(connection, b.type)
+    if connection.transformation is not None or unit_of(a) == unit_of(b):
+        return
+    units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
+    try:
+        converted = conversion(*units)
+    except InputError as error:
+        raise InputError(f"{source} -> {target}: {error}") from None
+    if converted is not None:
+        names = " and ".join(unit.name for unit in units if unit)
+        raise InputError(f"{source} -> {target}: units differ, {names}")
+
+
+def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
+    """Whether a variable takes all values of another, and none is lost on the way."""
+    start, end = TYPES[source.type], TYPES[target.type]
+    if start.family not in (end.family, *_FED_FROM.get(end.family, ())):
+        return False
+    if (start.family, end.family) == ("Integer", "Real"):
+        return bool(start.most < 2 ** np.finfo(np.dtype(end.c_type)).nmant)
+    return end.least <= start.least and start.most <= end.most
+
+
+def _check_transformed(connection: Connection, fmi_type: str) -> None:
+    """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
+    linear = isinstance(connection.transformation, Linear)
+    of = TYPES[fmi_type]
+    is_real = of.family == "Real"
+    if of.family == "String" or (linear and not is_real):
+        how = "transformed linearly" if linear else "mapped"
+        raise InputError(
+            f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
+            f"{how}"
+        )
+    if isinstance(connection.transformation, Mapped):
+        # Mappings are written in doubles.
+        exact = float_info.max if is_real else EXACT
+        least, most = max(of.least, -exact), min(of.most, exact)
+        for _, value in connection.transformation.pairs:
+            if not least <= value <= most or (not is_real and value != int(value)):
+                raise InputError(
+                    f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
+                    f"FMI type {fmi_type} cannot hold"
+                )

@@ -1,0 +1,121 @@
+"""Vehicles in formation: the numbers that the remarks of their scenarios name, and the wiring."""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from orchestrator import load, read
+from orchestrator.commands.main import main
+from orchestrator.vehicle.signals import loops_of
+
+VEHICLES = ("auv1", "auv2", "auv3")
+
+
+class Fleet:
+    """Tracking errors and distances of a result, from its columns."""
+
+    def __init__(self, folder: Path) -> None:
+        self.result = read(folder)
+        self.time = self.result.time
+        self.errors = np.array([self._error(name) for name in VEHICLES])
+        places = [self.group(f"{name}.plant.eta", "xyz") for name in VEHICLES]
+        apart = [np.linalg.norm(a - b, axis=1) for a, b in combinations(places, 2)]
+        self.distance = np.min(apart, axis=0)
+
+    def group(self, name: str, members: str) -> np.ndarray:
+        return self.result.group(*(f"{name}.{member}" for member in members))
+
+    def _error(self, name: str) -> np.ndarray:
+        """|y - y_d|, with (9): y is ell ahead of the centre of mass."""
+        theta, psi = (self.result[f"{name}.plant.eta.{k}"] for k in ("theta", "psi"))
+        level = np.cos(theta)
+        bow = np.column_stack((level * np.cos(psi), level * np.sin(psi), -np.sin(theta)))
+        y = self.group(f"{name}.plant.eta", "xyz") + 0.35 * bow
+        return np.linalg.norm(y - self.group(f"{name}.planner.y_d", "xyz"), axis=1)
+
+    def largest(self, after: float) -> float:
+        return float(self.errors[:, self.time > after].max())
+
+    def peak(self) -> float:
+        return float(max(np.abs(self.result[f"{name}.plant.tau.u"]).max() for name in VEHICLES))
+
+
+@pytest.fixture(scope="module")
+def fleets(tmp_path_factory: pytest.TempPathFactory):
+    """Both runs of a scenario, made once."""
+    made: dict[str, tuple[Fleet, Fleet]] = {}
+
+    def run(name: str) -> tuple[Fleet, Fleet]:
+        if name not in made:
+            folder = tmp_path_factory.mktemp("formation") / name
+            options = ["--kind", "native", "--no-figures", "--out", str(folder)]
+            assert main(["run", name, *options]) == 0
+            made[name] = Fleet(folder), Fleet(folder / "formation-pd")
+        return made[name]
+
+    return run
+
+
+def test_a_v_is_followed_as_its_remark_says(fleets):
+    proposed, pd = fleets("formation-v")
+    assert proposed.largest(25.0) == pytest.approx(0.26, abs=0.005)
+    assert pd.largest(25.0) == pytest.approx(0.43, abs=0.005)
+    assert min(proposed.distance.min(), pd.distance.min()) > 4.3
+    assert 74.0 < proposed.peak() < 75.0 and 31.0 < pd.peak() < 32.0
+
+
+def test_a_formation_changes_as_its_remark_says(fleets):
+    proposed, pd = fleets("formation-change")
+    assert 0.37 < proposed.largest(25.0) < 0.38
+    assert 0.55 < pd.largest(25.0) < 0.56
+    for fleet in (proposed, pd):
+        assert fleet.distance.min() == pytest.approx(2.7, abs=0.05)
+        assert 75.0 < fleet.time[fleet.distance.argmin()] < 95.0
+
+
+def test_followers_lose_their_leader_as_the_remark_says(fleets):
+    proposed, pd = fleets("formation-lost-link")
+    assert 1.7 < proposed.largest(25.0) < 1.8 and 2.2 < pd.largest(25.0) < 2.3
+    assert proposed.largest(100.0) == pytest.approx(0.11, abs=0.005)
+    assert pd.largest(100.0) == pytest.approx(0.08, abs=0.005)
+    for fleet in (proposed, pd):
+        assert fleet.distance.min() == pytest.approx(0.2, abs=0.05)
+        lost = fleet.result["auv2.link.lost"]
+        during = (fleet.time > 50.0) & (fleet.time < 69.9)
+        assert np.ptp(fleet.result["auv2.link.received"][during]) <= 1
+        assert lost[during][-1] - lost[during][0] == pytest.approx(20, abs=1)
+
+
+def test_places_in_a_v_are_those_of_geometry(fleets):
+    """Where the leader runs straight north, its V lies at 45 degrees to both sides."""
+    proposed, _ = fleets("formation-v")
+    row = int(np.searchsorted(proposed.time, 40.0))
+    # A step takes what the leader shows at its beginning.
+    leader = proposed.group("leader.y_d", "xyz")[row - 1]
+    half = 5.0 / np.sqrt(2.0)
+    for name, offset in (("auv1", (0, 0)), ("auv2", (-half, half)), ("auv3", (-half, -half))):
+        place = proposed.group(f"{name}.planner.y_d", "xyz")[row]
+        np.testing.assert_allclose(place - leader, [*offset, 0.0], atol=1e-9)
+
+
+def test_loops_of_a_formation_are_found():
+    for name in ("formation-v", "formation-change", "formation-lost-link"):
+        loops = loops_of(load(name, "native"))
+        assert [loop.name for loop in loops] == list(VEHICLES)
+        assert [loop.planner for loop in loops] == [f"{name}.planner" for name in VEHICLES]
+        assert [loop.controller for loop in loops] == [f"{name}.controller" for name in VEHICLES]
+
+
+@pytest.mark.parametrize("scenario", ["formation-v", "formation-lost-link"])
+def test_both_kinds_make_the_same_formation(scenario, tmp_path):
+    tables = []
+    for kind in ("python", "native"):
+        folder = tmp_path / kind
+        options = ["--kind", kind, "--no-figures", "--stop-time", "8", "--out", str(folder)]
+        assert main(["run", scenario, *options]) == 0
+        tables.append((folder / "result.csv").read_bytes())
+    assert tables[0] == tables[1]

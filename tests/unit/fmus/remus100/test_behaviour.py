@@ -1,0 +1,61 @@
+"""Remus100: hulls that are none, states that no run leads to, and inputs that nothing feeds."""
+
+from __future__ import annotations
+
+import pytest
+from pythonfmu.enums import Fmi2Status
+
+from auv_fmu.remus100 import Parameters
+from fmus.ports.port import Refusal
+from fmus.remus100 import behaviour
+from fmus.remus100.behaviour import Inputs
+from support.instances import ClassInstance
+
+STILL = Inputs((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "good"),
+    [("diameter", 1.5, 0.2), ("length", 0.2, 1.6), ("r_bg__z", 0.0, 0.02)],
+)
+def test_hulls_that_the_model_does_not_hold_for_are_refused(name, value, good):
+    driver = ClassInstance("Remus100", **{name: value})
+    assert name.replace("__", ".") in driver.messages()[0]
+    assert driver.answers() == [Fmi2Status.error]
+    driver.set(**{name: good})
+    driver.slave.exit_initialization_mode()
+    assert driver.step()
+
+
+def test_a_vehicle_that_nothing_commands_stays_where_it_is():
+    driver = ClassInstance("Remus100", noise__std=0.0)
+    before = driver.outputs()
+    for _ in range(50):
+        assert driver.step()
+    assert driver.outputs() == pytest.approx(before, abs=1e-12)
+
+
+def test_water_beyond_the_model_is_refused_and_the_next_step_is_taken():
+    driver = ClassInstance("Remus100", noise__std=0.0)
+    driver.step()
+    before = driver.outputs()
+    driver.set(water__y=50.0)
+    assert not driver.step()
+    assert "50 m/s through the water" in driver.messages()[-1]
+    driver.set(water__y=0.0)
+    assert driver.step()
+    assert driver.outputs() == pytest.approx(before, abs=1e-12)
+
+
+@pytest.mark.parametrize("actuator", [(0.27, 0.0, 0.0), (0.0, -0.27, 0.0), (0.0, 0.0, 160.0)])
+def test_state_with_an_actuator_beyond_its_limit_is_refused(actuator):
+    state, outputs = behaviour.begin(Parameters(), STILL)
+    assert behaviour.expected(Parameters(), state, outputs) == outputs
+    with pytest.raises(Refusal, match="beyond their limits"):
+        behaviour.expected(Parameters(), state._replace(actuator=actuator), outputs)
+
+
+def test_noise_beyond_belief_is_brought_back():
+    state, outputs = behaviour.begin(Parameters(), STILL)
+    expected = behaviour.expected(Parameters(), state, {**outputs, "y": (1e3, 0.35, -1e3)})
+    assert expected["y"] == pytest.approx((0.35 + 0.009, 0.009, -0.009))
