@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
@@ -12,9 +13,10 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from hypothesis import assume, given
 from hypothesis import strategies as st
+from lxml import etree
 
 from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.formats.ssp.writer import ssp_bytes, write_ssp
+from orchestrator.formats.ssp.writer import ssp_bytes, structure_xml, write_ssp
 from orchestrator.machine.errors import Findings
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.connection import Connection
@@ -260,6 +262,20 @@ def test_fmpy_finds_the_schema_kept(parts: dict[str, Component], tmp_path: Path)
     [path] = write_ssp(system, tmp_path)
     top = read_ssd(str(path)).system
     assert [element.name for element in top.elements] == ["a", "b"]
+
+
+@pytest.mark.skipif(find_spec("pyssp_standard") is None, reason="pyssp_standard is not installed")
+def test_nested_ssp_2_is_valid(parts: dict[str, Component]):
+    """Held against the schema of SSP 2.0, which that package has."""
+    found = find_spec("pyssp_standard")
+    assert found is not None and found.origin is not None
+    schema = Path(found.origin).with_name("resources") / "ssp2" / "SystemStructureDescription.xsd"
+    wires = {f"b.c.q:u[{i}]": f"a.p:y[{i}]" for i in (1, 2, 3)}
+    wires |= {"b.r:v": "a.p:z", "a.in.p:x": "b.c.q:y[2]"}
+    kinds = {"a.p": "3", "b.r": "2", "b.c.q": "3", "a.in.p": "3"}
+    made = {"b.r:v": Linear(0.001)}
+    text = structure_xml(system_of(parts, kinds, wires, made, step=0.1, stop_time=1.0))
+    etree.XMLSchema(etree.parse(schema)).assertValid(etree.fromstring(text))
 
 
 NAMES = st.lists(
