@@ -95,7 +95,9 @@ def page_data(opened: str) -> Plain:
     for run in both:
         # What an FMU refuses is refused here, before there is a page.
         run.run([])
-    others = [preset(name) for name in names() if name != first["name"]]
+    # The page runs one vehicle.
+    single = [name for name in names() if read_scenario(name).vehicles is None]
+    others = [preset(name) for name in single if name != first["name"]]
     return {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,

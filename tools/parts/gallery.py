@@ -20,8 +20,8 @@ SEEN = {
     "the commands and their limits, and the estimated parameters",
     "comparison": "paths of both vehicles and their reference in space; over time the commands and "
     "their limits, and the tracking errors, also on a logarithmic scale",
-    FLEET: "paths of all vehicles and their references in space and from above; over time the sizes "
-    "of their tracking errors, and the distances between them",
+    FLEET: "paths of all vehicles and their references in space, and from above; over time the "
+    "sizes of their tracking errors, and the distances between them",
     "comparison-errors": "tracking errors of both controllers over time, also on a logarithmic "
     "scale",
     "open-loop-surge": "path of the vehicle in space; over time its surge velocity and "
@@ -74,7 +74,9 @@ def _scenario(scenario: Scenario) -> str:
     title = scenario.title
     figure = FLEET if scenario.vehicles else scenario.figure
     shown = f"{title}: {SEEN[figure]}", f"{PICTURES}/{scenario.name}.png"
-    return _entry(title, shown, _sentence(scenario.remark), f"run {scenario.name}", scenario.name)
+    # The live page runs one vehicle.
+    preset = "" if scenario.vehicles else scenario.name
+    return _entry(title, shown, _sentence(scenario.remark), f"run {scenario.name}", preset)
 
 
 def _place(scenario: Scenario) -> tuple[bool, str]:
@@ -87,7 +89,8 @@ def _study(study: Study) -> str:
     settings = dict(study.parameters)
     if study.stop_time is not None and not study.stop_time.per:
         settings["stop_time"] = study.stop_time.base
-    preset = "&".join([study.scenario[0], *(f"{key}={value}" for key, value in settings.items())])
+    stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
+    preset = "" if read_scenario(study.scenario[0]).vehicles else "&".join(stated)
     return _entry(
         study.title,
         (seen(study, first), f"{PICTURES}/{picture(study, first)}"),
@@ -99,10 +102,8 @@ def _study(study: Study) -> str:
 
 def _entry(title: str, shown: tuple[str, str], sentence: str, command: str, preset: str) -> str:
     words, file = shown
-    return (
-        f"### {title}\n\n[![{words}]({file})]({file})\n\n{sentence}\n\n"
-        f"`auv-fmu {command}`\n\n<!-- live: {preset} -->"
-    )
+    live = f"\n\n<!-- live: {preset} -->" if preset else ""
+    return f"### {title}\n\n[![{words}]({file})]({file})\n\n{sentence}\n\n`auv-fmu {command}`{live}"
 
 
 def _sentence(remark: str) -> str:
