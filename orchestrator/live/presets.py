@@ -95,9 +95,7 @@ def page_data(opened: str) -> Plain:
     for run in both:
         # What an FMU refuses is refused here, before there is a page.
         run.run([])
-    # The page runs one vehicle.
-    single = [name for name in names() if read_scenario(name).vehicles is None]
-    others = [preset(name) for name in single if name != first["name"]]
+    others = [preset(name) for name in offered() if name != first["name"]]
     return {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
@@ -111,6 +109,11 @@ def page_data(opened: str) -> Plain:
             for one in metrics()
         ],
     }
+
+
+def offered() -> list[str]:
+    """The scenarios of the bundle that the page has: it runs one vehicle."""
+    return [name for name in names() if read_scenario(name).vehicles is None]
 
 
 def _printed(units: Members) -> dict[str, str]:
