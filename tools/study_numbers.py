@@ -40,6 +40,7 @@ _MADE = {
         "physical": "speed < 80 / 30 and turn < 80 / 20",
     },
     "distance": {"way": "eta0_z"},
+    "formation": {"close": "smallest_distance < 2"},
     "noise": {"product": "k_d * noise_std", "gain": "estimate_error / product"},
     "robustness": {
         "ratio_of_fig_7": "omega_d == 0.1 and abs(A_d - 2 * A_f) < 1e-9",
@@ -47,6 +48,9 @@ _MADE = {
     },
     "sampling": {"product": "k_d * step"},
 }
+
+#: What column names begin with that tells nothing apart.
+_COMPONENT = re.compile(r"^(auv\*\.)?(plant|controller|disturbance|link)\.")
 
 #: The lines of each study, in the order of its text.
 _LINES = {
@@ -114,6 +118,31 @@ _LINES = {
         median theta_hat_end_1 by scenario step | way > 9e3
         max theta_hat_end_1 by scenario step
         median theta_hat_end_1 by scenario step | 1e3 / 1.1 < way < 1e3 * 1.1
+    """,
+    "formation": """
+        n
+        n | failed
+        median smallest_distance
+        min smallest_distance
+        share close
+        share close | A_d < 5
+        share close | A_d < 5 and latency < 2 and loss < 0.5
+        min smallest_distance | A_d < 5 and latency < 2 and loss < 0.5
+        share close | A_d < 5 and loss > 0.8
+        share close | A_d < 5 and latency > 3.5
+        share close | A_d > 10
+        median smallest_distance | A_d < 5 and latency < 1 and loss < 0.2
+        median smallest_distance | A_d < 5 and latency < 1 and loss > 0.8
+        median smallest_distance | A_d < 5 and latency > 3.5 and loss < 0.2
+        rank smallest_distance latency
+        rank smallest_distance loss
+        rank smallest_distance A_d
+        median auv1_late_error | A_d < 5
+        median auv2_late_error | A_d < 5
+        median auv1_late_error | A_d > 10
+        median auv2_late_error | A_d > 10
+        rank auv2_late_error loss
+        rank auv1_late_error loss
     """,
     "gains": """
         n by scenario
@@ -251,12 +280,14 @@ STATISTICS: Mapping[str, Callable[..., str]] = {
 
 def prepared(study: str, runs: pd.DataFrame) -> pd.DataFrame:
     """The runs with short names, and with the columns that are made of others."""
-    runs = runs.rename(columns=lambda name: re.sub(r"^(plant|controller|disturbance)\.", "", name))
+    runs = runs.rename(columns=lambda name: _COMPONENT.sub("", name))
     runs = runs.rename(columns=lambda name: re.sub(r"\W+", "_", name).strip("_"))
     runs = runs.rename(columns={"lambda": "lam"})
     runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
     runs["failed"] = runs.failure.fillna("") != ""
     runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
+    # Of several vehicles, the largest.
+    runs["late_error"] = runs.filter(regex="(^|_)late_error$").max(axis=1)
     runs["lost"] = ~(runs.late_error <= 1.0)
     runs["saturated"] = runs.filter(like="saturated_fraction").max(axis=1) > 0.0
     runs["peak"] = runs.filter(like="peak_command").max(axis=1)

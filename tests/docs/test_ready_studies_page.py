@@ -8,10 +8,12 @@ from importlib import import_module
 import pytest
 from PIL import Image
 
+from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.indices import index_columns
+from orchestrator.vehicle.signals import loops_of
 from parts.gallery import PICTURES
 from support.markdown import DOCS
 
@@ -40,7 +42,8 @@ def test_numbers_are_read_off_columns_that_runs_have(name):
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     tool = import_module("study_numbers")
     study = read_study(name)
-    row = dict.fromkeys((*study.varied, *index_columns()), 1.0) | {
+    _, system = load_scenario(study.scenario[0])
+    row = dict.fromkeys((*study.varied, *index_columns(loops_of(system))), 1.0) | {
         "scenario": "fig5",
         "failure": "",
     }
