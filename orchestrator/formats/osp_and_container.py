@@ -293,8 +293,9 @@ def write_container(system: System, folder: Path) -> list[Path]:
             "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
         )
     container = f"{file_name(system.name)}.fmu"
-    # It knows instances by the names of their files, so each has a copy of its own.
-    files = [component.fmu.name for component in system.components.values()]
+    # It knows instances by the names of their files, so each has a copy of its own; and it names
+    # links after them in small letters, as a component of ours may be called.
+    files = [f"fmu_{component.fmu.name}" for component in system.components.values()]
     names = plain_file_names(files, container, _CONTENT)
     fmus = dict(zip(system.components, names, strict=True))
     content: dict[str, Any] = {

@@ -89,6 +89,13 @@ def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: s
     check(system, host, 100)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["formation-v", "sea"])
+@pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos", "container"])
+def test_formations_and_seas_have_our_numbers_in_other_hosts(native: Path, host: str, scenario):
+    check(closed_loop(native, read_scenario(scenario)), host, 500)
+
+
 @pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")
 def test_ecos_has_as_many_instances_as_components_with_fmi_3(dist3: Path):
     system = fleet(dist3).with_parameters({PortName("auv2.plant", "eta0.y"): 2.0})
