@@ -96,8 +96,19 @@ def _overload(function: Any, text: Callable[[list[str]], str]) -> None:
 for _function, _text in _WRITTEN_OUT.items():
     _overload(_function, _text)
 
-#: Sine and cosine of an angle are computed once, together, wherever they are needed.
-_PURE = {math.sin: _pure("llvm.sin"), math.cos: _pure("llvm.cos")}
+@intrinsic
+def _fmod(_: Any, x: Any, y: Any) -> Any:
+    """The instruction of LLVM that calls what the C library has by that name."""
+
+    def call(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        return builder.frem(*arguments)
+
+    return types.float64(types.float64, types.float64), call
+
+
+#: What numba does not know; and sine and cosine of an angle, which are computed once, together,
+#: wherever they are needed.
+_PURE = {math.sin: _pure("llvm.sin"), math.cos: _pure("llvm.cos"), math.fmod: _fmod}
 
 
 @numba.njit(**_OPTIONS, **_WITHIN)
