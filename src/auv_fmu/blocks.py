@@ -8,6 +8,7 @@ of them can be compiled.
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import inf
 from typing import Any, NamedTuple
 
 from auv_fmu import (
@@ -41,6 +42,8 @@ _NO_VELOCITY: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 #: Before the first instant.
 _NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
+
+_UNLIMITED = Limits((-inf, -inf, -inf), (inf, inf, inf))
 
 #: What there is nothing of.
 Nothing = tuple[()]
@@ -403,8 +406,8 @@ def remus_acting(parameters: remus100.Parameters, state: RemusState) -> Vector3:
 
 
 def remus_limits(parameters: remus100.Parameters) -> Limits:
-    """The REMUS 100 limits no force or moment: those of the paper, for nothing to be missing."""
-    return Limits()
+    """The REMUS 100 limits no force or moment."""
+    return _UNLIMITED
 
 
 #: The vehicle that goes with a set of parameters.
