@@ -293,7 +293,8 @@ def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
     try:
         if before is None:
             moment = closed_loop.begin(setting, blocks, n)
-            closed_loop.act(setting, blocks, moment, run_steps.h, run_steps.parts, run_steps.delayed)
+            h, parts, delayed = run_steps.h, run_steps.parts, run_steps.delayed
+            closed_loop.act(setting, blocks, moment, h, parts, delayed)
         else:
             h, parts, end = part_of(run_steps, k)
             instant = closed_loop.act(setting, blocks, before, h, parts, run_steps.delayed)

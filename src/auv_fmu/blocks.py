@@ -132,7 +132,7 @@ LAWS: dict[type, Law] = {
 # The planners
 
 
-class Planner(NamedTuple):
+class PlannerBlock(NamedTuple):
     """A planner in the loop; what follows from its state goes along with it.
 
     All take its parameters first. A step is one of h seconds from a time on, in n parts.
@@ -189,9 +189,9 @@ def path_reference(
 
 
 #: The planner that goes with a set of parameters.
-PLANNERS: dict[type, Planner] = {
-    motion_planner.Parameters: Planner(motion_planner.begin, helix_steps, helix_reference),
-    path_planner.Parameters: Planner(path_begin, path_steps, path_reference),
+PLANNERS: dict[type, PlannerBlock] = {
+    motion_planner.Parameters: PlannerBlock(motion_planner.begin, helix_steps, helix_reference),
+    path_planner.Parameters: PlannerBlock(path_begin, path_steps, path_reference),
 }
 
 
@@ -205,7 +205,7 @@ class SeaWaves(NamedTuple):
     waves: Components
 
 
-class Water(NamedTuple):
+class WaterBlock(NamedTuple):
     """Water in the loop: its state at the start, its motion at a place and time, its state later.
 
     All take its parameters first.
@@ -252,16 +252,16 @@ def steady_later(water: Vector3, state: Nothing, h: float) -> Nothing:
 
 
 #: The water that goes with a velocity, or with a sea.
-WATERS: dict[type, Water] = {
-    tuple: Water(steady_begin, steady_motion, steady_later),
-    SeaWaves: Water(sea_begin, sea_motion, sea_later),
+WATERS: dict[type, WaterBlock] = {
+    tuple: WaterBlock(steady_begin, steady_motion, steady_later),
+    SeaWaves: WaterBlock(sea_begin, sea_motion, sea_later),
 }
 
 
 # The vehicles
 
 
-class Vehicle(NamedTuple):
+class VehicleBlock(NamedTuple):
     """A vehicle in the loop; what follows from its state goes along with it.
 
     Between the commanded (tau_u, tau_q, tau_r) and the vehicle there may be an allocation, whose
@@ -411,8 +411,8 @@ def remus_limits(parameters: remus100.Parameters) -> Limits:
 
 
 #: The vehicle that goes with a set of parameters.
-VEHICLES: dict[type, Vehicle] = {
-    plant.Parameters: Vehicle(
+VEHICLES: dict[type, VehicleBlock] = {
+    plant.Parameters: VehicleBlock(
         plant_begin,
         plant_outputs,
         plant_disturbed,
@@ -423,7 +423,7 @@ VEHICLES: dict[type, Vehicle] = {
         plant_acting,
         plant_limits,
     ),
-    remus100.Parameters: Vehicle(
+    remus100.Parameters: VehicleBlock(
         remus_begin,
         remus_outputs,
         remus_disturbed,
@@ -441,6 +441,6 @@ class Blocks(NamedTuple):
     """Which blocks a loop has."""
 
     controller: Law
-    planner: Planner
-    vehicle: Vehicle
-    water: Water
+    planner: PlannerBlock
+    vehicle: VehicleBlock
+    water: WaterBlock

@@ -89,7 +89,7 @@ class Vehicles(NamedTuple):
     rotation: Any  #: attitude of a plant, body to earth; of a REMUS 100 there is nothing here
     planner: Any  #: a PlannerState or a PathState
     moving: Any  #: motion of the reference vehicle, or the corner ahead
-    water: Any = ()  #: the Variation of a sea
+    water: Any  #: the Variation of a sea; of steady water there is nothing here
 
 
 class Sent(NamedTuple):
@@ -122,14 +122,14 @@ def scene(setting: Setting, blocks: Blocks, vehicles: Vehicles, t: float, n: Vec
         n: three independent standard normal numbers, of the localisation system.
 
     """
-    state, derived, planner, moving, varying = vehicles
-    seen = blocks.vehicle.outputs(setting.plant, state, derived)
+    state = vehicles.plant
+    seen = blocks.vehicle.outputs(setting.plant, state, vehicles.rotation)
     return Scene(
         seen,
         plant.measure(seen.y, n, setting.plant.noise.std),
-        blocks.planner.reference(setting.planner, planner, moving),
+        blocks.planner.reference(setting.planner, vehicles.planner, vehicles.moving),
         disturbance(setting.disturbance, blocks.vehicle.disturbed(seen.nu_r), t),
-        blocks.water.motion(setting.water, varying, state.position, t),
+        blocks.water.motion(setting.water, vehicles.water, state.position, t),
     )
 
 
@@ -157,13 +157,13 @@ def move(
         parts: that the step is split into.
 
     """
-    state, derived, planner, moving, varying = vehicles
-    n = parts.plant
-    state, derived = blocks.vehicle.steps(
-        setting.plant, state, derived, drive, sent.tau_w, sent.water, h / n, n
+    _, rotation, planner, moving, water = vehicles
+    n, n_d = parts.plant, parts.planner
+    state, rotation = blocks.vehicle.steps(
+        setting.plant, vehicles.plant, rotation, drive, sent.tau_w, sent.water, h / n, n
     )
-    planner, moving = blocks.planner.steps(setting.planner, planner, moving, t, h, parts.planner)
-    return Vehicles(state, derived, planner, moving, blocks.water.later(setting.water, varying, h))
+    planner, moving = blocks.planner.steps(setting.planner, planner, moving, t, h, n_d)
+    return Vehicles(state, rotation, planner, moving, blocks.water.later(setting.water, water, h))
 
 
 class Moment(NamedTuple):

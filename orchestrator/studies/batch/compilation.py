@@ -96,6 +96,7 @@ def _overload(function: Any, text: Callable[[list[str]], str]) -> None:
 for _function, _text in _WRITTEN_OUT.items():
     _overload(_function, _text)
 
+
 @intrinsic
 def _fmod(_: Any, x: Any, y: Any) -> Any:
     """The instruction of LLVM that calls what the C library has by that name."""
@@ -108,16 +109,14 @@ def _fmod(_: Any, x: Any, y: Any) -> Any:
 
 #: What numba does not know; and sine and cosine of an angle, which are computed once, together,
 #: wherever they are needed.
-_PURE = {math.sin: _pure("llvm.sin"), math.cos: _pure("llvm.cos"), math.fmod: _fmod}
+_PURE: dict[Any, Any] = {math.sin: _pure("llvm.sin"), math.cos: _pure("llvm.cos"), math.fmod: _fmod}
 
 
-@numba.njit(**_OPTIONS, **_WITHIN)
 def _as_it_is(value: Any) -> Any:
     """A vector is a tuple here, and a matrix a tuple of rows."""
     return value
 
 
-@numba.njit(**_OPTIONS, **_WITHIN)
 def _solved(A: Any, b: Any) -> Any:
     """What :func:`solve` gives, with its operations in the same order, as an array."""
     n = len(b)
@@ -145,7 +144,10 @@ def _solved(A: Any, b: Any) -> Any:
 
 
 #: What numba does not know, and what stands for it.
-_OWN = {Vector: _as_it_is, Matrix: _as_it_is, solve: _solved}
+_OWN: dict[Any, Any] = {
+    known: numba.njit(function, **_OPTIONS, **_WITHIN)
+    for known, function in ((Vector, _as_it_is), (Matrix, _as_it_is), (solve, _solved))
+}
 
 
 def equations(module: ModuleType) -> ModuleType:
@@ -215,7 +217,7 @@ class _InNumba(ast.NodeTransformer):
         return self.generic_visit(node)
 
     def visit_Assign(self, node: ast.Assign) -> ast.AST:
-        """Take a row apart by places: it may be an array, of which only the run knows the length."""
+        """Take a row apart by places: of an array, numba does not know how many it has."""
         target, value = node.targets[0], node.value
         if isinstance(target, ast.Tuple) and isinstance(value, ast.Name) and value.id in self._rows:
             places = [
@@ -244,7 +246,9 @@ def compile_run(blocks: Blocks) -> Callable[..., Moment]:
     this user has done so before. It takes the setting of the loop as :func:`packed` makes it.
     """
     made = equations(kernel)
-    vars(made)["blocks"] = Blocks(*(type(one)(*map(_counterpart, one)) for one in blocks))
+    all_blocks: Any = blocks
+    compiled = (type(one)(*map(_counterpart, one)) for one in all_blocks)
+    vars(made)["blocks"] = Blocks(*compiled)
     run: Callable[..., Moment] = numba.njit(made.run.py_func, **_OPTIONS)
     functions = [f"{one.__module__}.{one.__name__}" for block in blocks for one in block]
     vars(run)["_cache"] = _Kept(" ".join(functions))
@@ -256,12 +260,14 @@ def packed(setting: Setting) -> Setting:
     planner: Any = setting.planner
     water: Any = setting.water
     if isinstance(planner, path_planner.Parameters):
-        way = planner.waypoints
+        way: Any = planner.waypoints
         x, y, z, t = map(np.array, (way.x, way.y, way.z, way.t))
-        planner = planner._replace(waypoints=way._replace(x=x, y=y, z=z, t=t))
+        way = way._replace(x=x, y=y, z=z, t=t)
+        setting = setting._replace(planner=planner._replace(waypoints=way))
     if isinstance(water, SeaWaves):
-        water = water._replace(waves=np.array(water.waves))
-    return setting._replace(planner=planner, water=water)
+        waves: Any = np.array(water.waves)
+        setting = setting._replace(water=water._replace(waves=waves))
+    return setting
 
 
 class _Kept:

@@ -100,7 +100,9 @@ def run(
     progress[0] = -1
     n, spare = normals(generator, noisy, (False, 0.0))
     moment = closed_loop.begin(setting, blocks, n)
-    first = closed_loop.act(setting, blocks, moment, run_steps.h, run_steps.parts, run_steps.delayed)
+    first = closed_loop.act(
+        setting, blocks, moment, run_steps.h, run_steps.parts, run_steps.delayed
+    )
     driven, _ = blocks.vehicle.begin(setting.plant, first.tau, moment.scene.water.velocity)
     done = done_in(first, blocks.vehicle.acting(setting.plant, driven))
     if not (is_sound(moment) and nought(done) == 0.0):

@@ -39,13 +39,13 @@ from orchestrator.vehicle.signals import AXES, DIRECTIONS
 #: Where a value lies: fields, and places in tuples.
 Place = tuple[str | int, ...]
 
-#: Inputs that a loop may leave open. Without a sea the first are the velocity of the water. The
-#: others are of no effect, or of none that the equations here have a place for.
+#: Inputs that a loop may leave open: the velocity of the water, if there is no sea, and others that
+#: the equations here have no place for.
 _WATER = [PortName("plant", f"water.{axis}") for axis in AXES]
-_STAY_ZERO = [
+_STAY_ZERO = {
     *(PortName("plant", f"dwater.{axis}") for axis in AXES),
     *(PortName("disturbance", f"nu.{direction}") for direction in DIRECTIONS),
-]
+}
 
 #: What may stand in the loop instead of its own component of that name, or besides.
 _INSTEAD = {
@@ -179,9 +179,6 @@ def setting_of(
         InputError: a component would refuse a value, or the equations here have no place for it.
 
     """
-    for name in _STAY_ZERO:
-        if parameters.get(name):
-            raise InputError(f"{name}: the batch engine has no place for it; leave it 0")
     components = {name: _BLOCKS[fmu] for name, fmu in fmus.items()}
     sets = {name: component.starts for name, component in components.items()}
     longest: dict[str, Any] = {}
@@ -196,9 +193,11 @@ def setting_of(
             except Refusal as refusal:
                 raise InputError(f"{component}: {refusal}") from None
             sets[component] = _replaced(sets[component], components[component].paths[port], meant)
-    for name, block in components.items():
+        elif name in _STAY_ZERO and value:
+            raise InputError(f"{name}: the batch engine has no place for it; leave it 0")
+    for role, block in components.items():
         try:
-            block.check(sets[name])
+            block.check(sets[role])
         except (Refusal, ArithmeticError, ValueError) as refusal:
             raise InputError(f"initialisation refused: {refusal}") from None
     water: Any = tuple(parameters.get(name, 0.0) for name in _WATER)
