@@ -187,17 +187,9 @@ class Instant(NamedTuple):
     signals: Any  #: Signals or PdSignals
     now: Sent  #: what this instant sends
     acts: Sent  #: what reaches the others in the step that begins here
-    tau: Vector3  #: what drives the vehicle: what the limits of (3) leave of its command [N, N.m]
-
-    @property
-    def command(self) -> Vector3:
-        """(tau_u, tau_q, tau_r) as it reaches the actuators, or their allocation [N, N.m]."""
-        return self.acts.tau
-
-    @property
-    def tau_w(self) -> Vector6:
-        """Disturbance that acts (u, v, w, p, q, r) [N, N.m]."""
-        return self.acts.tau_w
+    command: Vector3  #: (tau_u, tau_q, tau_r) of it, at the actuators or their allocation [N, N.m]
+    tau: Vector3  #: what drives the vehicle: what the limits of (3) leave of the command [N, N.m]
+    tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
 
 
 # The loop
@@ -245,7 +237,7 @@ def act(
     now = Sent(signals.tau, scene.tau_w, scene.water, allocated)
     acts = before if late else now
     tau = vehicle.driving(setting.plant, told, acts.allocated)
-    return Instant(t, vehicles, scene, measured, state, signals, now, acts, tau)
+    return Instant(t, vehicles, scene, measured, state, signals, now, acts, told, tau, acts.tau_w)
 
 
 def step(
@@ -269,7 +261,7 @@ def step(
         n: three independent standard normal numbers, for what is measured then.
 
     """
-    t, vehicles, _, measured, controller_state, signals, now, acts, tau = instant
+    t, vehicles, _, measured, controller_state, signals, now, acts, _, tau, _ = instant
     law, n_c = blocks.controller, parts.controller
     state = law.steps(setting.controller, controller_state, signals, measured, h / n_c, n_c)
     vehicles = move(setting, blocks, vehicles, t, tau, acts, h, parts)

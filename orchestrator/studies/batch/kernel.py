@@ -147,7 +147,7 @@ def done_in(instant: Instant, tau: Vector3) -> Done:
     """What was computed in the step that an instant begins, after which tau [N, N.m] acts."""
     scene, state, signals = instant.scene, instant.controller_state, instant.signals
     velocity, theta_hat = blocks.controller.estimates(scene, state, signals)
-    return Done(velocity, theta_hat, signals.tau, instant.acts.tau, tau, instant.acts.tau_w)
+    return Done(velocity, theta_hat, signals.tau, instant.command, tau, instant.tau_w)
 
 
 def is_sound(moment: Moment) -> bool:
