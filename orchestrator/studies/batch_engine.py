@@ -36,7 +36,7 @@ from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.indices import INDICES, Index, Indices
+from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
 
@@ -45,8 +45,8 @@ _OTHER = "use --engine fmu"
 
 _NO_ROWS = np.empty((0, 0))
 
-#: The indices that the kernel accumulates. Each run asks for them.
-_ACCUMULATED = [index for index in INDICES if index.accumulated]
+#: The indices that the kernel accumulates, and their columns. Each run asks for them.
+_ACCUMULATED = [(index, index.columns) for index in INDICES if index.accumulated]
 
 #: The others: reducers make them of the rows, as they do after a run of FMUs; it takes longer.
 _OF_ROWS = [index for index in INDICES if not index.accumulated]
@@ -60,7 +60,7 @@ class _Loop(NamedTuple):
         names: of its signals.
         columns: of the rows, after the time.
         there: which of these it has.
-        accumulated: indices of it that the kernel accumulates, and their columns.
+        without: names of the indices that it has no columns or parameters for.
 
     """
 
@@ -68,19 +68,20 @@ class _Loop(NamedTuple):
     names: Loop
     columns: tuple[str, ...]
     there: Sequence[bool]
-    accumulated: Sequence[tuple[Index, tuple[str, ...]]]
+    without: frozenset[str]
 
 
 def _loop(system: System) -> _Loop:
     names = AllocatedLoop() if "allocation" in system.components else STANDARD
     of_rows = columns(names)
     there = [system.has(port_name(name)) for name in of_rows]
-    accumulated = [
-        (index, index.columns)
-        for index in _ACCUMULATED
-        if all(system.has(port_name(name)) for needed in index.needs(names) for name in needed)
-    ]
-    return _Loop(system, names, of_rows, there, accumulated)
+    without = frozenset(
+        index.name
+        for index in INDICES
+        for needed in index.needs(names)
+        if not all(system.has(port_name(name)) for name in needed)
+    )
+    return _Loop(system, names, of_rows, there, without)
 
 
 class BatchEngine:
@@ -351,9 +352,9 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
     """The indices of an accumulator by their columns."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
     values: dict[str, float] = {}
-    for index, names in job.loop.accumulated:
+    for index, names in _ACCUMULATED:
         n = int(found["instants"]) if index.accumulated == "miss" else steps
-        if n:
+        if n and index.name not in job.loop.without:
             members = index.members_of(found[index.accumulated], n, t)
             values.update(zip(names, members, strict=True))
     # What was never reached is not a number.

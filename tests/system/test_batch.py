@@ -307,8 +307,7 @@ def test_an_index_that_is_not_accumulated_is_made_of_the_rows(monkeypatch, name)
     expected = batch.outcomes_at(run, ends)
     monkeypatch.setattr(batch_engine, "_ACCUMULATED", [])
     monkeypatch.setattr(batch_engine, "_OF_ROWS", INDICES)
-    other, _ = engines(name)
-    assert other.outcomes_at(run, ends) == expected
+    assert batch.outcomes_at(run, ends) == expected
     assert expected[-1].indices.keys() >= {"final_error.x", "late_error"}
 
 
@@ -378,6 +377,16 @@ def test_other_systems_are_refused_by_what_differs(tmp_path):
         (
             '[wires]\n"controller.y_d" = "plant.y"',
             "it has the wire plant.y.x -> controller.y_d.x",
+        ),
+        (
+            '[components]\nsea = "Sea"\n[wires]\n"sea.eta" = "plant.eta"\n'
+            '"plant.water" = "sea.water"',
+            "it has no wire sea.dwater.x -> plant.dwater.x",
+        ),
+        ('[components]\nsea = "MotionPlanner"', "it also has sea"),
+        (
+            '[components]\nplanner = "PathPlanner"\n[wires]\n"plant.tau_w" = false',
+            "it has no wire disturbance.tau_w.p -> plant.tau_w.p",
         ),
     ):
         own.write_text(text)
