@@ -16,7 +16,8 @@ from scipy.integrate import solve_ivp
 
 from auv_fmu import closed_loop, motion_planner, plant
 from auv_fmu.attitude import normalised, rotation_from_quaternion
-from auv_fmu.closed_loop import LAWS, Scene, Setting, Vehicles
+from auv_fmu.blocks import Scene
+from auv_fmu.closed_loop import Setting, Vehicles, blocks_of
 from auv_fmu.euler import STEP
 from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
@@ -194,25 +195,27 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
 
     Planner and controller go on by Euler's scheme, whose step over its length is the rate.
     """
-    law, h = LAWS[type(setting.controller)], 2.0**-10
-    begun = closed_loop.begin(setting, law, (0.0, 0.0, 0.0))
+    blocks, h = blocks_of(setting), 2.0**-10
+    law, own, settings = blocks.controller, setting.plant, setting.planner
+    assert isinstance(own, plant.Parameters)
+    assert isinstance(settings, motion_planner.Parameters)
+    begun = closed_loop.begin(setting, blocks, (0.0, 0.0, 0.0))
     start = begun.vehicles.plant, begun.vehicles.planner, begun.controller_state
 
     def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Scene]:
         state, planner, control = like(start, iter(x.tolist()))
         rotation = rotation_from_quaternion(normalised(state.quaternion))
-        settings = setting.planner
         moving = motion_planner.motion(settings.vehicle, planner, settings.tau_d)
-        vehicles = Vehicles(state, rotation, planner, moving)
-        return vehicles, control, closed_loop.scene(setting, vehicles, t, (0.0, 0.0, 0.0))
+        vehicles = Vehicles(state, rotation, planner, moving, begun.vehicles.water)
+        return vehicles, control, closed_loop.scene(setting, blocks, vehicles, t, (0.0, 0.0, 0.0))
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         vehicles, control, seen = unpacked(t, x)
         measured = law.measurement(seen)
         control, signals = law.command(setting.controller, control, measured, 0.0)
-        tau = plant.applied(setting.plant, signals.tau)
-        vehicle, roll, state, rotation = *setting.plant[:2], vehicles.plant, vehicles.rotation
-        moving = plant.rates(vehicle, roll, state, rotation, tau, seen.tau_w)
+        tau = plant.applied(own, signals.tau)
+        state, rotation = vehicles.plant, vehicles.rotation
+        moving = plant.rates(own.vehicle, own.roll, state, rotation, tau, seen.tau_w)
         planned = motion_planner.step(vehicles.planner, vehicles.moving, h)
         control_later = law.steps(setting.controller, control, signals, measured, h, 1)
         rest = np.subtract(flat((planned, control_later)), flat((vehicles.planner, control))) / h

@@ -14,12 +14,9 @@ from typing import NamedTuple
 import numpy as np
 
 from auv_fmu import closed_loop
-from auv_fmu.closed_loop import LAWS, Moment, Setting, splits
+from auv_fmu.closed_loop import Moment, Setting, blocks_of, splits
 from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
-from auv_fmu.output_feedback import Gains
-from fmus.auv_plant.behaviour import check
 from fmus.kinds import AUTO
-from fmus.ports.port import Refusal
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
@@ -28,9 +25,9 @@ from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.studies.batch.kernel import (
-    COLUMNS,
     END,
     RunSteps,
+    columns,
     is_bounded,
     new_accumulators,
     part_of,
@@ -41,30 +38,54 @@ from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
 
 _NO_ROWS = np.empty((0, 0))
 
-#: What there is only with an observer.
-_ESTIMATES = frozenset(STANDARD.dy_hat)
-
-#: The indices that the kernel accumulates, their columns, and whether they need an observer. Each
-#: run asks for them.
-_ACCUMULATED = [
-    (index, index.columns, not _ESTIMATES.isdisjoint(index.needs(STANDARD)[0]))
-    for index in INDICES
-    if index.accumulated
-]
+#: The indices that the kernel accumulates, and their columns. Each run asks for them.
+_ACCUMULATED = [(index, index.columns) for index in INDICES if index.accumulated]
 
 #: The others: reducers make them of the rows, as they do after a run of FMUs; it takes longer.
 _OF_ROWS = [index for index in INDICES if not index.accumulated]
 
 
+class _Loop(NamedTuple):
+    """A system, and what of a row it has.
+
+    Attributes:
+        system: that has the loop.
+        names: of its signals.
+        columns: of the rows, after the time.
+        there: which of these it has.
+        without: names of the indices that it has no columns or parameters for.
+
+    """
+
+    system: System
+    names: Loop
+    columns: tuple[str, ...]
+    there: Sequence[bool]
+    without: frozenset[str]
+
+
+def _loop(system: System) -> _Loop:
+    names = AllocatedLoop() if "allocation" in system.components else STANDARD
+    of_rows = columns(names)
+    there = [system.has(port_name(name)) for name in of_rows]
+    without = frozenset(
+        index.name
+        for index in INDICES
+        for needed in index.needs(names)
+        if not all(system.has(port_name(name)) for name in needed)
+    )
+    return _Loop(system, names, of_rows, there, without)
+
+
 class BatchEngine:
-    """Makes runs of the standard closed loop, with either controller, one after the other.
+    """Makes runs of the closed loop of the bundle's components, one after the other.
 
     Where it makes them no FMUs are needed.
     """
@@ -81,7 +102,7 @@ class BatchEngine:
 
         """
         check_systems(systems, kind)
-        self._systems = dict(systems)
+        self._loops = {name: _loop(system) for name, system in systems.items()}
 
     @property
     def digest(self) -> str:
@@ -104,7 +125,7 @@ class BatchEngine:
 
         """
         try:
-            job = _job(self._systems[point.scenario], point)
+            job = _job(self._loops[point.scenario], point)
             ends = np.array([_end(job, stop_time) for stop_time in stop_times], END)
             accumulators = new_accumulators(len(ends))
             rows = _empty_rows(job) if _OF_ROWS else _NO_ROWS
@@ -127,16 +148,16 @@ class BatchEngine:
             InputError: the run has no start.
 
         """
-        return _job(self._systems[point.scenario], point).setting
+        return _job(self._loops[point.scenario], point).setting
 
     def table(self, point: Point) -> Table:
-        """A run with its rows, in those columns :data:`.kernel.COLUMNS` that it has.
+        """A run with its rows, in those columns :func:`.kernel.columns` that it has.
 
         Raises:
             InputError: it has no start.
 
         """
-        job = _job(self._systems[point.scenario], point)
+        job = _job(self._loops[point.scenario], point)
         rows = _empty_rows(job)
         made, failure = _made(job, np.empty(0, END), new_accumulators(0), rows)
         return _table(job, rows[: made + 1], failure)
@@ -158,18 +179,14 @@ def check_systems(systems: Mapping[str, System], kind: str = AUTO) -> None:
 class _Job(NamedTuple):
     """A run, ready to be made."""
 
-    system: System
+    loop: _Loop
+    system: System  #: of the loop, with the parameters of the run
     experiment: Experiment
     setting: Setting
     run_steps: RunSteps
 
-    @property
-    def is_observed(self) -> bool:
-        """Whether there are estimates of velocity."""
-        return isinstance(self.setting.controller, Gains)
 
-
-def _job(system: System, point: Point) -> _Job:
+def _job(loop: _Loop, point: Point) -> _Job:
     """A run, ready to be made.
 
     Raises:
@@ -177,7 +194,7 @@ def _job(system: System, point: Point) -> _Job:
 
     """
     changes = {port_name(name): value for name, value in point.parameters.items()}
-    system = system.with_parameters(changes)
+    system = loop.system.with_parameters(changes)
     changed = [system.component(name.component).variable(name.port) for name in changes]
     if any(variable.causality != "parameter" for variable in changed):
         system.check()
@@ -186,10 +203,6 @@ def _job(system: System, point: Point) -> _Job:
         raise InputError(f"the batch engine has only the orders {' and '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
-    try:
-        check(setting.plant)
-    except Refusal as refusal:
-        raise InputError(f"initialisation refused: {refusal}") from None
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
     if max(parts) > MOST_INTERNAL_STEPS:
@@ -208,7 +221,7 @@ def _job(system: System, point: Point) -> _Job:
         last_parts,
         experiment.order != ORDERS[0],
     )
-    return _Job(system, experiment, setting, run_steps)
+    return _Job(loop, system, experiment, setting, run_steps)
 
 
 def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
@@ -231,18 +244,18 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
 
 
 def _empty_rows(job: _Job) -> np.ndarray:
-    return np.empty((job.experiment.rows, 1 + len(COLUMNS)))
+    return np.empty((job.experiment.rows, 1 + len(job.loop.columns)))
 
 
 def _table(job: _Job, rows: np.ndarray, failure: str | None = None) -> Table:
     """Rows of a run, in the columns that it has."""
-    there = [job.is_observed or name not in _ESTIMATES for name in COLUMNS]
     parameters = {
         name: job.system.value(name)
         for component in job.system.components.values()
         for name in (PortName(component.name, v.name) for v in component.having("parameter"))
     }
-    header = Header(tuple(compress(COLUMNS, there)), job.experiment, parameters)
+    there = job.loop.there
+    header = Header(tuple(compress(job.loop.columns, there)), job.experiment, parameters)
     return Table.of(header, rows[:, [True, *there]], Ending(failure))
 
 
@@ -275,22 +288,24 @@ def _why(job: _Job, k: int = 0, before: Moment | None = None) -> str:
 
     It is what an equation of plain Python raises, or else what is wrong with what it comes to.
     """
-    setting, run_steps, law = job.setting, job.run_steps, LAWS[type(job.setting.controller)]
+    setting, run_steps, blocks = job.setting, job.run_steps, blocks_of(job.setting)
     # Noise is too small to make a difference.
     n = (0.0, 0.0, 0.0)
     try:
         if before is None:
-            moment = closed_loop.begin(setting, law, n)
-            closed_loop.act(setting, law, moment, run_steps.h, run_steps.parts, run_steps.delayed)
+            moment = closed_loop.begin(setting, blocks, n)
+            h, parts, delayed = run_steps.h, run_steps.parts, run_steps.delayed
+            closed_loop.act(setting, blocks, moment, h, parts, delayed)
         else:
             h, parts, end = part_of(run_steps, k)
-            instant = closed_loop.act(setting, law, before, h, parts, run_steps.delayed)
-            moment = closed_loop.step(setting, law, instant, h, parts, end, n)
+            instant = closed_loop.act(setting, blocks, before, h, parts, run_steps.delayed)
+            moment = closed_loop.step(setting, blocks, instant, h, parts, end, n)
     except (ArithmeticError, ValueError) as error:
         return f"{type(error).__name__}: {error}"
     states = {
         "plant": moment.vehicles.plant,
         "planner": moment.vehicles.planner,
+        "sea": moment.vehicles.water,
         "controller": moment.controller_state,
     }
     for name, state in states.items():
@@ -310,11 +325,11 @@ def _run(
     """Call the kernel."""
     # Not installed where no studies are made.
     imported_apart("numba", ".numba_config.yaml")
-    from orchestrator.studies.batch.compilation import compile_run  # noqa: PLC0415
+    from orchestrator.studies.batch.compilation import compile_run, packed  # noqa: PLC0415
 
-    kernel = compile_run(type(job.setting.controller))  # type: ignore[arg-type]
+    kernel = compile_run(blocks_of(job.setting))
     uniform = _NOISE.uniform(job.setting.plant.noise.seed)
-    return kernel(job.setting, run_steps, uniform, ends, accumulators, rows, progress)
+    return kernel(packed(job.setting), run_steps, uniform, ends, accumulators, rows, progress)
 
 
 class _Noise(local):
@@ -337,11 +352,11 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
     """The indices of an accumulator by their columns."""
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
     values: dict[str, float] = {}
-    for index, columns, needs_observer in _ACCUMULATED:
+    for index, names in _ACCUMULATED:
         n = int(found["instants"]) if index.accumulated == "miss" else steps
-        if n and (job.is_observed or not needs_observer):
+        if n and index.name not in job.loop.without:
             members = index.members_of(found[index.accumulated], n, t)
-            values.update(zip(columns, members, strict=True))
+            values.update(zip(names, members, strict=True))
     # What was never reached is not a number.
     return {name: value for name, value in values.items() if not isnan(value)}
 
@@ -353,7 +368,7 @@ def _of_rows(job: _Job, stop_time: float, end: np.void, rows: np.ndarray) -> dic
         return {}
     shorter = replace(job.experiment, stop_time=stop_time)
     table = _table(job._replace(experiment=shorter), rows[: end["steps"] + 1])
-    observer = Indices(chosen=_OF_ROWS)
+    observer = Indices([job.loop.names], _OF_ROWS)
     observer.begin(table.header)
     observer.take(table.rows)
     return observer.values()
@@ -361,8 +376,9 @@ def _of_rows(job: _Job, stop_time: float, end: np.void, rows: np.ndarray) -> dic
 
 def _without_column(system: System) -> str:
     """An index of a system that the kernel has no columns for, in words; empty: there is none."""
+    loop = _loop(system)
     for index in _OF_ROWS:
-        for name in index.needs(STANDARD)[0]:
-            if name not in COLUMNS and system.has(port_name(name)):
+        for name in index.needs(loop.names)[0]:
+            if name not in loop.columns and system.has(port_name(name)):
                 return f"its index {index.name} is of {name}"
     return ""

@@ -159,8 +159,8 @@ class StudyFile(TomlTable):
     title: str = entry("Heading of the figures.", "none")
     remark: str = entry("What the report says below the figures, in Markdown.", "none")
     engine: Annotated[str, OneOf(ENGINES)] = entry(
-        "What makes the runs: the FMUs, or the compiled equations, which cover only the standard "
-        "closed loop and give the same numbers.",
+        "What makes the runs: the FMUs, or the compiled equations, which cover only the closed "
+        "loop of one vehicle and give the same numbers.",
         f"`{ENGINES[0]}`",
     )
     stop_time: float | StopTimeTable = entry(

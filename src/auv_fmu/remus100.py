@@ -234,7 +234,7 @@ def steps(
     mass = inertia(parameters.hull)
     flow = total(parameters.current, water)
     for _ in range(n):
-        state = state._replace(water=flow)
+        state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
         check_speed(state)
         state = step(parameters, mass, state, command, h)
         check_speed(state)

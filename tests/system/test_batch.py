@@ -19,7 +19,7 @@ from auv_fmu.closed_loop import Instant, Setting
 from auv_fmu.closed_loop import closed_loop as straight_line
 from auv_fmu.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS
+from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies import batch_engine
 from orchestrator.studies.batch_engine import BatchEngine
@@ -27,9 +27,10 @@ from orchestrator.studies.engine import FmuEngine, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
+from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import INDICES
-from support.runs import prepared
+from support.runs import prepared, whole
 from support.texts import tells
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
@@ -70,8 +71,9 @@ def bits(rows: np.ndarray) -> np.ndarray:
 def straight_rows(setting: Setting, steps: int, delayed: bool) -> np.ndarray:
     """Time and values after every step: what a row of the FMUs' table holds."""
     instants = list(straight_line(steps, setting, delayed))
-    start, _ = plant.begin(setting.plant, instants[0].tau, setting.plant.current)
-    acting = [start.tau, *(instant.vehicles.plant.tau for instant in instants[1:])]
+    acting = [instant.vehicles.plant.tau for instant in instants]
+    flow = plant.flow(setting.plant, instants[0].acts.water.velocity)
+    acting[0] = plant.begin(setting.plant, instants[0].tau, flow)[0].tau
     pairs = zip([instants[0], *instants[:-1]], instants, acting, strict=True)
     return np.array([_row(*pair) for pair in pairs])
 
@@ -114,6 +116,113 @@ def test_runs_of_studies_are_those_of_the_fmus(name):
     batch, fmus = engines(*read_study(name).scenario)
     for one, other in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
         assert one == other
+
+
+#: Scenarios with other blocks in the loop than the paper has, and a loop with all of them but one.
+OTHERS = ["path", "path-pd", "sea", "sea-pd", "remus", "remus-pd"]
+REMUS_IN_A_SEA = """
+[components]
+plant = "Remus100"
+allocation = "Allocation"
+sea = "Sea"
+[wires]
+"allocation.tau" = "controller.tau"
+"allocation.nu_r" = "plant.nu_r"
+"plant.command" = "allocation.command"
+"plant.tau" = false
+"plant.tau_w" = false
+"disturbance.nu" = false
+"sea.eta" = "plant.eta"
+"plant.water" = "sea.water"
+[parameters]
+plant.ell = 0.8
+plant.eta0.z = 2.0
+plant.noise.std = 0.001
+plant.current.y = 0.1
+allocation.measured = true
+sea.waves.spectrum = "pierson-moskowitz"
+sea.depth = 0.0
+controller.ell = 0.8
+planner.ell = 0.8
+planner.eta0.z = 2.0
+"""
+
+
+def compare_with_fmus(name: str, values: dict[str, Any], order: str, until: float) -> None:
+    """Every signal after every step, and all indices, with noise and a shorter step at the end."""
+    batch, fmus = engines(name)
+    point = Point(0, name, values, until, 0.02, order)
+    table = batch.table(point)
+    system = systems(name)[name].with_parameters({port_name(k): v for k, v in values.items()})
+    expected = whole(system, Experiment(until, 0.02, order), "compiled")
+    assert table.failure is None
+    assert len(table.columns) >= 40
+    rows = np.column_stack([expected.time, expected.group(*table.columns)])
+    assert bits(table.rows).tolist() == bits(rows).tolist()
+    for one, other in zip(batch.outcomes([point]), fmus.outcomes([point]), strict=True):
+        assert one == other
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("name", OTHERS)
+def test_runs_with_other_blocks_are_those_of_the_fmus(name, order):
+    noise = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
+    compare_with_fmus(name, noise, order, 30.01)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_remus_in_a_sea_is_that_of_the_fmus(tmp_path, order):
+    path = tmp_path / "both.toml"
+    path.write_text(REMUS_IN_A_SEA)
+    compare_with_fmus(str(path), {}, order, 10.01)
+
+
+#: Values that make a difference to how these are computed.
+OTHER_ADDITIONS: list[tuple[str, dict[str, Any]]] = [
+    ("path", {"planner.cruise": 0.4, "planner.rounding": 40.0, "plant.water.y": 0.1}),
+    ("path", {"planner.timed": True, "planner.count": 4, "planner.waypoint[1].t": 0.01}),
+    ("sea", {"sea.waves.spectrum": "none", "sea.current.mu": 0.5, "sea.current.root": 0.0}),
+    ("sea", {"sea.waves.count": 64, "sea.waves.s": 0.0, "sea.depth": 6.0, "sea.waves.Hs": 0.5}),
+    ("sea", {"plant.integrator": "rk4", "plant.current.z": 0.1, "plant.h_max": 0.007}),
+    ("sea", {"plant.roll": False, "plant.actuator.T.u": 0.2, "sea.waves.seed": -3}),
+    ("remus", {"plant.h_max": 0.004, "plant.water.x": 0.3, "plant.current.y": -0.1}),
+    ("remus", {"allocation.measured": True, "plant.r_bg.y": 0.001, "plant.fin.T": 0.0}),
+]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(("name", "values"), OTHER_ADDITIONS)
+def test_additions_with_other_blocks_are_those_of_the_fmus(name, values, order):
+    compare_with_fmus(name, values, order, 2.01)
+
+
+#: What they refuse: values that do not fit, starts, steps.
+OTHERS_REFUSED: list[tuple[str, dict[str, Any]]] = [
+    ("path", {"planner.cruise": 2.0, "planner.rounding": 0.5}),
+    ("path", {"planner.timed": True, "planner.waypoint[3].t": 1.0}),
+    ("path", {"planner.ell": 1e308}),
+    ("sea", {"sea.waves.Hs": 20.0}),
+    ("sea", {"sea.current.sigma": 1e200}),
+    ("sea", {"plant.m11": 1e-9}),
+    ("remus", {"plant.nu0.u": 11.0}),
+    ("remus", {"plant.diameter": 1.5}),
+    ("remus", {"plant.drag.T.yaw": 1e-3}),
+    ("remus", {"plant.current.x": 9.9, "controller.gamma": 1e200}),
+]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(("name", "values"), OTHERS_REFUSED)
+def test_what_fmus_of_other_blocks_refuse_is_refused_at_the_same_step(name, values, order):
+    compare_refusals(Point(5, name, values, 3.0, 0.02, order))
+
+
+@pytest.mark.parametrize("name", ["plant.dwater.x", "disturbance.nu.r"])
+def test_inputs_without_a_place_stay_zero(name):
+    scenario = "remus" if name.startswith("disturbance") else "path"
+    batch, _ = engines(scenario)
+    [outcome] = batch.outcomes([Point(0, scenario, {name: 0.1}, 1.0, 0.02)])
+    assert outcome.failure == f"{name}: the batch engine has no place for it; leave it 0"
 
 
 #: Values that make a difference to how the loop is computed.
@@ -167,8 +276,13 @@ def where(failure: str | None) -> str:
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("values", REFUSED, ids=", ".join)
 def test_what_fmus_refuse_is_refused_at_the_same_step(values, order):
-    run = Point(5, "fig4", values, 3.0, 0.02, order)
-    for batch, fmus in zip(*(engine.outcomes([run]) for engine in engines("fig4")), strict=True):
+    compare_refusals(Point(5, "fig4", values, 3.0, 0.02, order))
+
+
+def compare_refusals(run: Point) -> None:
+    """Both fail, in the same step."""
+    made = (engine.outcomes([run]) for engine in engines(run.scenario))
+    for batch, fmus in zip(*made, strict=True):
         assert batch.failure and fmus.failure and not batch.indices
         assert where(batch.failure) == where(fmus.failure)
 
@@ -184,7 +298,7 @@ def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
         assert ("estimate_error" in batch.indices) == (scenario == "fig4")
 
 
-@pytest.mark.parametrize("name", ["fig4", "fig5-pd"])
+@pytest.mark.parametrize("name", ["fig4", "fig5-pd", "remus"])
 def test_an_index_that_is_not_accumulated_is_made_of_the_rows(monkeypatch, name):
     """To the last bit what the accumulators hold, for each of several stop times."""
     batch, _ = engines(name)
@@ -264,6 +378,16 @@ def test_other_systems_are_refused_by_what_differs(tmp_path):
             '[wires]\n"controller.y_d" = "plant.y"',
             "it has the wire plant.y.x -> controller.y_d.x",
         ),
+        (
+            '[components]\nsea = "Sea"\n[wires]\n"sea.eta" = "plant.eta"\n'
+            '"plant.water" = "sea.water"',
+            "it has no wire sea.dwater.x -> plant.dwater.x",
+        ),
+        ('[components]\nsea = "MotionPlanner"', "it also has sea"),
+        (
+            '[components]\nplanner = "PathPlanner"\n[wires]\n"plant.tau_w" = false',
+            "it has no wire disturbance.tau_w.p -> plant.tau_w.p",
+        ),
     ):
         own.write_text(text)
         with pytest.raises(InputError) as refused:
@@ -276,14 +400,14 @@ def test_other_systems_are_refused_by_what_differs(tmp_path):
 def test_another_process_finds_the_kernel_compiled():
     """It loads in a fraction of a second what has taken several to compile."""
     text = (
-        "from auv_fmu.output_feedback import Gains\n"
+        "from auv_fmu.closed_loop import PAPER, blocks_of\n"
         "from orchestrator.studies.batch.compilation import compile_run\n"
         "from orchestrator.studies.batch_engine import BatchEngine\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
         "engine = pickle.load(sys.stdin.buffer)\n"
         "list(engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
-        "stats = compile_run(Gains).stats\n"
+        "stats = compile_run(blocks_of(PAPER)).stats\n"
         "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
     )
     batch, _ = engines("fig4")

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from auv_fmu import motion_planner, plant
-from auv_fmu.closed_loop import Instant, Setting, closed_loop, measurement
+from auv_fmu.blocks import measurement
+from auv_fmu.closed_loop import Instant, Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.observer import EXACT, INTEGRAL
 from auv_fmu.output_feedback import Gains

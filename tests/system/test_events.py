@@ -15,7 +15,7 @@ import pytest
 
 from auv_fmu import closed_loop as line
 from auv_fmu import plant
-from auv_fmu.closed_loop import LAWS, PAPER, Setting
+from auv_fmu.closed_loop import PAPER, Sent, Setting, blocks_of
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
@@ -64,9 +64,11 @@ class Span:
 def straight(delayed: bool) -> Iterator[dict[str, Any]]:
     """The loop of `auv_fmu.closed_loop`, written out once more, with what EVENTS say."""
     setting: Setting = PAPER
-    law = LAWS[type(setting.controller)]
+    blocks = blocks_of(setting)
+    law = blocks.controller
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
-    vehicles, before, held, lost, fast = line.vehicles_at_start(setting), None, None, None, True
+    vehicles = line.vehicles_at_start(setting, blocks)
+    before, held, lost, fast = None, None, None, True
     for k in range(STEPS + 1):
         if k == 60:
             current = setting.plant._replace(current=(0.3, 0.0, -0.1))
@@ -76,7 +78,8 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         setting = setting._replace(controller=setting.controller._replace(k_d=k_d))
         parts = line.splits(setting, H)
         gains = setting.controller
-        seen = line.scene(setting, vehicles, k * H, tuple(gauss(0.0, 1.0) for _ in range(3)))
+        noise = tuple(gauss(0.0, 1.0) for _ in range(3))
+        seen = line.scene(setting, blocks, vehicles, k * H, noise)
         if lost is None and seen.plant.nu[0] > 0.15 and not fast:
             lost = Span(k, k + 10)
         fast = seen.plant.nu[0] > 0.15
@@ -90,8 +93,9 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         if k in (0, 95):
             control = law.start(gains, measured)
         control, signals = law.command(gains, control, measured, H)
-        now = signals.tau, seen.tau_w
-        told, tau_w = before if before and delayed else now
+        now = Sent(signals.tau, seen.tau_w, seen.water, ())
+        acts = before if before and delayed else now
+        told = acts.tau
         before = now
         if k == 95:
             # What has begun anew shows what it computes then, as at the start.
@@ -103,7 +107,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         yield {"k": k, "vehicle": vehicles.plant, "seen": seen, "tau": signals.tau, "told": told}
         control = law.steps(gains, control, signals, measured, H, 1)
         tau = plant.applied(setting.plant, told)
-        vehicles = line.move(setting, vehicles, tau, tau_w, H, parts)
+        vehicles = line.move(setting, blocks, vehicles, k * H, tau, acts, H, parts)
     assert lost is not None
 
 

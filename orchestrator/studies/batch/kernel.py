@@ -13,36 +13,38 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu import closed_loop, plant
+from auv_fmu import closed_loop
 from auv_fmu.actuators import Limits
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.closed_loop import LAWS, Instant, Law, Moment, Setting, Splits
+from auv_fmu.blocks import Blocks
+from auv_fmu.closed_loop import PAPER, Instant, Moment, Setting, Splits, blocks_of
 from auv_fmu.control_point import control_point
 from auv_fmu.euler import LARGEST_STATE
-from auv_fmu.output_feedback import Gains
 from auv_fmu.vectors import Vector3, Vector4, Vector6, difference, norm
 from orchestrator.vehicle.indices import REACHED
-from orchestrator.vehicle.signals import AXES, DIRECTIONS, STANDARD
+from orchestrator.vehicle.signals import AXES, DIRECTIONS, Loop
 
-#: The controller's part of the loop; `.compilation` puts another one here before it compiles.
-law: Law = LAWS[Gains]
+#: What stands in the loop; `.compilation` puts other blocks here before it compiles.
+blocks: Blocks = blocks_of(PAPER)
 
-#: Of the rows, after the time: the names of their columns.
-COLUMNS: tuple[str, ...] = (
-    *STANDARD.posture,
-    *STANDARD.nu,
-    *(f"plant.y.{axis}" for axis in AXES),
-    *STANDARD.dy,
-    *STANDARD.y_d,
-    *STANDARD.dy_d,
-    *(f"planner.ddy_d.{axis}" for axis in AXES),
-    *STANDARD.dy_hat,
-    *STANDARD.theta_hat,
-    *STANDARD.tau,
-    *STANDARD.commanded,
-    *STANDARD.applied,
-    *(f"plant.tau_w.{direction}" for direction in DIRECTIONS),
-)
+
+def columns(loop: Loop) -> tuple[str, ...]:
+    """Of the rows, after the time: the names of their columns, whether or not a loop has them."""
+    return (
+        *loop.posture,
+        *loop.nu,
+        *(f"{loop.vehicle}.y.{axis}" for axis in AXES),
+        *loop.dy,
+        *loop.y_d,
+        *loop.dy_d,
+        *(f"{loop.planner}.ddy_d.{axis}" for axis in AXES),
+        *loop.dy_hat,
+        *loop.theta_hat,
+        *loop.tau,
+        *loop.commanded,
+        *loop.applied,
+        *(f"{loop.vehicle}.tau_w.{direction}" for direction in DIRECTIONS),
+    )
 
 
 class RunSteps(NamedTuple):
@@ -54,7 +56,7 @@ class RunSteps(NamedTuple):
     stop: float  #: end of the last one [s]
     parts: Splits  #: of a step of the whole length
     last_parts: Splits  #: of the shorter one
-    delayed: bool  #: command and disturbance act one step late: Jacobi order
+    delayed: bool  #: what blocks tell others acts one step late: Jacobi order
 
 
 class Done(NamedTuple):
@@ -63,7 +65,7 @@ class Done(NamedTuple):
     velocity: Vector3  #: that the controller went by [m/s]
     theta_hat: Any  #: and parameters
     commanded: Vector3  #: by the controller (tau_u, tau_q, tau_r) [N, N.m]
-    told: Vector3  #: to the actuators
+    told: Vector3  #: to the actuators, or to their allocation
     tau: Vector3  #: that acts
     tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
 
@@ -94,12 +96,15 @@ def run(
 
     """
     noisy = setting.plant.noise.std > 0.0
+    limits = blocks.vehicle.limits(setting.plant)
     progress[0] = -1
     n, spare = normals(generator, noisy, (False, 0.0))
-    moment = closed_loop.begin(setting, law, n)
-    first = closed_loop.act(setting, law, moment, run_steps.h, run_steps.parts, run_steps.delayed)
-    driven, _ = plant.begin(setting.plant, first.tau, setting.plant.current)
-    done = done_in(first, driven.tau)
+    moment = closed_loop.begin(setting, blocks, n)
+    first = closed_loop.act(
+        setting, blocks, moment, run_steps.h, run_steps.parts, run_steps.delayed
+    )
+    driven, _ = blocks.vehicle.begin(setting.plant, first.tau, moment.scene.water.velocity)
+    done = done_in(first, blocks.vehicle.acting(setting.plant, driven))
     if not (is_sound(moment) and nought(done) == 0.0):
         return moment
     k = 0
@@ -116,17 +121,17 @@ def run(
             break
         h, parts, end = part_of(run_steps, k)
         n, spare = normals(generator, noisy, spare)
-        instant = closed_loop.act(setting, law, moment, h, parts, run_steps.delayed)
+        instant = closed_loop.act(setting, blocks, moment, h, parts, run_steps.delayed)
         begun, before = moment, done.tau
-        moment = closed_loop.step(setting, law, instant, h, parts, end, n)
-        done = done_in(instant, moment.vehicles.plant.tau)
+        moment = closed_loop.step(setting, blocks, instant, h, parts, end, n)
+        done = done_in(instant, blocks.vehicle.acting(setting.plant, moment.vehicles.plant))
         if not is_sound(moment):
             break
         miss = difference(done.velocity, begun.scene.plant.dy)
         one = StepSignals(begun.t, end, done.told, done.tau, before, miss, k == 0)
         for j in range(len(accumulators)):
             if k < ends[j].steps:
-                take_step(accumulators[j], one, setting.plant.limits, ends[j])
+                take_step(accumulators[j], one, limits, ends[j])
         k += 1
     return moment
 
@@ -140,9 +145,9 @@ def part_of(run_steps: RunSteps, k: int) -> tuple[float, Splits, float]:
 
 def done_in(instant: Instant, tau: Vector3) -> Done:
     """What was computed in the step that an instant begins, after which tau [N, N.m] acts."""
-    velocity, theta_hat = law.estimates(instant)
-    commanded = instant.signals.tau
-    return Done(velocity, theta_hat, commanded, instant.command, tau, instant.tau_w)
+    scene, state, signals = instant.scene, instant.controller_state, instant.signals
+    velocity, theta_hat = blocks.controller.estimates(scene, state, signals)
+    return Done(velocity, theta_hat, signals.tau, instant.command, tau, instant.tau_w)
 
 
 def is_sound(moment: Moment) -> bool:
@@ -154,6 +159,7 @@ def is_sound(moment: Moment) -> bool:
     return (
         is_bounded(vehicles.plant)
         and is_bounded(vehicles.planner)
+        and is_bounded(vehicles.water)
         and is_bounded(moment.controller_state)
         and nought((scene.y, scene.plant.dy, scene.reference, moment.before)) == 0.0
     )
@@ -208,7 +214,7 @@ def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
 
 
 def fill(row: np.ndarray, moment: Moment, done: Done) -> None:
-    """Fill a row with the time and the values of :data:`COLUMNS`."""
+    """Fill a row with the time and the values of :func:`columns`."""
     scene, seen = moment.scene, moment.scene.plant
     shown = moment.vehicles.plant.position, seen.euler, seen.nu, scene.y, seen.dy
     values = flat((moment.t, shown, scene.reference, done))

@@ -2,41 +2,74 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from auv_fmu import plant
+from auv_fmu import blocks
+from auv_fmu.blocks import SeaWaves
 from auv_fmu.closed_loop import LongestSteps, Setting
+from auv_fmu.sea import Sea
+from fmus.allocation import ports as allocation
+from fmus.auv_plant import behaviour as auv_plant_behaviour
 from fmus.auv_plant import ports as auv_plant
 from fmus.disturbance_generator import ports as disturbance_generator
 from fmus.motion_planner import ports as motion_planner
 from fmus.observer_controller import ports as observer_controller
+from fmus.path_planner import behaviour as path_planner_behaviour
+from fmus.path_planner import ports as path_planner
 from fmus.pd_controller import ports as pd_controller
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, Refusal
+from fmus.remus100 import behaviour as remus100_behaviour
+from fmus.remus100 import ports as remus100
+from fmus.sea import behaviour as sea_behaviour
+from fmus.sea import ports as sea
 from orchestrator.machine.errors import InputError
 from orchestrator.master.plan import code_of
+from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import Component, read_component
+from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
-from orchestrator.vehicle.signals import AXES
+from orchestrator.vehicle.signals import AXES, DIRECTIONS
 
 #: Where a value lies: fields, and places in tuples.
 Place = tuple[str | int, ...]
 
-#: Inputs of the plant that the loop leaves open.
+#: Inputs that a loop may leave open: the velocity of the water, if there is no sea, and others that
+#: the equations here have no place for.
 _WATER = [PortName("plant", f"water.{axis}") for axis in AXES]
-_SPEEDING_UP = [PortName("plant", f"dwater.{axis}") for axis in AXES]
+_STAY_ZERO = {
+    *(PortName("plant", f"dwater.{axis}") for axis in AXES),
+    *(PortName("disturbance", f"nu.{direction}") for direction in DIRECTIONS),
+}
 
-#: The controller that is told the velocity, and the wires for it.
-_TOLD = "PdController"
-_VELOCITY = {
-    Connection(PortName("plant", f"dy.{axis}"), PortName("controller", f"dy.{axis}"))
-    for axis in AXES
+#: What may stand in the loop instead of its own component of that name, or besides.
+_INSTEAD = {
+    "plant": "Remus100",
+    "controller": "PdController",
+    "planner": "PathPlanner",
+    "sea": "Sea",
+}
+
+#: What that takes: components, and wires that are other ones, or removed.
+_COMPONENTS_WITH: Mapping[str, Mapping[str, str]] = {"Remus100": {"allocation": "Allocation"}}
+_WIRES_WITH: Mapping[str, Mapping[str, str | bool]] = {
+    "PdController": {"controller.dy": "plant.dy"},
+    "Sea": {"sea.eta": "plant.eta", "plant.water": "sea.water", "plant.dwater": "sea.dwater"},
+    "Remus100": {
+        "allocation.tau": "controller.tau",
+        "allocation.nu_r": "plant.nu_r",
+        "plant.command": "allocation.command",
+        "plant.tau": False,
+        "plant.tau_w": False,
+        "plant.dwater": False,
+        "disturbance.nu": False,
+    },
 }
 
 
@@ -53,25 +86,40 @@ def unsupported(system: System, fmus: Path) -> str:
         fmus: folder of the bundle's.
 
     """
-    standard = closed_loop(fmus)
-    wanted = {name: {_contents(part)} for name, part in standard.components.items()}
-    wanted["controller"].add(_contents(read_component("controller", fmus / f"{_TOLD}.fmu")))
-    for name, choices in wanted.items():
+    wanted = _nearest(system, fmus)
+    for name, part in wanted.components.items():
         if name not in system.components:
             return f"it has no {name}"
-        if _contents(system.components[name]) not in choices:
+        if _contents(system.components[name]) != _contents(part):
             return f"its {name} is {system.components[name].fmu}"
-    for name in system.components.keys() - wanted:
+    for name in system.components.keys() - wanted.components:
         return f"it also has {name}"
-    connections, wires = set(system.connections), set(standard.connections)
-    if system.components["controller"].fmu.stem == _TOLD:
-        wires |= _VELOCITY
+    connections, wires = set(system.connections), set(wanted.connections)
     for one in sorted(map(_shown, connections - wires)):
         return f"it has the wire {one}"
     for one in sorted(map(_shown, wires - connections)):
         return f"it has no wire {one}"
     later = [f"it starts at {system.start_time:g} s"] if system.start_time else []
     return next(iter([*(f"its {name} has a longer step" for name in system.steps), *later]), "")
+
+
+def _nearest(system: System, fmus: Path) -> System:
+    """The loop of those that the equations make that has the same components, where there is one.
+
+    Args:
+        system: to be looked at.
+        fmus: folder of the bundle's.
+
+    """
+    components: dict[str, str] = {}
+    wires: dict[str, str | bool] = {}
+    for name, fmu in _INSTEAD.items():
+        if name in system.components and system.components[name].fmu.stem == fmu:
+            components |= {name: fmu, **_COMPONENTS_WITH.get(fmu, {})}
+    for fmu in _WIRES_WITH:
+        if fmu in components.values():
+            wires |= _WIRES_WITH[fmu]
+    return closed_loop(fmus, Scenario("", components=components, wires=wires))
 
 
 def _contents(part: Component) -> tuple[str, str]:
@@ -83,27 +131,38 @@ def _shown(connection: Connection) -> str:
     return f"{connection.source} -> {connection.target}"
 
 
-class _Parameters(NamedTuple):
-    """The parameters of a component."""
+class _Block(NamedTuple):
+    """A component as the equations have it."""
 
-    ports: Mapping[str, Port]
+    ports: Mapping[str, Port]  #: its parameters
     paths: Mapping[str, Place]  #: where each lies in the set of the equations
     starts: Any  #: that set, of the ports' own values
+    check: Callable[[Any], object]  #: refuses values that do not fit
 
 
-def _declared(parameters: ParameterSet[Any]) -> _Parameters:
+def _declared(
+    parameters: ParameterSet[Any], check: Callable[[Any], object] = lambda values: None
+) -> _Block:
     ports = {port.name: port for port in parameters.ports}
     starts = {name: port.start for name, port in ports.items() if port.start is not None}
-    return _Parameters(ports, parameters.paths, parameters.of(starts))
+    return _Block(ports, parameters.paths, parameters.of(starts), check)
 
 
 #: By the name of the FMU.
-_COMPONENTS: Mapping[str, _Parameters] = {
-    "AuvPlant": _declared(auv_plant.PARAMETERS),
+_BLOCKS: Mapping[str, _Block] = {
+    "AuvPlant": _declared(auv_plant.PARAMETERS, auv_plant_behaviour.check),
+    "Remus100": _declared(remus100.PARAMETERS, remus100_behaviour.check),
+    "Allocation": _declared(allocation.PARAMETERS),
     "ObserverController": _declared(observer_controller.PARAMETERS),
     "PdController": _declared(pd_controller.PARAMETERS),
     "DisturbanceGenerator": _declared(disturbance_generator.PARAMETERS),
     "MotionPlanner": _declared(motion_planner.PARAMETERS),
+    "PathPlanner": _declared(
+        # Runs of a study mostly have the same path, and to check it takes a while.
+        path_planner.PARAMETERS,
+        lru_cache(maxsize=8)(path_planner_behaviour.check),
+    ),
+    "Sea": _declared(sea.PARAMETERS, sea_behaviour.check),
 }
 
 
@@ -121,10 +180,7 @@ def setting_of(
         InputError: a component would refuse a value, or the equations here have no place for it.
 
     """
-    for name in _SPEEDING_UP:
-        if parameters.get(name):
-            raise InputError(f"{name}: the water of the batch engine does not speed up; leave it 0")
-    components = {name: _COMPONENTS[fmu] for name, fmu in fmus.items()}
+    components = {name: _BLOCKS[fmu] for name, fmu in fmus.items()}
     sets = {name: component.starts for name, component in components.items()}
     longest: dict[str, Any] = {}
     for name, value in parameters.items():
@@ -138,9 +194,24 @@ def setting_of(
             except Refusal as refusal:
                 raise InputError(f"{component}: {refusal}") from None
             sets[component] = _replaced(sets[component], components[component].paths[port], meant)
+        elif name in _STAY_ZERO and value:
+            raise InputError(f"{name}: the batch engine has no place for it; leave it 0")
+    for role, block in components.items():
+        try:
+            block.check(sets[role])
+        except (Refusal, ArithmeticError, ValueError) as refusal:
+            raise InputError(f"initialisation refused: {refusal}") from None
     water: Any = tuple(parameters.get(name, 0.0) for name in _WATER)
-    sets["plant"] = sets["plant"]._replace(current=plant.flow(sets["plant"], water))
-    return Setting(**sets, h_max=LongestSteps(**longest), h=step)
+    if "sea" in sets:
+        of_sea = sets.pop("sea")
+        water = _sea_waves(of_sea, repr(of_sea))
+    return Setting(**sets, water=water, h_max=LongestSteps(**longest), h=step)
+
+
+@lru_cache(maxsize=8)
+def _sea_waves(parameters: Sea, text: str) -> SeaWaves:
+    """A sea by its parameters, and by their text, which tells 0.0 from -0.0: it takes a while."""
+    return blocks.sea_waves(parameters)
 
 
 def _replaced(whole: Any, path: Place, value: object) -> Any:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from auv_fmu import allocation, remus100
 from auv_fmu.closed_loop import PAPER
+from auv_fmu.sea import Sea, regular_waves
+from auv_fmu.tail import Tail
+from auv_fmu.waves import NONE, Waves
 from orchestrator.machine.errors import InputError
 from orchestrator.studies.batch.support import setting_of
 from orchestrator.system.names import port_name
@@ -37,6 +41,53 @@ def test_each_value_comes_to_its_component_alone():
         h_max=PAPER.h_max._replace(planner=0.01),
         h=0.04,
     )
+
+
+def test_values_of_other_blocks_come_to_their_places():
+    fmus = {
+        **FMUS,
+        "plant": "Remus100",
+        "allocation": "Allocation",
+        "planner": "PathPlanner",
+        "sea": "Sea",
+    }
+    values = {
+        "plant.fin.max": 0.2,
+        "allocation.fin.max": 0.3,
+        "planner.waypoint[2].y": 7.0,
+        "planner.timed": True,
+        "sea.waves.spectrum": "none",
+        "sea.depth": 20.0,
+    }
+    setting = setting_of(fmus, {port_name(k): v for k, v in values.items()}, 0.02)
+    assert isinstance(setting.plant, remus100.Parameters)
+    assert setting.plant == remus100.Parameters(tail=Tail(delta_max=0.2))
+    assert setting.allocation == allocation.Parameters(tail=Tail(delta_max=0.3))
+    assert setting.planner.waypoints.y[:3] == (6.0, 7.0, 10.0)
+    assert setting.planner.waypoints.timed
+    sea = Sea(Waves(spectrum=NONE), depth=20.0)
+    assert setting.water.sea == sea
+    assert setting.water.waves == regular_waves(sea)
+
+
+def test_velocity_of_the_water_stands_beside_the_current_of_the_plant():
+    values = {port_name("plant.water.y"): 0.3, port_name("plant.current.y"): 0.1}
+    setting = setting_of(FMUS, values, PAPER.h)
+    assert (setting.water, setting.plant.current) == ((0.0, 0.3, 0.0), (0.0, 0.1, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("fmu", "name", "value", "what"),
+    [
+        ("PathPlanner", "planner.waypoint[2].z", 1000.0, "climbs or dives"),
+        ("Sea", "sea.waves.Hs", 20.0, "break in this depth"),
+        ("Remus100", "plant.diameter", 1.5, "slender hull"),
+    ],
+)
+def test_values_that_do_not_fit_are_refused_as_the_fmu_does(fmu, name, value, what):
+    name = port_name(name)
+    with pytest.raises(InputError, match=f"initialisation refused: .*{what}"):
+        setting_of({**FMUS, name.component: fmu}, {name: value}, 0.02)
 
 
 def test_text_that_is_no_choice_is_refused_as_the_fmu_does():

@@ -1,0 +1,446 @@
+"""The blocks of the paper's Fig. 2 of which there are several, and what each does in the loop.
+
+A loop has a controller, a planner, a vehicle and the water around it. The type of its parameters
+says which one a block is. What it does are functions of the language of equations, so a loop of any
+of them can be compiled.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf
+from typing import Any, NamedTuple
+
+from auv_fmu import (
+    allocation,
+    motion_planner,
+    ocean_current,
+    output_feedback,
+    path_planner,
+    pd,
+    plant,
+    remus100,
+    sea,
+)
+from auv_fmu.actuators import Limits
+from auv_fmu.allocation import Allocated
+from auv_fmu.motion_planner import Motion, PlannerState, Reference
+from auv_fmu.ocean_current import Variation
+from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
+from auv_fmu.path_planner import Corner, PathState
+from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
+from auv_fmu.plant import PlantOutputs, PlantState
+from auv_fmu.remus100 import RemusState
+from auv_fmu.sea import Sea
+from auv_fmu.vectors import Rotation, Vector3, Vector4, Vector6
+from auv_fmu.waves import Components, WaterMotion
+
+#: Of water that flows steadily: its acceleration [m/s2].
+_STEADY: Vector3 = (0.0, 0.0, 0.0)
+
+_NO_VELOCITY: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+#: Before the first instant.
+_NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
+
+_UNLIMITED = Limits((-inf, -inf, -inf), (inf, inf, inf))
+
+#: What there is nothing of.
+Nothing = tuple[()]
+
+
+class Scene(NamedTuple):
+    """What vehicle, reference and water show at one instant."""
+
+    plant: PlantOutputs
+    y: Vector3  #: measured control point [m]
+    reference: Reference
+    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
+    water: WaterMotion  #: at the vehicle, beside its parameter `current`
+
+
+# The controllers
+
+
+class Law(NamedTuple):
+    """A controller in the loop: what it is told, how it starts, what it commands, how it goes on.
+
+    What it goes by is what it has estimated, or been told.
+    """
+
+    measurement: Callable[[Scene], Any]
+    start: Callable[[Any, Any], Any]
+    command: Callable[[Any, Any, Any, float], tuple[Any, Any]]
+    steps: Callable[[Any, Any, Any, Any, float, int], Any]
+    estimates: Callable[[Scene, Any, Any], tuple[Vector3, Vector4]]
+
+
+def measurement(seen: Scene) -> Measurement:
+    """What the proposed controller is told."""
+    y_d, dy_d, ddy_d = seen.reference
+    return Measurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d)
+
+
+def start(gains: Gains, measured: Measurement) -> ControllerState:
+    """State of the proposed controller at the start."""
+    return output_feedback.initial_state(gains, measured.y)
+
+
+def command(
+    gains: Gains, state: ControllerState, measured: Measurement, h: float
+) -> tuple[ControllerState, Signals]:
+    """What the proposed controller goes on from at an instant, and its signals."""
+    state = output_feedback.gated(gains, state, measured.y)
+    return state, output_feedback.evaluate(gains, state, measured, h)
+
+
+def estimates(seen: Scene, state: ControllerState, signals: Signals) -> tuple[Vector3, Vector4]:
+    """Velocity and parameters that the proposed controller goes by: dy_hat and theta_hat."""
+    return signals.dy_hat, state.theta_hat
+
+
+def pd_measurement(seen: Scene) -> PdMeasurement:
+    """What the PD controller is told."""
+    y_d, dy_d, ddy_d = seen.reference
+    return PdMeasurement(seen.y, seen.plant.euler, y_d, dy_d, ddy_d, seen.plant.dy)
+
+
+def pd_start(gains: PdGains, measured: PdMeasurement) -> Vector4:
+    """State of the PD controller at the start."""
+    return gains.theta_0
+
+
+def pd_command(
+    gains: PdGains, theta_hat: Vector4, measured: PdMeasurement, h: float
+) -> tuple[Vector4, PdSignals]:
+    """What the PD controller goes on from at an instant, and its signals."""
+    return theta_hat, pd.evaluate(gains, theta_hat, measured)
+
+
+def pd_estimates(seen: Scene, theta_hat: Vector4, signals: PdSignals) -> tuple[Vector3, Vector4]:
+    """Velocity and parameters that the PD controller goes by; it is told the velocity."""
+    return seen.plant.dy, theta_hat
+
+
+#: The controller that goes with a set of gains.
+LAWS: dict[type, Law] = {
+    Gains: Law(measurement, start, command, output_feedback.steps, estimates),
+    PdGains: Law(pd_measurement, pd_start, pd_command, pd.steps, pd_estimates),
+}
+
+
+# The planners
+
+
+class PlannerBlock(NamedTuple):
+    """A planner in the loop; what follows from its state goes along with it.
+
+    All take its parameters first. A step is one of h seconds from a time on, in n parts.
+    """
+
+    begin: Callable[[Any], tuple[Any, Any]]
+    steps: Callable[[Any, Any, Any, float, float, int], tuple[Any, Any]]
+    reference: Callable[[Any, Any, Any], Reference]
+
+
+def helix_steps(
+    parameters: motion_planner.Parameters,
+    state: PlannerState,
+    moving: Motion,
+    t: float,
+    h: float,
+    n: int,
+) -> tuple[PlannerState, Motion]:
+    """The reference vehicle after a step, and its motion."""
+    return motion_planner.steps(parameters, state, moving, h / n, n)
+
+
+def helix_reference(
+    parameters: motion_planner.Parameters, state: PlannerState, moving: Motion
+) -> Reference:
+    """The reference that the reference vehicle makes."""
+    return motion_planner.reference(state, moving, parameters.ell)
+
+
+def path_begin(parameters: path_planner.Parameters) -> tuple[PathState, Corner]:
+    """The start of a path, and the corner ahead."""
+    first = path_planner.first_corner(parameters.waypoints, 0.0)
+    return PathState(0.0, 0.0), path_planner.corner_ahead(parameters.waypoints, first, 0.0)
+
+
+def path_steps(
+    parameters: path_planner.Parameters,
+    state: PathState,
+    ahead: Corner,
+    t: float,
+    h: float,
+    n: int,
+) -> tuple[PathState, Corner]:
+    """The reference on a path after a step, whatever its parts, and the corner ahead."""
+    later = PathState(state.start, t + h)
+    return later, path_planner.corner_ahead(parameters.waypoints, ahead, later.t)
+
+
+def path_reference(
+    parameters: path_planner.Parameters, state: PathState, ahead: Corner
+) -> Reference:
+    """The reference on a path."""
+    return path_planner.reference(parameters.waypoints, ahead, state.t)
+
+
+#: The planner that goes with a set of parameters.
+PLANNERS: dict[type, PlannerBlock] = {
+    motion_planner.Parameters: PlannerBlock(motion_planner.begin, helix_steps, helix_reference),
+    path_planner.Parameters: PlannerBlock(path_begin, path_steps, path_reference),
+}
+
+
+# The water
+
+
+class SeaWaves(NamedTuple):
+    """A sea, and the waves that it is a sum of; they do not change during a run."""
+
+    sea: Sea
+    waves: Components
+
+
+class WaterBlock(NamedTuple):
+    """Water in the loop: its state at the start, its motion at a place and time, its state later.
+
+    All take its parameters first.
+    """
+
+    begin: Callable[[Any], Any]
+    motion: Callable[[Any, Any, Vector3, float], WaterMotion]
+    later: Callable[[Any, Any, float], Any]
+
+
+def sea_waves(parameters: Sea) -> SeaWaves:
+    """A sea by its parameters."""
+    return SeaWaves(parameters, sea.regular_waves(parameters))
+
+
+def sea_begin(water: SeaWaves) -> Variation:
+    """What varies in a sea, at the start."""
+    return ocean_current.begin(water.sea.current)
+
+
+def sea_motion(water: SeaWaves, state: Variation, position: Vector3, t: float) -> WaterMotion:
+    """How the water of a sea moves at a position [m] and a time [s]."""
+    return sea.water(water.sea, water.waves, state, position, t)
+
+
+def sea_later(water: SeaWaves, state: Variation, h: float) -> Variation:
+    """What varies in a sea, h seconds later."""
+    return ocean_current.advance(water.sea.current, state, h)
+
+
+def steady_begin(water: Vector3) -> Nothing:
+    """Nothing varies in steady water."""
+    return ()
+
+
+def steady_motion(water: Vector3, state: Nothing, position: Vector3, t: float) -> WaterMotion:
+    """Steady water moves with one velocity [m/s] everywhere."""
+    return WaterMotion(water, _STEADY, 0.0)
+
+
+def steady_later(water: Vector3, state: Nothing, h: float) -> Nothing:
+    """Nothing varies in steady water."""
+    return state
+
+
+#: The water that goes with a velocity, or with a sea.
+WATERS: dict[type, WaterBlock] = {
+    tuple: WaterBlock(steady_begin, steady_motion, steady_later),
+    SeaWaves: WaterBlock(sea_begin, sea_motion, sea_later),
+}
+
+
+# The vehicles
+
+
+class VehicleBlock(NamedTuple):
+    """A vehicle in the loop; what follows from its state goes along with it.
+
+    Between the commanded (tau_u, tau_q, tau_r) and the vehicle there may be an allocation, whose
+    outputs are what is allocated. What drives the vehicle follows from either.
+
+    Attributes:
+        begin: state at the start, from what drives it and the velocity of the water.
+        outputs: what is seen of it.
+        disturbed: the velocity that the disturbance is told, of that through the water.
+        idle: what is allocated before the first instant.
+        allocate: of a command, with the velocity through the water.
+        driving: what drives it, from the command that reaches it and what is allocated.
+        steps: n steps of h seconds, with what drives it, the disturbance and the water.
+        acting: force and moments (tau_u, tau_q, tau_r) that act [N, N.m].
+        limits: of a command.
+
+    """
+
+    begin: Callable[[Any, Vector3, Vector3], tuple[Any, Any]]
+    outputs: Callable[[Any, Any, Any], PlantOutputs]
+    disturbed: Callable[[Vector6], Vector6]
+    idle: Callable[[], Any]
+    allocate: Callable[[Any, Vector3, Vector6], Any]
+    driving: Callable[[Any, Vector3, Any], Vector3]
+    steps: Callable[[Any, Any, Any, Vector3, Vector6, WaterMotion, float, int], tuple[Any, Any]]
+    acting: Callable[[Any, Any], Vector3]
+    limits: Callable[[Any], Limits]
+
+
+def plant_begin(
+    parameters: plant.Parameters, tau: Vector3, water: Vector3
+) -> tuple[PlantState, Rotation]:
+    """The paper's vehicle at the start, and its attitude."""
+    return plant.begin(parameters, tau, plant.flow(parameters, water))
+
+
+def plant_outputs(
+    parameters: plant.Parameters, state: PlantState, rotation: Rotation
+) -> PlantOutputs:
+    """What is seen of the paper's vehicle."""
+    return plant.outputs(state, rotation, parameters.ell, parameters.roll.rolls)
+
+
+def plant_disturbed(nu_r: Vector6) -> Vector6:
+    """The disturbance is told the velocity of the paper's vehicle through the water."""
+    return nu_r
+
+
+def plant_idle() -> Nothing:
+    """The paper's vehicle has no allocation."""
+    return ()
+
+
+def plant_allocate(allocating: None, tau: Vector3, nu_r: Vector6) -> Nothing:
+    """The paper's vehicle has no allocation."""
+    return ()
+
+
+def plant_driving(parameters: plant.Parameters, tau: Vector3, allocated: Nothing) -> Vector3:
+    """What the limits (3) leave of a command (tau_u, tau_q, tau_r) [N, N.m]."""
+    return plant.applied(parameters, tau)
+
+
+def plant_steps(
+    parameters: plant.Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    tau: Vector3,
+    tau_w: Vector6,
+    water: WaterMotion,
+    h: float,
+    n: int,
+) -> tuple[PlantState, Rotation]:
+    """The paper's vehicle after n steps of h seconds, and its attitude."""
+    flow, dwater = plant.flow(parameters, water.velocity), water.acceleration
+    return plant.steps(parameters, state, rotation, tau, tau_w, flow, dwater, h, n)
+
+
+def plant_acting(parameters: plant.Parameters, state: PlantState) -> Vector3:
+    """What the actuators of the paper's vehicle give."""
+    return state.tau
+
+
+def plant_limits(parameters: plant.Parameters) -> Limits:
+    """The limits (3)."""
+    return parameters.limits
+
+
+def remus_begin(
+    parameters: remus100.Parameters, drive: Vector3, water: Vector3
+) -> tuple[RemusState, Nothing]:
+    """The REMUS 100 at the start; fins and propeller are at rest, whatever they are to do."""
+    return remus100.begin(parameters, water), ()
+
+
+def remus_outputs(
+    parameters: remus100.Parameters, state: RemusState, derived: Nothing
+) -> PlantOutputs:
+    """What is seen of the REMUS 100."""
+    y, dy = remus100.control(state, parameters.ell)
+    return PlantOutputs(state.euler, y, dy, state.nu, remus100.through_water(state))
+
+
+def remus_disturbed(nu_r: Vector6) -> Vector6:
+    """The disturbance has nothing to do with the REMUS 100, and is told nothing of it."""
+    return _NO_VELOCITY
+
+
+def remus_idle() -> Allocated:
+    """Nothing is allocated yet."""
+    return Allocated(_NO_COMMAND, _NO_COMMAND)
+
+
+def remus_allocate(allocating: allocation.Parameters, tau: Vector3, nu_r: Vector6) -> Allocated:
+    """Fins and propeller for a force and two moments."""
+    return allocation.evaluate(allocating, tau, (nu_r[0], nu_r[1], nu_r[2]))
+
+
+def remus_driving(parameters: remus100.Parameters, tau: Vector3, allocated: Allocated) -> Vector3:
+    """Commands of fins and propeller (delta_r, delta_s, n) [rad, rad, rad/s]."""
+    return allocated.command
+
+
+def remus_steps(
+    parameters: remus100.Parameters,
+    state: RemusState,
+    derived: Nothing,
+    drive: Vector3,
+    tau_w: Vector6,
+    water: WaterMotion,
+    h: float,
+    n: int,
+) -> tuple[RemusState, Nothing]:
+    """The REMUS 100 after n steps of h seconds; no disturbance acts on it."""
+    return remus100.steps(parameters, state, drive, water.velocity, h, n), derived
+
+
+def remus_acting(parameters: remus100.Parameters, state: RemusState) -> Vector3:
+    """What fins and propeller give."""
+    tau = remus100.tail_forces(parameters.tail, state)
+    return tau[0], tau[4], tau[5]
+
+
+def remus_limits(parameters: remus100.Parameters) -> Limits:
+    """The REMUS 100 limits no force or moment."""
+    return _UNLIMITED
+
+
+#: The vehicle that goes with a set of parameters.
+VEHICLES: dict[type, VehicleBlock] = {
+    plant.Parameters: VehicleBlock(
+        plant_begin,
+        plant_outputs,
+        plant_disturbed,
+        plant_idle,
+        plant_allocate,
+        plant_driving,
+        plant_steps,
+        plant_acting,
+        plant_limits,
+    ),
+    remus100.Parameters: VehicleBlock(
+        remus_begin,
+        remus_outputs,
+        remus_disturbed,
+        remus_idle,
+        remus_allocate,
+        remus_driving,
+        remus_steps,
+        remus_acting,
+        remus_limits,
+    ),
+}
+
+
+class Blocks(NamedTuple):
+    """Which blocks a loop has."""
+
+    controller: Law
+    planner: PlannerBlock
+    vehicle: VehicleBlock
+    water: WaterBlock
