@@ -111,9 +111,21 @@ def as_request(prepared: Prepared, compared: Prepared, request: Request) -> Requ
         compared: the run that it is drawn together with.
         request: of that run.
 
+    Raises:
+        InputError: no change of values makes it of its own scenario.
+
     """
     standard = Request(compared.scenario.compare, kind=request.kind)
     own = prepare_request(standard)
+    here, there = (
+        ({name: part.digest for name, part in one.components.items()}, {*one.connections})
+        for one in (prepared.system, own.system)
+    )
+    if here != there:
+        raise InputError(
+            f"{compared.scenario.name}: compare = {standard.scenario!r}: is a scenario with other "
+            "components or wires, which a report cannot show; write one that has the same"
+        )
     experiment, table = prepared.experiment, prepared.input_table
     played = table.targets if table else ()
     inputs = prepared.scenario.inputs

@@ -15,7 +15,7 @@ from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, role_of
 from orchestrator.vehicle.signals import STANDARD
 from support.markdown import DOCS, blocks
 from support.texts import mentions
@@ -141,7 +141,8 @@ def test_the_ready_scenarios_give_their_companions_the_same_parameters(name):
             port: system.value(port)
             for component in system.components.values()
             for variable in component.having("parameter")
-            if (port := PortName(component.name, variable.name)).component != STANDARD.controller
+            if role_of(component.name) != STANDARD.controller
+            for port in [PortName(component.name, variable.name)]
         }
         for system in (
             one.system

@@ -54,7 +54,7 @@ def fleets(tmp_path_factory: pytest.TempPathFactory):
             folder = tmp_path_factory.mktemp("formation") / name
             options = ["--kind", "native", "--no-figures", "--out", str(folder)]
             assert main(["run", name, *options]) == 0
-            made[name] = Fleet(folder), Fleet(folder / "formation-pd")
+            made[name] = Fleet(folder), Fleet(next(folder.glob("*-pd")))
         return made[name]
 
     return run

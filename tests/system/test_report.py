@@ -196,6 +196,6 @@ def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatc
     monkeypatch.setattr(many_runs, "write_report", write_report)
     assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
     [(folder, scenarios, command)] = asked
-    assert (folder, scenarios[-2:]) == (tmp_path, ["sea", "mine.toml"])
+    assert (folder, scenarios[-2:]) == (tmp_path, ["sea-pd", "mine.toml"])
     assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
     assert capsys.readouterr().out == "a\nb\n"

@@ -61,8 +61,9 @@ def test_all_figures_are_there():
     figures = ["3a", "3b", "4", "5", "5-pd", "6", "6-pd", "7a", "7b", "7c"]
     others = [
         "current-step", "fault-sensor", "fault-thruster", "formation-change",
-        "formation-lost-link", "formation-pd", "formation-v", "path", "path-pd", "remus",
-        "remus-pd", "sea",
+        "formation-lost-link", "formation-lost-link-pd", "formation-pd", "formation-v", "path",
+        "path-pd", "remus",
+        "remus-pd", "sea", "sea-pd",
     ]  # fmt: skip
     assert names() == sorted([*(f"fig{name}" for name in figures), *others])
 

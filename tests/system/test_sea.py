@@ -26,7 +26,7 @@ def test_controllers_follow_the_survey_below_waves_as_its_remark_says(tmp_path: 
     assert main(["run", "sea", *options]) == 0
     for folder, distances, peak in (
         (tmp_path, (0.85, 0.28), 66.0),
-        (tmp_path / "path-pd", (1.05, 0.30), 35.0),
+        (tmp_path / "sea-pd", (1.05, 0.30), 35.0),
     ):
         result = read(folder)
         away = np.linalg.norm(tracking_error(result), axis=1)
