@@ -47,7 +47,9 @@ def main() -> None:
         systems = {name: load_scenario(name) for name in study.scenario}
         space = Space(study, systems)
         legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-        entries = read_figures(study.name, study.figures, space.columns, space.has_scenarios)
+        entries = read_figures(
+            study.name, study.figures, space.columns, space.has_scenarios, space.indices
+        )
         with TemporaryDirectory() as drawn:
             list(
                 draw_figures(

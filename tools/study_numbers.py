@@ -283,7 +283,8 @@ def prepared(study: str, runs: pd.DataFrame) -> pd.DataFrame:
     runs = runs.rename(columns=lambda name: _COMPONENT.sub("", name))
     runs = runs.rename(columns=lambda name: re.sub(r"\W+", "_", name).strip("_"))
     runs = runs.rename(columns={"lambda": "lam"})
-    runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
+    if "scenario" in runs:
+        runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
     runs["failed"] = runs.failure.fillna("") != ""
     runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
     # Of several vehicles, the largest.

@@ -5,7 +5,7 @@ A new one is a function here, which :data:`_DRAW` names, and an entry of :data:`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import cycle, product
 from pathlib import Path
@@ -135,7 +135,7 @@ def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
     figure, panels = make_panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=sharing)
     parts = list(runs.parts(entry.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
-        bins = bins_of(runs[x], _BINS, are_full=True, is_wide=x in entry.logarithmic)
+        bins = bins_of(runs[x], _BINS, are_full=True, is_wide=entry.logarithmic.get(x))
         for (name, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
             _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
         if value in entry.limits:
@@ -187,7 +187,7 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """
     [x], y = entry.x, entry.y
     across, down = (
-        bins_of(runs[name], _CELLS, is_wide=name in entry.logarithmic) for name in (x, y)
+        bins_of(runs[name], _CELLS, is_wide=entry.logarithmic.get(name)) for name in (x, y)
     )
     beside = [name for name, _ in runs.parts(entry.by[-1:])]
     below = list(runs.parts(entry.by[:-1]))
@@ -350,7 +350,7 @@ def draw_figures(
     folder: Path,
     legends: Mapping[str, str] | None = None,
     units: Mapping[str, str] | None = None,
-    logarithmic: Collection[str] = (),
+    logarithmic: Mapping[str, bool] | None = None,
 ) -> Iterator[str]:
     """Draw the figures of a study, as PNG and SVG.
 
@@ -361,13 +361,13 @@ def draw_figures(
         folder: to write into.
         legends: what the lines of scenarios are called.
         units: of parameters, as FMUs write them.
-        logarithmic: values whose axes are.
+        logarithmic: whether the axes of values that are sampled are.
 
     Yields:
         What was left out, and why.
 
     """
-    for entry in [replace(entry, logarithmic=logarithmic) for entry in entries]:
+    for entry in [replace(entry, logarithmic=logarithmic or {}) for entry in entries]:
         runs = Values(columns, entry.labels, legends, units).where(entry.where)
         values = (*entry.x, *([entry.y] if entry.y else ()), *entry.show)
         lacking = [value for value in values if not np.isfinite(runs[value]).any()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import reduce
 from math import isnan
@@ -58,7 +58,7 @@ class FigureEntry:
 
     Attributes:
         name: of its files.
-        logarithmic: values whose axes are.
+        logarithmic: whether the axes of values that are sampled are; the spread of others says it.
 
     """
 
@@ -71,7 +71,7 @@ class FigureEntry:
     where: Mapping[str, Any] = field(default_factory=dict)
     limits: Mapping[str, float] = field(default_factory=dict)
     labels: Mapping[str, str] = field(default_factory=dict)
-    logarithmic: Collection[str] = ()
+    logarithmic: Mapping[str, bool] = field(default_factory=dict)
 
 
 def _failed(columns: Columns) -> np.ndarray:
@@ -286,7 +286,7 @@ def is_geometric(grid: np.ndarray) -> bool:
 
 
 def bins_of(
-    values: np.ndarray, most: int, *, are_full: bool = False, is_wide: bool = False
+    values: np.ndarray, most: int, *, are_full: bool = False, is_wide: bool | None = None
 ) -> Bins:
     """Bins for some values, at least one of which is finite.
 
@@ -294,11 +294,12 @@ def bins_of(
         values: of a grid, or anywhere.
         most: how many bins there are for values that do not form a grid.
         are_full: whether these have as many values each, and not the same width.
-        is_wide: whether the axis is logarithmic, whatever the values are.
+        is_wide: whether the axis is logarithmic; None: where the values ask for it.
 
     """
     values = values[np.isfinite(values)]
-    wide = is_wide or is_logarithmic(values) or is_geometric(np.unique(values))
+    asked = is_logarithmic(values) or is_geometric(np.unique(values))
+    wide = asked if is_wide is None else is_wide
     places = np.unique(np.log(values) if wide else values)
     if len(places) > _GRID:
         even = np.linspace(0.0, 1.0, most + 1)

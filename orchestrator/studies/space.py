@@ -49,7 +49,7 @@ class Space:
         indices: the columns of what comes out of the runs.
         has_scenarios: whether there are several.
         units: of what varies, as the FMUs write them; empty where there is none.
-        logarithmic: what is drawn by its logarithm.
+        logarithmic: whether what is sampled is drawn by its logarithm.
 
     """
 
@@ -75,7 +75,7 @@ class Space:
         }
         self._ranges = study.sample.ranges if study.sample else {}
         self.logarithmic = {
-            name for name, range_of in self._ranges.items() if range_of.spacing == LOG_SPACING
+            name: range_of.spacing == LOG_SPACING for name, range_of in self._ranges.items()
         }
         self._limits = {
             name: limits[:2] if key == name else (-max(limits[:2]), max(limits[:2]))
