@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import plant
+from auv_fmu import hull, plant, remus100
 from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
 from auv_fmu.plant import RK4, Parameters, RollAxis
 from auv_fmu.vehicle import Vehicle
@@ -148,3 +148,33 @@ def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
     back = -sum(moments(0.0, sin(x))[0] for x in middle) * width
     assert up == pytest.approx(-pitch * (1.0 - cos(a)), rel=1e-6)
     assert up + back == pytest.approx((roll - pitch) * (1.0 - cos(a)), abs=1e-6)
+
+
+# The REMUS 100
+
+
+@given(psi=angles, position=vectors(speeds, 3))
+def test_remus_100_at_rest_and_level_in_still_water_stays_so(psi, position):
+    vehicle = remus100.Parameters(eta0=(*position, 0.0, 0.0, psi))
+    state = remus100.begin(vehicle, NONE_3)
+    later = remus100.steps(vehicle, state, NONE_3, NONE_3, 0.02, 100)
+    assert (later.position, later.euler, later.nu) == (state.position, state.euler, NONE_6)
+
+
+@given(
+    velocity=vectors(st.floats(-3.0, 3.0), 3),
+    rates=vectors(st.floats(-1.0, 1.0), 3),
+    phi=st.floats(-1.0, 1.0),
+    theta=st.floats(-1.0, 1.0),
+)
+def test_remus_100_with_idle_actuators_only_loses_energy(velocity, rates, phi, theta):
+    """d/dt (nu' M nu / 2) is the work of righting, and of damping and fins, which brake."""
+    vehicle, nu = remus100.Parameters(), np.array((*velocity, *rates))
+    mass = hull.inertia(vehicle.hull)
+    M = np.array([[mass.M[i, j] for j in range(6)] for i in range(6)])
+    state = remus100.RemusState(NONE_3, (phi, theta, 0.0), tuple(nu), NONE_3, NONE_3)
+    dnu = np.array(remus100.accelerations(vehicle, mass, state))
+    work_of_righting = np.dot(rates, hull.righting(vehicle.hull, phi, theta))
+    scale = 1.0 + nu @ M @ nu
+    assert nu @ M @ dnu - work_of_righting <= 1e-9 * scale
+    assert abs(np.dot(nu, hull.coriolis(vehicle.hull, mass, tuple(nu)))) <= 1e-9 * scale**1.5
