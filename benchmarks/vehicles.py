@@ -8,6 +8,9 @@ is a process of its own, whose rows are dropped. Printed are
 - `step`: of one vehicle, in the compiled loop and in the Python loop, in time of the processor,
 - `memory`: that each vehicle adds to the process until its first step; the first one has what a run
   before it has left.
+
+Below them the step of ten vehicles in other hosts, and of one, from the native kind; the time of a
+host is not that of its reading of outputs.
 """
 
 from __future__ import annotations
@@ -22,6 +25,7 @@ import numpy as np
 
 from auv_fmu.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
+from orchestrator.exchange.hosts.comparison import compare
 from orchestrator.master.loop import LoopName
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.runs.loading import load
@@ -34,6 +38,9 @@ SIZES: dict[KindName, tuple[int, ...]] = {NATIVE: (1, 10, 100, 1000), PYTHON: (1
 
 #: Steps of all vehicles together, and the fewest of each.
 VEHICLE_STEPS, FEWEST = {NATIVE: 100_000, PYTHON: 2_000}, 20
+
+#: Hosts that run the same vehicles, how many, and in how many steps of all together.
+HOSTS_BESIDE, FEW, HOST_STEPS = ("libcosim-ssp", "ecos"), (1, 10), 50_000
 
 #: Both loops, and the one that `load`, `start` and `memory` are of.
 LOOPS: tuple[LoopName, ...] = ("compiled", "python")
@@ -76,6 +83,16 @@ def found(n: int, kind: KindName, loop: LoopName, steps: int) -> list[float]:
     return [loaded - begun, watch.began - loaded, microseconds, (watch.memory - before) / n]
 
 
+def in_hosts(n: int) -> str:
+    """The step of a vehicle in other hosts."""
+    steps = HOST_STEPS // n
+    verdicts = compare(load({"vehicles": n}, NATIVE), HOSTS_BESIDE, steps, STEP)
+    return "".join(
+        f"{verdict.failure or f'{1e6 / (verdict.steps_per_second * n):.2f} us':>18}"
+        for verdict in verdicts
+    )
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -98,6 +115,9 @@ def main() -> None:
                 f"{kind:8}{n:9,}{loading:8.2f} s{start:8.2f} s{of_loops}{memory:11.3f} MB",
                 flush=True,
             )
+    print(f"\n{'kind':8}{'vehicles':>9}" + "".join(f"{host:>18}" for host in HOSTS_BESIDE))
+    for n in FEW:
+        print(f"{NATIVE:8}{n:9,}{in_hosts(n)}", flush=True)
 
 
 if __name__ == "__main__":

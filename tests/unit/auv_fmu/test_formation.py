@@ -222,7 +222,7 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
 
     The distances are within the errors that each has: all planners have the same heading.
     """
-    law, h, moments = closed_loop.LAWS[type(PAPER.controller)], PAPER.h, []
+    blocks, h, moments = closed_loop.blocks_of(PAPER), PAPER.h, []
     parts, of_leader = closed_loop.splits(PAPER, h), motion_planner.Parameters()
     moving, motion = motion_planner.begin(of_leader)
     leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
@@ -232,15 +232,15 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
     for planner, state in zip(planners, states, strict=True):
         x, y, z = formation.reference(planner, state, leader, 0.0).y_d
         begun = PAPER._replace(plant=PAPER.plant._replace(eta0=(x - 0.35, y, z, 0.0, 0.0, 0.0)))
-        moments.append(closed_loop.begin(begun, law, ORIGIN))
+        moments.append(closed_loop.begin(begun, blocks, ORIGIN))
     for k in range(3000):
         errors, positions = [], []
         for i, planner in enumerate(planners):
             wanted = formation.reference(planner, states[i], leader, k * h)
             moment = moments[i]._replace(scene=moments[i].scene._replace(reference=wanted))
-            instant = closed_loop.act(PAPER, law, moment, h, parts, delayed=False)
+            instant = closed_loop.act(PAPER, blocks, moment, h, parts, delayed=False)
             n = (noise(0.0, 1.0), noise(0.0, 1.0), noise(0.0, 1.0))
-            moments[i] = closed_loop.step(PAPER, law, instant, h, parts, (k + 1) * h, n)
+            moments[i] = closed_loop.step(PAPER, blocks, instant, h, parts, (k + 1) * h, n)
             states[i] = formation.steps(planner, states[i], leader, h, 1)
             errors.append(dist(moment.scene.plant.y, wanted.y_d))
             positions.append(moment.scene.plant.y)

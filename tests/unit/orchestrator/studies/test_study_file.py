@@ -245,15 +245,25 @@ def test_a_figure_is_named_as_a_file_can_be():
         entries(**{"../mine": BANDS})
 
 
-#: As the command line and the pages name them.
-NAMES = {"attraction", "robustness", "noise", "gains", "distance", "sampling"}
+#: As the command line and the pages name them; the first ones compare two controllers.
+COMPARISONS = {"attraction", "robustness", "noise", "gains", "distance", "sampling"}
+NAMES = {*COMPARISONS, "formation"}
 
 
-def test_there_are_six():
+def test_there_are_seven():
     assert set(ready_studies()) == NAMES
 
 
-@pytest.mark.parametrize("name", ready_studies())
+def test_formations_are_ten_thousand():
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
+    study = read_study("formation")
+    space = Space(study, {name: load_scenario(name) for name in study.scenario})
+    assert len(space) == 10_000 and len(space.prepared["formation-lost-link"].loops) == 3
+    columns = space.columns, space.has_scenarios, space.indices
+    assert read_figures(study.name, study.figures, *columns)
+
+
+@pytest.mark.parametrize("name", sorted(COMPARISONS))
 def test_study_holds_the_proposed_controller_against_pd_ten_thousand_times(name):
     study = read_study(name)
     assert study.title

@@ -97,7 +97,7 @@ def test_text_that_is_no_choice_is_refused_as_the_fmu_does():
 
 def test_water_moves_and_does_not_speed_up():
     setting = setting_of(FMUS, {port_name("plant.water.y"): 0.2}, 0.02)
-    assert setting.plant.current == (0.0, 0.2, 0.0)
+    assert (setting.plant.current, setting.water) == ((0.0, 0.0, 0.0), (0.0, 0.2, 0.0))
     assert setting_of(FMUS, {port_name("plant.dwater.x"): 0.0}, PAPER.h) == PAPER
     with pytest.raises(InputError, match=r"plant\.dwater\.x: the water .* does not speed up"):
         setting_of(FMUS, {port_name("plant.dwater.x"): 0.1}, 0.02)
