@@ -17,7 +17,7 @@ from fmpy.model_description import ModelVariable
 from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
 from fmus.ports.quantities import POSITION, TAU, THETA, VELOCITY, Members
-from orchestrator.figures.style import printed_unit
+from orchestrator.figures.style import printed_unit, vehicle_colours
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR
 from orchestrator.master.hooks.events import (
@@ -45,8 +45,12 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.indices import metrics
-from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, loops_of
+from orchestrator.vehicle.reducers import (
+    LAST_SECONDS,
+    SMALLEST_DISTANCE,
+    SMALLEST_DISTANCE_LABEL,
+)
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
 class _Controller(NamedTuple):
@@ -65,6 +69,8 @@ class _Controller(NamedTuple):
     allocated: str
 
 
+Plain = dict[str, Any]
+
 #: In the order in which they are drawn.
 _CONTROLLERS = {
     "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
@@ -74,10 +80,19 @@ _CONTROLLERS = {
 #: Groups of signals that have charts, with the units of their members.
 _CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
 
-#: The page keeps all rows of a run in its memory, and refuses more steps.
+#: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
 _MOST_STEPS = 200_000
 
-Plain = dict[str, Any]
+#: More have no colours that can be told apart.
+_MOST_VEHICLES = 10
+
+#: What there is of several vehicles together.
+_TOGETHER: Plain = {
+    "name": SMALLEST_DISTANCE,
+    "label": SMALLEST_DISTANCE_LABEL,
+    "meaning": "smallest distance between the centres of mass of any two vehicles",
+    "units": {"": "m"},
+}
 
 
 def page_data(opened: str) -> Plain:
@@ -107,13 +122,14 @@ def page_data(opened: str) -> Plain:
             {"name": one.name, "label": one.label, "meaning": one.meaning}
             | {"units": _printed(one.units)}
             for one in metrics()
-        ],
+        ]
+        + [_TOGETHER],
     }
 
 
 def offered() -> list[str]:
-    """The scenarios of the bundle that the page has: it runs one vehicle."""
-    return [name for name in names() if read_scenario(name).vehicles is None]
+    """The scenarios of the bundle that the page has."""
+    return [*names()]
 
 
 def _printed(units: Members) -> dict[str, str]:
@@ -148,6 +164,7 @@ def _preset(name: str, both: Sequence[Prepared]) -> Plain:
         "events": scenario.name if scenario.events else "",
         "loops": loops,
         "drawn": sorted(range(len(both)), key=lambda i: _place(both[i].system)),
+        "colours": vehicle_colours(len(both[0].loops)) if len(both[0].loops) > 1 else [],
     }
 
 
@@ -169,16 +186,17 @@ def runs_of(name: str) -> list[Prepared]:
 
 
 def _other(system: System) -> str:
-    """The scenario with the controller that a system does not have; empty: it has neither."""
+    """The scenario with the controller that a single vehicle does not have; empty: it has neither."""
     controller = _controller(system)
-    if controller is None:
+    if controller is None or STANDARD.controller not in system.components:
         return ""
     is_allocated = isinstance(loops_of(system)[0], AllocatedLoop)
     return controller.allocated if is_allocated else controller.other
 
 
 def _controller(system: System) -> _Controller | None:
-    found = system.components.get(STANDARD.controller)
+    """The controller of the first vehicle."""
+    found = system.components.get(loops_of(system)[0].controller)
     return _CONTROLLERS.get(_type(found)) if found else None
 
 
@@ -200,7 +218,8 @@ def _check(prepared: Prepared) -> None:
 
     """
     plan = prepared.plan
-    system, experiment = plan.system, plan.experiment
+    system, experiment, loops = plan.system, plan.experiment, prepared.loops
+    most_steps = _MOST_STEPS // len(loops)
     ours = {part.digest for part in bundle().values()}
     foreign = [name for name, part in system.components.items() if part.digest not in ours]
     lacking = {
@@ -211,9 +230,9 @@ def _check(prepared: Prepared) -> None:
         "transformations of values": any(c.transformation for c in system.connections),
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,
-        f"a system without the {STANDARD.vehicle}": STANDARD.vehicle not in system.components,
-        "several vehicles": len(prepared.loops) > 1,
-        f"more than {_MOST_STEPS:,} steps": experiment.rows - 1 > _MOST_STEPS,
+        f"a system without the {loops[0].vehicle}": loops[0].vehicle not in system.components,
+        f"more than {_MOST_VEHICLES} vehicles": len(loops) > _MOST_VEHICLES,
+        f"more than {most_steps:,} steps": experiment.rows - 1 > most_steps,
     }
     for what, is_there in lacking.items():
         if is_there:
@@ -228,8 +247,14 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     controller = _controller(system)
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
+        "vehicles": list(map(_vehicle, prepared.loops)),
         "components": {name: _type(part) for name, part in system.components.items()},
-        "head": {"order": scenario.order, "only": [*scenario.only], "wires": {**scenario.wires}},
+        "head": {
+            "order": scenario.order,
+            "vehicles": scenario.vehicles,
+            "only": [*scenario.only],
+            "wires": {**scenario.wires},
+        },
         "initial": [
             _stage([name], system.feeding[name])
             for names in stages(system, GAUSS_SEIDEL)
@@ -238,6 +263,17 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
         "stages": list(map(_stage, sequence, gathered)),
         "parameters": list(_parameters(system)),
         "events": _events(prepared, owner),
+    }
+
+
+def _vehicle(loop: Loop) -> dict[str, str]:
+    return {
+        "name": loop.name,
+        "vehicle": loop.vehicle,
+        "controller": loop.controller,
+        "planner": loop.planner,
+        "disturbance": loop.disturbance,
+        "allocation": loop.allocation if isinstance(loop, AllocatedLoop) else "",
     }
 
 

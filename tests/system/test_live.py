@@ -48,6 +48,7 @@ CHANGES: list[dict[str, Any]] = [
     {"preset": "path", "events": "fault-sensor", "planner.waypoint[2].z": 2.5},
     {"preset": "fig4", "events": "fault-thruster", "stop_time": 70.0, "plant.noise.seed": 7},
     {"events": "", "stop_time": 10.01, "controller.saturation": "algebraic", "plant.roll": False},
+    {"preset": "formation-v", "stop_time": 10.0, "auv2.controller.eps_t": 2, "vehicle": "auv2"},
 ]
 
 
@@ -115,10 +116,14 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         assert difference[looked_at].max() <= TOLERANCE
         if until < table.time[-1]:
             continue
-        wanted = metrics_of(table, run.loops).found(run.loops[0])
-        assert said["metrics"].keys() == wanted.keys()
-        for index, values in wanted.items():
-            assert said["metrics"][index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)
+        metrics = metrics_of(table, run.loops)
+        together = {name: [value] for name, value in metrics.together.items()}
+        assert len(together) == (len(run.loops) > 1)
+        for loop, measured in zip(run.loops, said["metrics"], strict=True):
+            wanted = metrics.found(loop) | together
+            assert measured.keys() == wanted.keys()
+            for index, values in wanted.items():
+                assert measured[index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)
 
 
 @pytest.mark.slow
@@ -391,7 +396,8 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ('coupling = "linear"\n', "linear"),
         ("[steps]\nplanner = 0.1\n", "longer steps"),
         ("[parameters]\nplant.m11 = -1.0\n", "m11 = -1"),
-        ('[components]\ntow = "AuvPlant"\n', "several vehicles"),
+        ("vehicles = 11\n", "more than 10 vehicles"),
+        ("vehicles = 2\nstop_time = 2001.0\n", "more than 100,000 steps"),
     ],
 )
 def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, capsys):

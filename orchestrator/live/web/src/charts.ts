@@ -17,8 +17,14 @@ const HEIGHT = 132;
 const TIME_AXIS = 22;
 const VALUE_AXIS = 46;
 
-const DASHES: Record<Style, number[]> = { first: [], second: [6, 3], reference: [4, 4] };
-const WIDTHS: Record<Style, number> = { first: 1.5, second: 1.5, reference: 1.5 };
+const DASHES: Record<Style, number[]> = {
+  first: [],
+  second: [6, 3],
+  reference: [4, 4],
+  "first-of-all": [],
+  "second-of-all": [6, 3],
+};
+const WIDTH = 1.5;
 
 /** Share of a limit from which on it is in sight. */
 const NEAR = 0.5;
@@ -27,6 +33,8 @@ const PROPERTIES: Record<Style, string> = {
   first: "--first",
   second: "--second",
   reference: "--reference",
+  "first-of-all": "--reference",
+  "second-of-all": "--reference",
 };
 
 /** A number in few characters. */
@@ -128,7 +136,7 @@ class Chart {
           (style, k): uPlot.Series => ({
             label: this.#panel.names[k],
             stroke: stroke(PROPERTIES[style]),
-            width: WIDTHS[style],
+            width: WIDTH,
             dash: DASHES[style],
             points: { show: false },
           }),
