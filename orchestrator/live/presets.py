@@ -186,7 +186,7 @@ def runs_of(name: str) -> list[Prepared]:
 
 
 def _other(system: System) -> str:
-    """The scenario with the controller that a single vehicle does not have; empty: it has neither."""
+    """The scenario with the controller that a single vehicle lacks; empty: it has neither."""
     controller = _controller(system)
     if controller is None or STANDARD.controller not in system.components:
         return ""
@@ -252,6 +252,7 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
         "head": {
             "order": scenario.order,
             "vehicles": scenario.vehicles,
+            "absent": [name for name, what in scenario.components.items() if what is False],
             "only": [*scenario.only],
             "wires": {**scenario.wires},
         },

@@ -28,7 +28,8 @@ function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string
   const components = Object.entries(loop.components).map(
     ([name, type]) => `${key(name)} = ${literal(type)}\n`,
   );
-  const { order, vehicles, only, wires } = loop.head;
+  const { order, vehicles, absent, only, wires } = loop.head;
+  components.push(...absent.map((name) => `${key(name)} = false\n`));
   const wired = Object.entries(wires).map(([to, from]) => `"${to}" = ${literal(from)}\n`);
   const parameters = loop.parameters.flatMap(({ name, value, default: own }) => {
     const wanted = settings.values[name] ?? value;

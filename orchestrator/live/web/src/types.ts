@@ -113,6 +113,8 @@ export interface LoopData {
     readonly order: string | readonly string[] | null;
     /** How many times the scenario has the closed loop; null: once, without names of vehicles. */
     readonly vehicles: number | null;
+    /** Components that the scenario takes out of the closed loop. */
+    readonly absent: readonly string[];
     /** Empty: all components. */
     readonly only: readonly string[];
     readonly wires: Readonly<Record<string, string | boolean>>;

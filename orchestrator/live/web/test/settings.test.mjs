@@ -245,6 +245,7 @@ test("vehicles without a scenario are a scenario file with their number", () => 
     "vehicles = 2",
     '"auv2.plant" = "AuvPlant"',
     'leader = "PathPlanner"',
+    '"auv2.disturbance" = false',
     '"auv1.controller.eps_t" = 10',
   ];
   for (const line of wanted) assert.ok(text.split("\n").includes(line), line);
