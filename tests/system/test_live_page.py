@@ -340,11 +340,12 @@ def test_refused_link_shows_the_preset_without_what_is_hidden(page, chromium):
     assert "PD" not in live.run(TABLE)
 
 
+SLIDERS = "[...document.querySelectorAll('#groups input[type=range]')].map((one) => one.ariaLabel)"
+
+
 def test_sliders_have_names_of_their_own(opened):
     opened.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
-    names = opened.run(
-        "[...document.querySelectorAll('#groups input[type=range]')].map((one) => one.ariaLabel)"
-    )
+    names = opened.run(SLIDERS)
     assert len(names) == len(set(names)) > 20
 
 
@@ -383,9 +384,7 @@ def test_all_vehicles_are_shown_and_one_is_chosen(opened):
     header, found = rows(opened.run(CSV))
     for vehicle, other in (("auv1", "auv2"), ("auv2", "auv3"), ("auv3", "auv1")):
         opened.run(f"{CHOSEN}.value = '{vehicle}'; {CHOSEN}.dispatchEvent(new Event('change'))")
-        sliders = opened.run(
-            "[...document.querySelectorAll('#groups input[type=range]')].map((one) => one.ariaLabel)"
-        )
+        sliders = opened.run(SLIDERS)
         assert f"{vehicle}.controller.eps_t" in sliders
         assert not any(other in one for one in sliders)
         # Its indices, and the one of all vehicles.

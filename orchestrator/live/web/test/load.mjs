@@ -95,7 +95,13 @@ export const preset = {
       parameters: [...gains, parameter("controller.k_d", 50), ...ofPlant],
     }),
     loop("PD", "PdController", {
-      head: { order: "jacobi", vehicles: null, absent: [], only: [], wires: { "controller.dy": "plant.dy" } },
+      head: {
+        order: "jacobi",
+        vehicles: null,
+        absent: [],
+        only: [],
+        wires: { "controller.dy": "plant.dy" },
+      },
     }),
   ],
   drawn: [0, 1],
