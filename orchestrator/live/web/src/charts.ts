@@ -103,6 +103,8 @@ class Chart {
 
   #options(): uPlot.Options {
     const stroke = (name: string) => () => property(name);
+    // By itself, uPlot keeps the colours that points had at first.
+    const ofPoint = (_: uPlot, k: number) => property(PROPERTIES[this.#panel.styles[k - 1]]);
     const axis = {
       stroke: stroke("--muted"),
       font: "11px system-ui, sans-serif",
@@ -115,7 +117,12 @@ class Chart {
       height: HEIGHT,
       padding: [8, 13, 0, 0],
       legend: { show: false },
-      cursor: { y: false, drag: { x: false, y: false }, bind: silent(), points: { size: 6 } },
+      cursor: {
+        y: false,
+        drag: { x: false, y: false },
+        bind: silent(),
+        points: { size: 6, fill: ofPoint, stroke: ofPoint },
+      },
       scales: {
         x: { time: false, range: (_, low, high) => this.#times(low ?? 0, high ?? 1) },
         y: { range: (_, low, high) => this.#range(low ?? 0, high ?? 0) },

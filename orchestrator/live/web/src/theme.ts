@@ -41,18 +41,23 @@ export function vehicleColour(text: string): Colour {
   return mixed(parsed(text), [1, 1, 1], Number.parseFloat(property("--lighter")) / 100);
 }
 
+/** How much nearer to the text's the second controller's colour is, where both have a vehicle's. */
+const SECOND = 0.35;
+
 /** Has the lines of all controllers in a vehicle's colour; undefined: each in its own. */
 export function colourLines(text: string | undefined): void {
   known.clear();
   const { style } = document.documentElement;
-  for (const name of ["--first", "--second"]) {
+  for (const [name, share] of Object.entries({ "--first": 0, "--second": SECOND })) {
     if (text === undefined) style.removeProperty(name);
-    else {
-      const parts = vehicleColour(text).map((part) => Math.round(255 * part).toString(16));
-      style.setProperty(name, `#${parts.map((part) => part.padStart(2, "0")).join("")}`);
-    }
+    else style.setProperty(name, written(mixed(vehicleColour(text), colour("--text"), share)));
   }
   known.clear();
+}
+
+function written(colour: Colour): string {
+  const parts = colour.map((part) => Math.round(255 * part).toString(16));
+  return `#${parts.map((part) => part.padStart(2, "0")).join("")}`;
 }
 
 export function palette(): Palette {
