@@ -38,6 +38,10 @@ pytestmark = [needs_npm, needs_zig]
 #: controller switches at every step.
 CHAOTIC = {"fig6-pd": 10.0}
 
+#: Tolerances where a run makes differences larger: two vehicles come back to their leader at once,
+#: with commands beyond their limits.
+LARGER = {"formation-lost-link": 1e-7}
+
 #: Sine and its like, which differ between C libraries in the last bit.
 SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 
@@ -113,7 +117,8 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         until = CHAOTIC.get(run.scenario.name, np.inf)
         looked_at = table.time <= until
         difference = np.abs(found - table.rows) / np.maximum(1.0, np.abs(table.rows))
-        assert difference[looked_at].max() <= TOLERANCE
+        tolerance = LARGER.get(run.scenario.name, TOLERANCE)
+        assert difference[looked_at].max() <= tolerance
         if until < table.time[-1]:
             continue
         metrics = metrics_of(table, run.loops)
@@ -123,7 +128,7 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
             wanted = metrics.found(loop) | together
             assert measured.keys() == wanted.keys()
             for index, values in wanted.items():
-                assert measured[index] == pytest.approx(values, rel=TOLERANCE, abs=TOLERANCE)
+                assert measured[index] == pytest.approx(values, rel=tolerance, abs=tolerance)
 
 
 @pytest.mark.slow
