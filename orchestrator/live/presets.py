@@ -17,7 +17,7 @@ from fmpy.model_description import ModelVariable
 from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
 from fmus.ports.quantities import POSITION, TAU, THETA, VELOCITY, Members
-from orchestrator.figures.style import printed_unit, vehicle_colours
+from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR
 from orchestrator.master.hooks.events import (
@@ -83,7 +83,7 @@ _CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
 #: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
 _MOST_STEPS = 200_000
 
-#: More have no colours that can be told apart.
+#: Paths of more are hard to tell apart.
 _MOST_VEHICLES = 10
 
 #: What there is of several vehicles together.
@@ -149,6 +149,7 @@ def preset(name: str) -> Plain:
 def _preset(name: str, both: Sequence[Prepared]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
     loops = [_loop(one, scenario) for one in both]
+    fleet = both[0].loops if len(both[0].loops) > 1 else ()
     loops[0]["scenario"] = name
     if len({loop["label"] for loop in loops}) < len(loops):
         # The page tells loops apart by their labels.
@@ -164,7 +165,8 @@ def _preset(name: str, both: Sequence[Prepared]) -> Plain:
         "events": scenario.name if scenario.events else "",
         "loops": loops,
         "drawn": sorted(range(len(both)), key=lambda i: _place(both[i].system)),
-        "colours": vehicle_colours(len(both[0].loops)) if len(both[0].loops) > 1 else [],
+        "colours": vehicle_colours(len(fleet)),
+        "references": reference_colours(fleet),
     }
 
 
@@ -182,15 +184,20 @@ def runs_of(name: str) -> list[Prepared]:
     both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
     for one in both:
         _check(one)
+    if len({len(one.loops) for one in both}) > 1:
+        raise InputError(
+            f"{scenario.name}: the live page cannot run a comparison with another number of "
+            "vehicles"
+        )
     return both
 
 
 def _other(system: System) -> str:
     """The scenario with the controller that a single vehicle lacks; empty: it has neither."""
-    controller = _controller(system)
-    if controller is None or STANDARD.controller not in system.components:
+    controller, loops = _controller(system), loops_of(system)
+    if controller is None or len(loops) > 1 or loops[0].controller != STANDARD.controller:
         return ""
-    is_allocated = isinstance(loops_of(system)[0], AllocatedLoop)
+    is_allocated = isinstance(loops[0], AllocatedLoop)
     return controller.allocated if is_allocated else controller.other
 
 

@@ -251,6 +251,17 @@ def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Par
     assert (said.get("failure"), said.get("remark")) == (ending.failure, ending.remark)
 
 
+def test_vehicles_have_any_names_and_may_have_no_controller(parts: Parts, tmp_path):
+    said, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
+    table = Table()
+    run.run([table])
+    found = np.fromfile(tmp_path / "mine.0").reshape(table.rows.shape)
+    assert found == pytest.approx(table.rows, rel=TOLERANCE, abs=TOLERANCE)
+    one, other = said["metrics"]
+    assert one.keys() - other.keys() == {"final_error"}
+    assert other["peak_command"] == [0.0, 0.0, 0.0]
+
+
 def test_messages_are_the_ones_of_the_master(parts: Parts, tmp_path):
     """Of an observer that restarts after each reset."""
     resets = (f'[[events]]\nat = {k / 25}\nreset = "controller"\n' for k in range(1, 120))
@@ -401,6 +412,7 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ('coupling = "linear"\n', "linear"),
         ("[steps]\nplanner = 0.1\n", "longer steps"),
         ("[parameters]\nplant.m11 = -1.0\n", "m11 = -1"),
+        ('compare = "fig4"\n[components]\ntow = "AuvPlant"\n', "another number of vehicles"),
         ("vehicles = 11\n", "more than 10 vehicles"),
         ("vehicles = 2\nstop_time = 2001.0\n", "more than 100,000 steps"),
     ],

@@ -345,7 +345,7 @@ export class Page {
       this.#results.findIndex((result) => result),
     );
     const first = this.#results[place];
-    const { colours, zUp } = this.#preset;
+    const { colours, references: referenceColours, zUp } = this.#preset;
     const fleet = this.#loops[place].vehicles;
     const references = fleet.map((vehicle) => {
       const points = first && reference(first, vehicle);
@@ -370,22 +370,25 @@ export class Page {
       ),
       references,
       colours,
+      referenceColours,
       waypoints,
       ell: Math.max(
         ...fleet.map(({ vehicle }) => Number(first?.parameters[`${vehicle}.ell`] ?? 0)),
       ),
       zUp,
     });
+    // A vehicle's own reference has its colour.
+    const isNamed = colours.length === 0 || referenceColours.some((one) => !colours.includes(one));
     fillLegend(element("legend"), this.#preset, this.#loops, [
-      ...(hasReference && colours.length === 0 ? ["reference"] : []),
+      ...(hasReference && isNamed ? ["reference"] : []),
       ...(waypoints.length ? ["waypoints"] : []),
     ]);
     this.#indices.show(
       this.#results.flatMap((result, place) => {
+        if (!result) return [];
         const { label } = this.#loops[place];
         const { vehicle, fleet } = chosen[place];
-        const found = () => metrics(result as Result, vehicle, fleet, lastSeconds);
-        return result ? [{ label, place, metrics: found() }] : [];
+        return [{ label, place, metrics: metrics(result, vehicle, fleet, lastSeconds) }];
       }),
     );
     this.#player.set(end, marks);

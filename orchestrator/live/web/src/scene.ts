@@ -2,7 +2,7 @@
 
 import { Camera, type Mesh, Renderer, Transform } from "ogl";
 import { axesOf, grid, type Label } from "./axes";
-import { type Colour, PathLine, POINTS, Primitives } from "./lines";
+import { PathLine, POINTS, Primitives } from "./lines";
 import {
   type Box,
   boxOf,
@@ -33,6 +33,8 @@ export interface Shown {
   references: readonly (Float64Array | undefined)[];
   /** A colour for each vehicle; none: each controller has its colour. */
   colours: readonly string[];
+  /** The same for the references. */
+  referenceColours: readonly string[];
   /** Of the reference: three numbers each [m]. */
   waypoints: readonly number[];
   /** Distance of the control point from the centre of mass [m]. */
@@ -48,7 +50,7 @@ const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
 
-/** More points than the page has vehicles. */
+/** One for each vehicle, as many as a page has. */
 const MOST_TARGETS = 10;
 
 /** Half of the length of the lines of a waypoint's cross: a share of the scene. */
@@ -99,6 +101,7 @@ export class Scene {
     tracks: [],
     references: [],
     colours: [],
+    referenceColours: [],
     waypoints: [],
     ell: 0.35,
     zUp: false,
@@ -135,8 +138,7 @@ export class Scene {
     for (const { mesh } of [this.#grid, this.#target, this.#waypoints]) {
       mesh.setParent(this.#root);
     }
-    // The same order for all pages: references, then the paths above them.
-    this.#provide([[], []], 1);
+    this.#provide([], 1);
     this.#labels = document.createElement("div");
     this.#labels.className = "scene-labels";
     this.#labels.setAttribute("aria-hidden", "true");
@@ -194,8 +196,8 @@ export class Scene {
       paintVehicle(mesh, colour, highlight, reference);
     }
     this.#references.forEach((line, vehicle) => {
-      const own: Colour | undefined = colours[vehicle];
-      const colour = own ? mixed(own, reference, FAINT) : reference;
+      const own = this.#shown.referenceColours[vehicle];
+      const colour = own ? mixed(vehicleColour(own), reference, FAINT) : reference;
       line.paint(colour, mixed(colour, background, own ? LATER : 0.3));
     });
     this.#target.paint(reference);

@@ -147,6 +147,8 @@ export interface Preset {
   readonly drawn: readonly number[];
   /** A colour for each of several vehicles, `#rrggbb`; of a single one, none. */
   readonly colours: readonly string[];
+  /** The same for their references: a grey where several vehicles follow the same one. */
+  readonly references: readonly string[];
 }
 
 /** Units as they are printed, by the members of a group; a single number has the member `""`. */

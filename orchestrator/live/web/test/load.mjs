@@ -106,6 +106,7 @@ export const preset = {
   ],
   drawn: [0, 1],
   colours: [],
+  references: [],
 };
 
 const ofEach = (name) =>
@@ -136,6 +137,7 @@ export const fleet = {
   ],
   drawn: [0],
   colours: ["#0072B2", "#D55E00"],
+  references: ["#0072B2", "#D55E00"],
 };
 export const data = {
   opened: "fault",
