@@ -17,7 +17,7 @@ from fmpy.model_description import ModelVariable
 from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
 from fmus.ports.quantities import POSITION, TAU, THETA, VELOCITY, Members
-from orchestrator.figures.style import printed_unit
+from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR
 from orchestrator.master.hooks.events import (
@@ -45,8 +45,12 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.indices import metrics
-from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, loops_of
+from orchestrator.vehicle.reducers import (
+    LAST_SECONDS,
+    SMALLEST_DISTANCE,
+    SMALLEST_DISTANCE_LABEL,
+)
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
 class _Controller(NamedTuple):
@@ -65,6 +69,8 @@ class _Controller(NamedTuple):
     allocated: str
 
 
+Plain = dict[str, Any]
+
 #: In the order in which they are drawn.
 _CONTROLLERS = {
     "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
@@ -74,10 +80,19 @@ _CONTROLLERS = {
 #: Groups of signals that have charts, with the units of their members.
 _CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
 
-#: The page keeps all rows of a run in its memory, and refuses more steps.
+#: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
 _MOST_STEPS = 200_000
 
-Plain = dict[str, Any]
+#: Paths of more are hard to tell apart.
+_MOST_VEHICLES = 10
+
+#: What there is of several vehicles together.
+_TOGETHER: Plain = {
+    "name": SMALLEST_DISTANCE,
+    "label": SMALLEST_DISTANCE_LABEL,
+    "meaning": "smallest distance between the centres of mass of any two vehicles",
+    "units": {"": "m"},
+}
 
 
 def page_data(opened: str) -> Plain:
@@ -107,13 +122,14 @@ def page_data(opened: str) -> Plain:
             {"name": one.name, "label": one.label, "meaning": one.meaning}
             | {"units": _printed(one.units)}
             for one in metrics()
-        ],
+        ]
+        + [_TOGETHER],
     }
 
 
 def offered() -> list[str]:
-    """The scenarios of the bundle that the page has: it runs one vehicle."""
-    return [name for name in names() if read_scenario(name).vehicles is None]
+    """The scenarios of the bundle that the page has."""
+    return [*names()]
 
 
 def _printed(units: Members) -> dict[str, str]:
@@ -133,6 +149,7 @@ def preset(name: str) -> Plain:
 def _preset(name: str, both: Sequence[Prepared]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
     loops = [_loop(one, scenario) for one in both]
+    fleet = both[0].loops if len(both[0].loops) > 1 else ()
     loops[0]["scenario"] = name
     if len({loop["label"] for loop in loops}) < len(loops):
         # The page tells loops apart by their labels.
@@ -148,6 +165,8 @@ def _preset(name: str, both: Sequence[Prepared]) -> Plain:
         "events": scenario.name if scenario.events else "",
         "loops": loops,
         "drawn": sorted(range(len(both)), key=lambda i: _place(both[i].system)),
+        "colours": vehicle_colours(len(fleet)),
+        "references": reference_colours(fleet),
     }
 
 
@@ -165,20 +184,26 @@ def runs_of(name: str) -> list[Prepared]:
     both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
     for one in both:
         _check(one)
+    if len({len(one.loops) for one in both}) > 1:
+        raise InputError(
+            f"{scenario.name}: the live page cannot run a comparison with another number of "
+            "vehicles"
+        )
     return both
 
 
 def _other(system: System) -> str:
-    """The scenario with the controller that a system does not have; empty: it has neither."""
-    controller = _controller(system)
-    if controller is None:
+    """The scenario with the controller that a single vehicle lacks; empty: it has neither."""
+    controller, loops = _controller(system), loops_of(system)
+    if controller is None or len(loops) > 1 or loops[0].controller != STANDARD.controller:
         return ""
-    is_allocated = isinstance(loops_of(system)[0], AllocatedLoop)
+    is_allocated = isinstance(loops[0], AllocatedLoop)
     return controller.allocated if is_allocated else controller.other
 
 
 def _controller(system: System) -> _Controller | None:
-    found = system.components.get(STANDARD.controller)
+    """The controller of the first vehicle."""
+    found = system.components.get(loops_of(system)[0].controller)
     return _CONTROLLERS.get(_type(found)) if found else None
 
 
@@ -200,7 +225,8 @@ def _check(prepared: Prepared) -> None:
 
     """
     plan = prepared.plan
-    system, experiment = plan.system, plan.experiment
+    system, experiment, loops = plan.system, plan.experiment, prepared.loops
+    most_steps = _MOST_STEPS // len(loops)
     ours = {part.digest for part in bundle().values()}
     foreign = [name for name, part in system.components.items() if part.digest not in ours]
     lacking = {
@@ -211,9 +237,9 @@ def _check(prepared: Prepared) -> None:
         "transformations of values": any(c.transformation for c in system.connections),
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,
-        f"a system without the {STANDARD.vehicle}": STANDARD.vehicle not in system.components,
-        "several vehicles": len(prepared.loops) > 1,
-        f"more than {_MOST_STEPS:,} steps": experiment.rows - 1 > _MOST_STEPS,
+        f"a system without the {loops[0].vehicle}": loops[0].vehicle not in system.components,
+        f"more than {_MOST_VEHICLES} vehicles": len(loops) > _MOST_VEHICLES,
+        f"more than {most_steps:,} steps": experiment.rows - 1 > most_steps,
     }
     for what, is_there in lacking.items():
         if is_there:
@@ -228,8 +254,15 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     controller = _controller(system)
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
+        "vehicles": list(map(_vehicle, prepared.loops)),
         "components": {name: _type(part) for name, part in system.components.items()},
-        "head": {"order": scenario.order, "only": [*scenario.only], "wires": {**scenario.wires}},
+        "head": {
+            "order": scenario.order,
+            "vehicles": scenario.vehicles,
+            "absent": [name for name, what in scenario.components.items() if what is False],
+            "only": [*scenario.only],
+            "wires": {**scenario.wires},
+        },
         "initial": [
             _stage([name], system.feeding[name])
             for names in stages(system, GAUSS_SEIDEL)
@@ -238,6 +271,17 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
         "stages": list(map(_stage, sequence, gathered)),
         "parameters": list(_parameters(system)),
         "events": _events(prepared, owner),
+    }
+
+
+def _vehicle(loop: Loop) -> dict[str, str]:
+    return {
+        "name": loop.name,
+        "vehicle": loop.vehicle,
+        "controller": loop.controller,
+        "planner": loop.planner,
+        "disturbance": loop.disturbance,
+        "allocation": loop.allocation if isinstance(loop, AllocatedLoop) else "",
     }
 
 

@@ -29,6 +29,11 @@ static double same_log(double x) {
     return y + n * LN_2;
 }
 
+/* Of no negative number. */
+static double same_pow(double x, double y) {
+    return x > 0.0 ? same_exp(y * same_log(x)) : y > 0.0 ? 0.0 : 1.0;
+}
+
 static double series(double x, double first, int n) {
     double sum = first;
     for (; n > 0; n -= 2) sum = 1.0 - x * x / (n * (n + 1.0)) * sum;

@@ -340,11 +340,12 @@ def test_refused_link_shows_the_preset_without_what_is_hidden(page, chromium):
     assert "PD" not in live.run(TABLE)
 
 
+SLIDERS = "[...document.querySelectorAll('#groups input[type=range]')].map((one) => one.ariaLabel)"
+
+
 def test_sliders_have_names_of_their_own(opened):
     opened.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
-    names = opened.run(
-        "[...document.querySelectorAll('#groups input[type=range]')].map((one) => one.ariaLabel)"
-    )
+    names = opened.run(SLIDERS)
     assert len(names) == len(set(names)) > 20
 
 
@@ -369,6 +370,46 @@ def test_path_shows_its_waypoints_and_the_scenario_is_the_title(opened):
     opened.run('auvfmu.set({preset: "path"})')
     assert "waypoints" in opened.run("document.getElementById('legend').innerText")
     assert opened.run("document.title") == "A survey through waypoints: proposed and PD controller"
+
+
+CHOSEN = "document.getElementById('vehicle')"
+
+
+def test_all_vehicles_are_shown_and_one_is_chosen(opened):
+    assert opened.run(f"{CHOSEN}.parentElement.hidden")
+    own = opened.run("getComputedStyle(document.documentElement).getPropertyValue('--first')")
+    opened.run('auvfmu.set({preset: "formation-v", stop_time: 30, "auv3.plant.eta0.z": 4})')
+    legend = opened.run("document.getElementById('legend').innerText").split()
+    assert legend == ["auv1", "auv2", "auv3", "proposed", "PD", "waypoints"]
+    header, found = rows(opened.run(CSV))
+    for vehicle, other in (("auv1", "auv2"), ("auv2", "auv3"), ("auv3", "auv1")):
+        opened.run(f"{CHOSEN}.value = '{vehicle}'; {CHOSEN}.dispatchEvent(new Event('change'))")
+        sliders = opened.run(SLIDERS)
+        assert f"{vehicle}.controller.eps_t" in sliders
+        assert not any(other in one for one in sliders)
+        # Its indices, and the one of all vehicles.
+        applied = found[1:, header.index(f"{vehicle}.plant.tau_applied.u")]
+        effort = np.sqrt(np.sum(applied**2 * np.diff(found[:, 0])))
+        assert f"{effort:.4g}".rstrip("0") in opened.run(TABLE)
+    places = np.array(
+        [[found[:, header.index(f"auv{k}.plant.eta.{axis}")] for axis in "xyz"] for k in (1, 2, 3)]
+    )
+    apart = min(
+        np.linalg.norm(places[i] - places[k], axis=0).min() for i, k in ((0, 1), (0, 2), (1, 2))
+    )
+    assert f"{apart:.4g}".rstrip("0") in opened.run(TABLE)
+    opened.wait("/auv3\\.plant\\.eta0\\.z=4.*&vehicle=auv3/.test(location.hash)")
+    assert rows(opened.run(CSV))[1].tobytes() == found.tobytes()
+    opened.run('auvfmu.set({preset: "fig4"})')
+    assert opened.run(f"{CHOSEN}.parentElement.hidden")
+    now = opened.run("getComputedStyle(document.documentElement).getPropertyValue('--first')")
+    assert now == own
+
+
+def test_command_makes_the_same_rows_of_several_vehicles(opened, tmp_path):
+    """Of the comparison, which has no scenario of its own and one link fewer than vehicles."""
+    opened.run('auvfmu.set({preset: "formation-lost-link", stop_time: 5, hide: "proposed"})')
+    compare_rows(opened, tmp_path)
 
 
 def test_space_plays_and_stops(opened):
@@ -399,7 +440,7 @@ def test_times_of_marks_are_rounded(opened):
 def test_phone_needs_no_sideways_scrolling(opened):
     opened.resize(390, 844)
     opened.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
-    for preset in ("fig4", "fault-sensor", "path", "fig3a"):
+    for preset in ("fig4", "fault-sensor", "path", "fig3a", "formation-v"):
         opened.run(f'auvfmu.set({{preset: "{preset}"}})')
         assert opened.run("document.documentElement.scrollWidth") == 390
         too_wide = (

@@ -74,9 +74,8 @@ def _scenario(scenario: Scenario) -> str:
     title = scenario.title
     figure = FLEET if scenario.vehicles else scenario.figure
     shown = f"{title}: {SEEN[figure]}", f"{PICTURES}/{scenario.name}.png"
-    # The live page runs one vehicle.
-    preset = "" if scenario.vehicles else scenario.name
-    return _entry(title, shown, _sentence(scenario.remark), f"run {scenario.name}", preset)
+    command = f"run {scenario.name}"
+    return _entry(title, shown, _sentence(scenario.remark), command, scenario.name)
 
 
 def _place(scenario: Scenario) -> tuple[bool, str]:
@@ -90,7 +89,8 @@ def _study(study: Study) -> str:
     if study.stop_time is not None and not study.stop_time.per:
         settings["stop_time"] = study.stop_time.base
     stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
-    preset = "" if read_scenario(study.scenario[0]).vehicles else "&".join(stated)
+    # The live page knows no stars in names.
+    preset = "" if any("*" in one for one in stated) else "&".join(stated)
     return _entry(
         study.title,
         (seen(study, first), f"{PICTURES}/{picture(study, first)}"),

@@ -10,8 +10,8 @@ import type { Data, Result, Value } from "./types";
 export interface Api {
   /**
    * Changes settings, runs, and draws. The names are the ones of links: `component.parameter`,
-   * `stop_time`, `step`, `events`, which begin without edits, `hide`, and `preset`, which begins as
-   * it is. Settings that are refused change nothing.
+   * `stop_time`, `step`, `events`, which begin without edits, `hide`, `vehicle`, and `preset`, which
+   * begins as it is. Settings that are refused change nothing.
    */
   set(changes: Readonly<Record<string, Value>>): Promise<void>;
   /** The rows of the scenario's own loop, as result.csv has them. */

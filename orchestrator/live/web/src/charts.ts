@@ -17,8 +17,14 @@ const HEIGHT = 132;
 const TIME_AXIS = 22;
 const VALUE_AXIS = 46;
 
-const DASHES: Record<Style, number[]> = { first: [], second: [6, 3], reference: [4, 4] };
-const WIDTHS: Record<Style, number> = { first: 1.5, second: 1.5, reference: 1.5 };
+const DASHES: Record<Style, number[]> = {
+  first: [],
+  second: [6, 3],
+  reference: [4, 4],
+  "first-of-all": [],
+  "second-of-all": [6, 3],
+};
+const WIDTH = 1.5;
 
 /** Share of a limit from which on it is in sight. */
 const NEAR = 0.5;
@@ -27,6 +33,8 @@ const PROPERTIES: Record<Style, string> = {
   first: "--first",
   second: "--second",
   reference: "--reference",
+  "first-of-all": "--reference",
+  "second-of-all": "--reference",
 };
 
 /** A number in few characters. */
@@ -95,6 +103,8 @@ class Chart {
 
   #options(): uPlot.Options {
     const stroke = (name: string) => () => property(name);
+    // By itself, uPlot keeps the colours that points had at first.
+    const ofPoint = (_: uPlot, k: number) => property(PROPERTIES[this.#panel.styles[k - 1]]);
     const axis = {
       stroke: stroke("--muted"),
       font: "11px system-ui, sans-serif",
@@ -107,7 +117,12 @@ class Chart {
       height: HEIGHT,
       padding: [8, 13, 0, 0],
       legend: { show: false },
-      cursor: { y: false, drag: { x: false, y: false }, bind: silent(), points: { size: 6 } },
+      cursor: {
+        y: false,
+        drag: { x: false, y: false },
+        bind: silent(),
+        points: { size: 6, fill: ofPoint, stroke: ofPoint },
+      },
       scales: {
         x: { time: false, range: (_, low, high) => this.#times(low ?? 0, high ?? 1) },
         y: { range: (_, low, high) => this.#range(low ?? 0, high ?? 0) },
@@ -128,7 +143,7 @@ class Chart {
           (style, k): uPlot.Series => ({
             label: this.#panel.names[k],
             stroke: stroke(PROPERTIES[style]),
-            width: WIDTHS[style],
+            width: WIDTH,
             dash: DASHES[style],
             points: { show: false },
           }),

@@ -26,9 +26,10 @@ export function commandLine(settings: Settings, preset: Preset, loop: LoopData):
 function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string {
   const file = fileName(`${preset.name}-${loop.label}`);
   const components = Object.entries(loop.components).map(
-    ([name, type]) => `${name} = ${literal(type)}\n`,
+    ([name, type]) => `${key(name)} = ${literal(type)}\n`,
   );
-  const { order, only, wires } = loop.head;
+  const { order, vehicles, absent, only, wires } = loop.head;
+  components.push(...absent.map((name) => `${key(name)} = false\n`));
   const wired = Object.entries(wires).map(([to, from]) => `"${to}" = ${literal(from)}\n`);
   const parameters = loop.parameters.flatMap(({ name, value, default: own }) => {
     const wanted = settings.values[name] ?? value;
@@ -38,6 +39,7 @@ function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string
     `title = ${literal(`${preset.name} with the ${loop.label} controller`)}\n`,
     `stop_time = ${literal(settings.stopTime)}\n`,
     `step = ${literal(settings.step)}\n`,
+    vehicles === null ? "" : `vehicles = ${vehicles}\n`,
     order === null ? "" : `order = ${typeof order === "string" ? literal(order) : list(order)}\n`,
     only.length > 0 ? `only = ${list(only)}\n` : "",
     `\n[components]\n${components.join("")}`,
@@ -78,7 +80,7 @@ function toTable(event: EventData): string {
   if (event.repeat) entries.push(["repeat", "true"]);
   if (event.lasts !== undefined) entries.push(["for", literal(event.lasts)]);
   entries.push(acting(event.action), ["label", literal(event.label)]);
-  return `[[events]]\n${entries.map(([key, value]) => `${key} = ${value}\n`).join("")}`;
+  return `[[events]]\n${entries.map(([name, value]) => `${name} = ${value}\n`).join("")}`;
 }
 
 function acting(action: Action): [string, string] {
@@ -103,6 +105,11 @@ function table(values: readonly (readonly [string, Value])[]): string {
 
 function list(names: readonly string[]): string {
   return `[${names.map((name) => literal(name)).join(", ")}]`;
+}
+
+/** A name as a key of TOML, in which dots would make tables. */
+function key(name: string): string {
+  return /^[\w-]+$/.test(name) ? name : literal(name);
 }
 
 /** A value of TOML; JSON writes texts and truth values as TOML does. */

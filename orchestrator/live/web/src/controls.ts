@@ -2,8 +2,8 @@
 
 import { type Changed, Field, SliderRow } from "./field";
 import { parametersOf, type Settings } from "./settings";
-import { GROUPS } from "./sliders";
-import type { Preset } from "./types";
+import { GROUPS, of } from "./sliders";
+import type { Preset, VehicleData } from "./types";
 
 export class Controls {
   readonly #groups: HTMLElement;
@@ -22,8 +22,8 @@ export class Controls {
     search.addEventListener("input", () => this.#filter());
   }
 
-  /** Makes the controls of a preset. */
-  build(preset: Preset): void {
+  /** Makes the controls of a preset; the sliders are of one vehicle. */
+  build(preset: Preset, vehicle: VehicleData): void {
     const parameters = parametersOf(preset);
     const known = new Map(
       [...this.#groups.querySelectorAll("details")].map((one) => [one.dataset.title, one.open]),
@@ -31,6 +31,7 @@ export class Controls {
     this.#rows = [];
     const groups = GROUPS.flatMap(({ title, open, rows }) => {
       const made = rows
+        .map((row) => of(vehicle, row))
         .map((row) => ({ row, found: row.names.flatMap((name) => parameters.get(name) ?? []) }))
         .filter(({ row, found }) => found.length === row.names.length)
         .map(

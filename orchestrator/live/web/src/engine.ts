@@ -1,7 +1,15 @@
 // The part of the page that needs no document: it runs in Node, too.
 export { type Api, apiWithoutPage, makeApi } from "./api";
 export { Refusal } from "./experiment";
-export { commandName, controlPoint, limits, metrics, trackingError } from "./indices";
+export {
+  commandName,
+  controlPoint,
+  limits,
+  metrics,
+  reference,
+  smallestDistance,
+  trackingError,
+} from "./indices";
 export { Engine } from "./simulate";
 export { csv } from "./text";
 export type * from "./types";

@@ -50,9 +50,13 @@ const COMPARISONS: Readonly<Record<Condition["comparison"], (a: number, b: numbe
   ">": (a, b) => a > b,
 };
 
-/** The component and the port of a name. */
-export function parted(name: string): [string, string] {
-  const dot = name.indexOf(".");
+/** The component and the port of a name: either may have dots, the longest component counts. */
+export function parted(
+  name: string,
+  components: { has(component: string): boolean },
+): [string, string] {
+  let dot = name.lastIndexOf(".");
+  while (dot > 0 && !components.has(name.slice(0, dot))) dot = name.lastIndexOf(".", dot - 1);
   return [name.slice(0, dot), name.slice(dot + 1)];
 }
 
@@ -69,7 +73,7 @@ function same(wanted: Value, held: Value): boolean {
 }
 
 function tune(run: Run, target: string, value: Value): void {
-  const [component, port] = parted(target);
+  const [component, port] = parted(target, run.instances);
   const instance = instanceOf(run, component);
   instance.set(new Map([[port, value]]));
   const held = instance.read(port);
@@ -84,7 +88,7 @@ function doEffect(run: Run, effect: Effect, target: string, value: Value): void 
 }
 
 function ground(run: Run, target: string, effect: Effect): Layer {
-  const [component, port] = parted(target);
+  const [component, port] = parted(target, run.instances);
   if (effect === "tune") {
     return { event: GROUND, effect, value: instanceOf(run, component).read(port) };
   }
@@ -127,10 +131,10 @@ class Layers {
   }
 
   /** Values that events have given to parameters of a component, by the names of its ports. */
-  tuned(component: string): Map<string, Value> {
+  tuned(run: Run, component: string): Map<string, Value> {
     const found = new Map<string, Value>();
     for (const [target, layers] of this.setting) {
-      const [owner, port] = parted(target);
+      const [owner, port] = parted(target, run.instances);
       const { effect, value } = layers[layers.length - 1];
       if (owner === component && effect === "tune") found.set(port, value);
     }
@@ -236,7 +240,7 @@ export class Events {
   /** Start a component over, with its current parameters. */
   private reset(run: Run, name: string): void {
     const instance = instanceOf(run, name);
-    const values = new Map([...(run.values.get(name) ?? []), ...this.layers.tuned(name)]);
+    const values = new Map([...(run.values.get(name) ?? []), ...this.layers.tuned(run, name)]);
     instance.reset();
     instance.enterInitialization(values, run.experiment.time(run.made));
     run.overrides.refresh(name);

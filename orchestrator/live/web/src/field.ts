@@ -195,9 +195,10 @@ function stepOf({ scale }: Slider): number {
 
 /** Whether a message says `component.parameter` or `component: parameter`. */
 export function names(message: string, name: string): boolean {
-  const [component, ...rest] = name.split(".");
-  const port = rest.join(".");
-  return [name, `${component}: ${port}`].some((text) => {
+  // The name of a component may have dots, too.
+  const dots = [...name.matchAll(/\./g)].map(({ index }) => index);
+  const said = dots.map((dot) => `${name.slice(0, dot)}: ${name.slice(dot + 1)}`);
+  return [name, ...said].some((text) => {
     const at = message.indexOf(text);
     return at >= 0 && !/[\w[.]/.test(message[at + text.length] ?? "");
   });

@@ -1,10 +1,21 @@
 // The controllers: a switch for each, and what the colours mean.
 
-import type { LoopData } from "./types";
+import type { LoopData, Preset } from "./types";
 
 /** A sample of a line. */
 export function swatch(kind: string): string {
   return `<span class="swatch of-${kind}"></span>`;
+}
+
+/** A sample of each vehicle's lines, with its name; of a single vehicle, nothing. */
+function vehicles({ loops, colours }: Preset): HTMLElement[] {
+  return colours.map((colour, k) => {
+    const item = document.createElement("li");
+    item.innerHTML = swatch("vehicle");
+    (item.firstChild as HTMLElement).style.setProperty("--vehicle", colour);
+    item.append(loops[0].vehicles[k].name);
+    return item;
+  });
 }
 
 /** A switch for each controller; `changed` gets the labels of those that are hidden. */
@@ -34,15 +45,23 @@ export function buildSwitches(
   host.replaceChildren(...(legend ? [legend] : []), ...labels);
 }
 
-/** What the colours mean: of the controllers, and of `others`, such as `reference`. */
+/**
+ * What the colours mean: of the vehicles, of the controllers, and of `others`, such as `reference`.
+ *
+ * Where each vehicle has its colour, a controller has only its style of line.
+ */
 export function fillLegend(
   host: HTMLElement,
+  preset: Preset,
   loops: readonly LoopData[],
   others: readonly string[],
 ): void {
-  const items = loops.map(({ label }, place) => [String(place), label]);
+  const [first] = preset.colours;
+  const style = first === undefined ? "" : " of-all";
+  const items = loops.map(({ label }, place) => [`${place}${style}`, label]);
   items.push(...others.map((name) => [name, name]));
   host.replaceChildren(
+    ...vehicles(preset),
     ...items.map(([kind, label]) => {
       const item = document.createElement("li");
       item.innerHTML = swatch(kind);

@@ -4,6 +4,7 @@ import { isDuration, isTime } from "./experiment";
 import {
   type Edit,
   eventOf,
+  fleetOf,
   parametersOf,
   presetOf,
   type Settings,
@@ -19,6 +20,7 @@ const STOP_TIME = "stop_time";
 const STEP = "step";
 const EVENTS = "events";
 const HIDDEN = "hide";
+const VEHICLE = "vehicle";
 
 /** What stands in a link for a duration without an end. */
 const FOR_GOOD = "always";
@@ -40,6 +42,7 @@ export function toHash(settings: Settings, data: Data): string {
     if (lasts !== undefined) fields.push([`${name}.for`, lasts === null ? FOR_GOOD : `${lasts}`]);
   }
   for (const label of settings.hidden) fields.push([HIDDEN, label]);
+  if (settings.vehicle !== fleetOf(preset)[0]) fields.push([VEHICLE, settings.vehicle]);
   // What was typed and is no number is not sent.
   const sent = fields.filter(([, value]) => value !== "NaN");
   return `#${sent.map(([key, value]) => `${encode(key)}=${encode(value)}`).join("&")}`;
@@ -57,7 +60,7 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
   const values: Record<string, Value> = {};
   const edited: [string, string][] = [];
   const hidden: string[] = [];
-  let { stopTime, step, events } = untouched(preset);
+  let { stopTime, step, events, vehicle } = untouched(preset);
   for (const [key, text] of fields) {
     const parameter = parameters.get(key);
     const edit = EDIT.test(key);
@@ -69,13 +72,15 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
     else if (key === STEP && Number.isFinite(number)) step = number;
     else if (key === EVENTS && (text === "" || Object.hasOwn(preset.loops[0].events, text)))
       events = text;
+    else if (key === VEHICLE && fleetOf(preset).includes(text)) vehicle = text;
     else if (edit) edited.push([key, text]);
     else if (key === HIDDEN && (text === "" || hidden.includes(text))) continue;
     else if (key === HIDDEN && preset.loops.some(({ label }) => label === text)) hidden.push(text);
     else unknown.push(`${key}=${text}`);
   }
   const { name } = preset;
-  let settings: Settings = { preset: name, values: {}, stopTime, step, events, edits: {}, hidden };
+  const none = { values: {}, edits: {} };
+  let settings: Settings = { preset: name, ...none, stopTime, step, events, hidden, vehicle };
   settings = withValues(settings, preset, values);
   // Which events there are is known only now.
   for (const [key, text] of edited) {

@@ -3,17 +3,18 @@
 import { Charts, type Mark, rowAt } from "./charts";
 import { commandLine } from "./command";
 import { Controls } from "./controls";
-import { controlPoint, type Engine, metrics, Refusal } from "./engine";
+import { controlPoint, type Engine, metrics, Refusal, reference } from "./engine";
 import { EventsForm } from "./events_form";
 import { IndicesTable } from "./indices_table";
 import { buildSwitches, fillLegend } from "./legend";
 import { fromHash, toHash } from "./link";
-import { interleaved, lines, longest, sections } from "./panels";
+import { type Chosen, interleaved, lines, longest, sections } from "./panels";
 import { Player } from "./player";
-import { missing, Scene } from "./scene";
+import { missing, Scene, type Track } from "./scene";
 import {
   type Changes,
   eventsOf,
+  fleetOf,
   presetOf,
   type Settings,
   untouched,
@@ -21,8 +22,8 @@ import {
   withValues,
 } from "./settings";
 import { csvLines, entered } from "./text";
-import { palette, themeButton } from "./theme";
-import type { Data, LoopData, Preset, Result } from "./types";
+import { colourLines, palette, themeButton } from "./theme";
+import type { Data, LoopData, Preset, Result, VehicleData } from "./types";
 
 /** The link is written so long after the last change [ms]: browsers limit how often it may be. */
 const LINK_AFTER = 300;
@@ -58,6 +59,8 @@ export class Page {
   #preset: Preset;
   /** The preset that the controls and charts were made for. */
   #built: Preset | undefined;
+  /** The vehicle that the sliders are of. */
+  #vehicle = "";
   /** The preset's loops; their order gives them their colours. */
   #loops: readonly LoopData[] = [];
   /** The last runs that could be made, in the order of the loops. */
@@ -102,10 +105,7 @@ export class Page {
     new ResizeObserver(([{ target }]) => {
       document.documentElement.style.setProperty("--toolbar", `${target.clientHeight}px`);
     }).observe(element("toolbar"));
-    themeButton(element("theme"), () => {
-      this.#scene?.paint(palette());
-      this.#charts.repaint();
-    });
+    themeButton(element("theme"), () => this.#paint());
     this.#open();
     this.#sayUnknown(unknown);
   }
@@ -128,6 +128,10 @@ export class Page {
       ...this.#data.presets.map(({ name, title }) => new Option(`${name}: ${title}`, name)),
     );
     select.addEventListener("change", () => this.open(select.value));
+    const vehicle = element<HTMLSelectElement>("vehicle");
+    vehicle.addEventListener("change", () =>
+      this.apply({ ...this.#settings, vehicle: vehicle.value }),
+    );
     element("copy-link").addEventListener("click", () => {
       this.#writeLink();
       this.#copy(location.href, "Link copied");
@@ -135,8 +139,8 @@ export class Page {
     element("copy-command").addEventListener("click", () => this.#copyCommand());
     element("download").addEventListener("click", () => this.#download());
     element("reset-all").addEventListener("click", () => {
-      const { hidden } = this.#settings;
-      this.#take({ ...untouched(this.#preset), hidden });
+      const { hidden, vehicle } = this.#settings;
+      this.#take({ ...untouched(this.#preset), hidden, vehicle });
     });
     for (const [id, key] of [
       ["stop-time", "stopTime"],
@@ -198,12 +202,13 @@ export class Page {
     buildSwitches(element("loops"), this.#loops, this.#settings.hidden, (hidden) =>
       this.#take({ ...this.#settings, hidden }),
     );
+    this.#openVehicle();
     if (this.#preset !== this.#built) {
-      this.#controls.build(this.#preset);
       this.#charts.build(
         sections(
           this.#loops.map(({ label }) => label),
           this.#data.units,
+          fleetOf(this.#preset).length,
         ),
       );
       this.#results = [];
@@ -211,6 +216,35 @@ export class Page {
     this.#built = this.#preset;
     this.run();
     this.#player.seek(this.#player.time);
+  }
+
+  /** Offers the preset's vehicles, and makes the controls of the one that is chosen. */
+  #openVehicle(): void {
+    const preset = this.#preset;
+    const { vehicle } = this.#settings;
+    const isOther = preset !== this.#built;
+    if (isOther || vehicle !== this.#vehicle) {
+      this.#controls.build(preset, preset.loops[0].vehicles[this.#chosen]);
+      this.#paint();
+    }
+    this.#vehicle = vehicle;
+    const select = element<HTMLSelectElement>("vehicle");
+    const fleet = fleetOf(preset);
+    (select.parentElement as HTMLElement).hidden = fleet.length < 2;
+    if (isOther) select.replaceChildren(...fleet.map((name) => new Option(name)));
+    select.value = vehicle;
+  }
+
+  /** The place of the chosen vehicle among all. */
+  get #chosen(): number {
+    return Math.max(0, fleetOf(this.#preset).indexOf(this.#settings.vehicle));
+  }
+
+  /** Charts have the colour of the chosen vehicle, and of a single one, those of the controllers. */
+  #paint(): void {
+    colourLines(this.#preset.colours[this.#chosen]);
+    this.#scene?.paint(palette());
+    this.#charts.repaint();
   }
 
   #take(settings: Settings): void {
@@ -239,8 +273,8 @@ export class Page {
       this.#refuse(error.message);
       // The last good runs stay; a link may have none.
       if (this.#results.length > 0) return;
-      const { hidden } = this.#settings;
-      this.#results = this.#runs({ ...untouched(this.#preset), hidden });
+      const { hidden, vehicle } = this.#settings;
+      this.#results = this.#runs({ ...untouched(this.#preset), hidden, vehicle });
       this.#draw();
       return;
     }
@@ -298,42 +332,63 @@ export class Page {
     const slider = element<HTMLInputElement>("stop-slider");
     slider.value = String(stopTime);
     slider.setAttribute("aria-valuetext", `${stopTime} s`);
-    const isTouched = toHash(this.#settings, this.#data) !== toHash(untouched(preset), this.#data);
+    const { vehicle } = this.#settings;
+    const own = toHash({ ...untouched(preset), vehicle }, this.#data);
+    const isTouched = toHash(this.#settings, this.#data) !== own;
     element("reset-all").hidden = !isTouched;
   }
 
   #draw(): void {
     const { lastSeconds, units } = this.#data;
-    const first = this.#results.find((result) => result);
-    const hasReference = first?.has("planner.y_d.x") ?? false;
+    const place = Math.max(
+      0,
+      this.#results.findIndex((result) => result),
+    );
+    const first = this.#results[place];
+    const { colours, references: referenceColours, zUp } = this.#preset;
+    const fleet = this.#loops[place].vehicles;
+    const references = fleet.map((vehicle) => {
+      const points = first && reference(first, vehicle);
+      return points && interleaved(points);
+    });
+    const hasReference = references.some((points) => points);
+    const chosen: Chosen[] = this.#loops.map(({ vehicles }) => ({
+      vehicle: vehicles[this.#chosen],
+      fleet: vehicles,
+    }));
     const end = Math.max(
       ...this.#results.map((result) => result?.time[result.rows - 1] ?? 0),
       1e-9,
     );
     const marks = marksOf(first, end);
-    const waypoints = first && hasReference ? waypointsOf(first) : [];
-    this.#charts.set(lines(this.#results, units), marks);
+    const planners = Object.keys(this.#loops[place].components);
+    const waypoints = first && hasReference ? waypointsOf(first, planners) : [];
+    this.#charts.set(lines(this.#results, chosen, units), marks);
     this.#scene?.set({
-      tracks: this.#results.map(
-        (result) =>
-          result && { path: interleaved(controlPoint(result)), attitude: attitudeOf(result) },
+      tracks: this.#results.map((result, k) =>
+        result ? this.#loops[k].vehicles.map((vehicle) => trackOf(result, vehicle)) : [],
       ),
-      reference:
-        first && hasReference
-          ? interleaved(["x", "y", "z"].map((axis) => first.column(`planner.y_d.${axis}`)))
-          : undefined,
+      references,
+      colours,
+      referenceColours,
       waypoints,
-      ell: Number(first?.parameters["plant.ell"] ?? 0),
-      zUp: this.#preset.zUp,
+      ell: Math.max(
+        ...fleet.map(({ vehicle }) => Number(first?.parameters[`${vehicle}.ell`] ?? 0)),
+      ),
+      zUp,
     });
-    fillLegend(element("legend"), this.#loops, [
-      ...(hasReference ? ["reference"] : []),
+    // A vehicle's own reference has its colour.
+    const isNamed = colours.length === 0 || referenceColours.some((one) => !colours.includes(one));
+    fillLegend(element("legend"), this.#preset, this.#loops, [
+      ...(hasReference && isNamed ? ["reference"] : []),
       ...(waypoints.length ? ["waypoints"] : []),
     ]);
     this.#indices.show(
       this.#results.flatMap((result, place) => {
+        if (!result) return [];
         const { label } = this.#loops[place];
-        return result ? [{ label, place, metrics: metrics(result, lastSeconds) }] : [];
+        const { vehicle, fleet } = chosen[place];
+        return [{ label, place, metrics: metrics(result, vehicle, fleet, lastSeconds) }];
       }),
     );
     this.#player.set(end, marks);
@@ -427,16 +482,23 @@ function messagesOf({ failure = "", remark, messages }: Result): string[] {
   return remark === undefined ? others : [remark, ...others];
 }
 
-function attitudeOf(result: Result): Float64Array {
-  return interleaved(["phi", "theta", "psi"].map((angle) => result.column(`plant.eta.${angle}`)));
+function trackOf(result: Result, vehicle: VehicleData): Track {
+  const angles = ["phi", "theta", "psi"].map((angle) => `${vehicle.vehicle}.eta.${angle}`);
+  return {
+    path: interleaved(controlPoint(result, vehicle)),
+    attitude: interleaved(angles.map((angle) => result.column(angle))),
+  };
 }
 
-/** The points that a PathPlanner runs through [m]; other planners have none. */
-function waypointsOf({ parameters }: Result): number[] {
-  const count = Number(parameters["planner.count"] ?? 0);
-  return Array.from({ length: 3 * count }, (_, i) =>
-    Number(parameters[`planner.waypoint[${Math.floor(i / 3) + 1}].${"xyz"[i % 3]}`]),
-  );
+/** The points that each PathPlanner runs through [m]; other components have none. */
+function waypointsOf({ parameters }: Result, components: readonly string[]): number[] {
+  return components.flatMap((name) => {
+    const has = parameters[`${name}.waypoint[1].x`] !== undefined;
+    const count = has ? Number(parameters[`${name}.count`]) : 0;
+    return Array.from({ length: 3 * count }, (_, i) =>
+      Number(parameters[`${name}.waypoint[${Math.floor(i / 3) + 1}].${"xyz"[i % 3]}`]),
+    );
+  });
 }
 
 /** What happens in a run: each event that begins, until its end, if it has one. */

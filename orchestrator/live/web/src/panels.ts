@@ -1,10 +1,10 @@
 // What the charts show of a run.
 
-import { commandName, limits, trackingError } from "./engine";
-import type { Data, Result } from "./types";
+import { commandName, limits, smallestDistance, trackingError } from "./engine";
+import type { Data, Result, VehicleData } from "./types";
 
-/** Colour and style of a line: of a controller, or of what is true or wanted. */
-export type Style = "first" | "second" | "reference";
+/** Colour and style of a line: of a controller, of what is true or wanted, or of all vehicles. */
+export type Style = "first" | "second" | "reference" | "first-of-all" | "second-of-all";
 
 export interface Panel {
   /** HTML. */
@@ -31,10 +31,22 @@ export interface Lines {
   readonly limits?: readonly [number, number];
 }
 
-/** The sections of a page whose controllers have these names. */
-export function sections(labels: readonly string[], units: Data["units"]): readonly Section[] {
+/** The sections of a page whose controllers have these names, for one vehicle or several. */
+export function sections(
+  labels: readonly string[],
+  units: Data["units"],
+  vehicles: number,
+): readonly Section[] {
   const both: Style[] = ["first", "second"];
   const compared = { styles: both.slice(0, labels.length), names: labels };
+  const together: Style[] = ["first-of-all", "second-of-all"];
+  const distances: Section = {
+    title: "Smallest distance between two vehicles",
+    note: "of their centres of mass",
+    panels: [
+      { styles: together.slice(0, labels.length), names: labels, title: "distance", unit: "m" },
+    ],
+  };
   return [
     {
       title: "Tracking errors",
@@ -74,6 +86,7 @@ export function sections(labels: readonly string[], units: Data["units"]): reado
         unit,
       })),
     },
+    ...(vehicles > 1 ? [distances] : []),
   ];
 }
 
@@ -85,9 +98,22 @@ export function longest(results: readonly (Result | undefined)[]): Result | unde
   );
 }
 
-/** The lines of all panels, section by section. */
+/** The vehicles of a loop, and the one of them that is looked at. */
+export interface Chosen {
+  readonly vehicle: VehicleData;
+  readonly fleet: readonly VehicleData[];
+}
+
+/**
+ * The lines of all panels, section by section.
+ *
+ * @param results of the loops.
+ * @param chosen of each of them.
+ * @param units of the groups of signals.
+ */
 export function lines(
   results: readonly (Result | undefined)[],
+  chosen: readonly Chosen[],
   units: Data["units"],
 ): readonly (readonly Lines[])[] {
   const whole = longest(results);
@@ -95,31 +121,37 @@ export function lines(
   const rows = Math.max(0, (whole?.rows ?? 0) - 1);
   /** Times at which steps begin: the row at whose end they stand has their signals. */
   const starts = time.subarray(0, rows);
-  const errors = results.map((result) => result && trackingError(result));
+  const of = <T>(make: (result: Result, chosen: Chosen) => T): (T | undefined)[] =>
+    results.map((result, place) => result && make(result, chosen[place]));
+  const errors = of((result, { vehicle }) => trackingError(result, vehicle));
   const steps = (result: Result | undefined, name: string) =>
     result?.has(name) ? result.column(name).subarray(1) : undefined;
-  const observed = results.find((result) => result?.has("controller.dy_hat.x"));
-  const moving = observed ?? whole;
+  const observed = results.findIndex((result, place) =>
+    result?.has(`${chosen[place].vehicle.controller}.dy_hat.x`),
+  );
+  const moving = observed < 0 ? results.indexOf(whole) : observed;
+  const { vehicle } = chosen[Math.max(moving, 0)];
   return [
     Object.keys(units.e).map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
     Object.keys(units.tau).map((member) => {
-      const values = results.map(
-        (result) => result && steps(result, commandName(result, member)),
+      const values = of((result, { vehicle }) =>
+        steps(result, commandName(result, vehicle, member)),
       );
-      const ends = whole && limits(whole, member);
+      const ends = whole && limits(whole, chosen[results.indexOf(whole)].vehicle, member);
       return { time: starts, values, ...(ends ? { limits: ends } : {}) };
     }),
     Object.keys(units.dy).map((axis) => ({
       time: starts,
       values: [
-        steps(observed, `controller.dy_hat.${axis}`),
-        moving?.column(`plant.dy.${axis}`).subarray(0, rows),
+        steps(results[observed], `${vehicle.controller}.dy_hat.${axis}`),
+        results[moving]?.column(`${vehicle.vehicle}.dy.${axis}`).subarray(0, rows),
       ],
     })),
     Object.keys(units.theta_hat).map((k) => ({
       time: starts,
-      values: results.map((result) => steps(result, `controller.theta_hat[${k}]`)),
+      values: of((result, { vehicle }) => steps(result, `${vehicle.controller}.theta_hat[${k}]`)),
     })),
+    [{ time, values: of((result, { fleet }) => smallestDistance(result, fleet)) }],
   ];
 }
 

@@ -165,9 +165,11 @@ export class Overrides {
 
   /** Let the inputs of a component take at once what feeds them. */
   refresh(component: string): void {
-    const { values, names } = this.row;
+    const { values, firsts, names } = this.row;
+    const first = firsts.get(component) ?? names.length;
+    const end = Math.min(names.length, ...[...firsts.values()].filter((other) => other > first));
     for (const [column, [[gathering, place]]] of this.fed) {
-      if (names[column].startsWith(`${component}.`)) {
+      if (first <= column && column < end) {
         const taken = values[gathering.sources[place]];
         values[column] = gathering.factors[place] * taken + gathering.offsets[place];
       }

@@ -2,7 +2,7 @@
 
 import { Camera, type Mesh, Renderer, Transform } from "ogl";
 import { axesOf, grid, type Label } from "./axes";
-import { type Colour, PathLine, POINTS, Primitives } from "./lines";
+import { PathLine, POINTS, Primitives } from "./lines";
 import {
   type Box,
   boxOf,
@@ -13,11 +13,11 @@ import {
   rotation,
   type Vector,
 } from "./space";
-import type { Palette } from "./theme";
+import { mixed, type Palette, vehicleColour } from "./theme";
 import { Turning } from "./turning";
 import { paintVehicle, vehicleMesh } from "./vehicle_mesh";
 
-/** Of a run: three numbers for each row. */
+/** Of a vehicle in a run: three numbers for each row. */
 export interface Track {
   /** The control point [m], earth frame. */
   path: Float64Array;
@@ -27,9 +27,14 @@ export interface Track {
 
 /** What a scene shows. */
 export interface Shown {
-  /** In the order of the controllers; absent: hidden, or not there. */
-  tracks: readonly (Track | undefined)[];
-  reference: Float64Array | undefined;
+  /** Of each controller, in their order, the tracks of all vehicles; none: it is hidden. */
+  tracks: readonly (readonly Track[])[];
+  /** Of each vehicle, as far as there are any. */
+  references: readonly (Float64Array | undefined)[];
+  /** A colour for each vehicle; none: each controller has its colour. */
+  colours: readonly string[];
+  /** The same for the references. */
+  referenceColours: readonly string[];
   /** Of the reference: three numbers each [m]. */
   waypoints: readonly number[];
   /** Distance of the control point from the centre of mass [m]. */
@@ -44,6 +49,9 @@ const HALF = 0.3;
 const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
+
+/** One for each vehicle, as many as a page has. */
+const MOST_TARGETS = 10;
 
 /** Half of the length of the lines of a waypoint's cross: a share of the scene. */
 const CROSS = 0.015;
@@ -65,8 +73,16 @@ export function missing(text: string): HTMLElement {
   return note;
 }
 
-function mixed(a: Colour, b: Colour, share: number): Colour {
-  return a.map((value, k) => value + (b[k] - value) * share) as unknown as Colour;
+/** How faint a path is after the time that is shown, and how faint a vehicle's reference. */
+const LATER = 0.68;
+const FAINT = 0.35;
+
+/** What a vehicle with a controller is drawn with. */
+interface Drawing {
+  readonly controller: number;
+  readonly vehicle: number;
+  readonly path: PathLine;
+  readonly mesh: Mesh;
 }
 
 export class Scene {
@@ -74,15 +90,23 @@ export class Scene {
   readonly #renderer: Renderer;
   readonly #camera: Camera;
   readonly #root = new Transform();
-  readonly #paths: PathLine[];
-  readonly #vehicles: Mesh[];
-  readonly #reference: PathLine;
+  readonly #drawings: Drawing[] = [];
+  readonly #references: PathLine[] = [];
   readonly #target: Primitives;
   readonly #waypoints: Primitives;
   readonly #grid: Primitives;
   readonly #labels: HTMLElement;
   readonly #turning: Turning;
-  #shown: Shown = { tracks: [], reference: undefined, waypoints: [], ell: 0.35, zUp: false };
+  #shown: Shown = {
+    tracks: [],
+    references: [],
+    colours: [],
+    referenceColours: [],
+    waypoints: [],
+    ell: 0.35,
+    zUp: false,
+  };
+  #palette: Palette | undefined;
   #box: Box = { low: [-1, -1, -1], high: [1, 1, 1] };
   /** The scene is drawn with its largest extent as 1. */
   #scale = 1;
@@ -109,19 +133,12 @@ export class Scene {
     const gl = this.#renderer.gl;
     this.#camera = new Camera(gl, { fov: (HALF * 360) / Math.PI, near: 0.05, far: 50 });
     this.#grid = new Primitives(gl, 400, gl.LINES);
-    this.#reference = new PathLine(gl, 1.6, false);
-    this.#target = new Primitives(gl, 1, gl.POINTS, 7 * this.#renderer.dpr);
+    this.#target = new Primitives(gl, MOST_TARGETS, gl.POINTS, 7 * this.#renderer.dpr);
     this.#waypoints = new Primitives(gl, 400, gl.LINES);
-    this.#paths = [new PathLine(gl, 2.6, false), new PathLine(gl, 2.6, true)];
-    this.#vehicles = [vehicleMesh(gl), vehicleMesh(gl)];
-    const primitives = [this.#grid, this.#target, this.#waypoints];
-    for (const { mesh } of [...primitives, this.#reference, ...this.#paths]) {
+    for (const { mesh } of [this.#grid, this.#target, this.#waypoints]) {
       mesh.setParent(this.#root);
     }
-    for (const vehicle of this.#vehicles) {
-      vehicle.matrixAutoUpdate = false;
-      vehicle.setParent(this.#root);
-    }
+    this.#provide([], 1);
     this.#labels = document.createElement("div");
     this.#labels.className = "scene-labels";
     this.#labels.setAttribute("aria-hidden", "true");
@@ -135,22 +152,54 @@ export class Scene {
     this.#resize();
   }
 
+  /** Makes what a scene with these tracks and so many references lacks. */
+  #provide(tracks: Shown["tracks"], references: number): void {
+    const gl = this.#renderer.gl;
+    while (this.#references.length < references) {
+      const line = new PathLine(gl, 1.6, false);
+      line.mesh.setParent(this.#root);
+      this.#references.push(line);
+    }
+    tracks.forEach((vehicles, controller) => {
+      for (let vehicle = 0; vehicle < vehicles.length; vehicle++) {
+        if (this.#drawing(controller, vehicle)) continue;
+        const made = { path: new PathLine(gl, 2.6, controller > 0), mesh: vehicleMesh(gl) };
+        made.path.mesh.setParent(this.#root);
+        made.mesh.matrixAutoUpdate = false;
+        made.mesh.setParent(this.#root);
+        this.#drawings.push({ controller, vehicle, ...made });
+      }
+    });
+  }
+
+  #drawing(controller: number, vehicle: number): Drawing | undefined {
+    return this.#drawings.find((one) => one.controller === controller && one.vehicle === vehicle);
+  }
+
   #resize(): void {
     const { clientWidth: width, clientHeight: height } = this.#host;
     if (!width || !height) return;
     this.#renderer.setSize(width, height);
     this.#camera.perspective({ aspect: width / height });
-    for (const line of [this.#reference, ...this.#paths]) line.resize();
+    const paths = this.#drawings.map(({ path }) => path);
+    for (const line of [...this.#references, ...paths]) line.resize();
     this.draw();
   }
 
   paint(palette: Palette): void {
+    this.#palette = palette;
     const { background, controllers, reference, highlight, grid } = palette;
-    controllers.forEach((colour, k) => {
-      this.#paths[k].paint(colour, mixed(colour, background, 0.68));
-      paintVehicle(this.#vehicles[k], colour, highlight, reference);
+    const colours = this.#shown.colours.map(vehicleColour);
+    for (const { controller, vehicle, path, mesh } of this.#drawings) {
+      const colour = colours[vehicle] ?? controllers[controller];
+      path.paint(colour, mixed(colour, background, LATER));
+      paintVehicle(mesh, colour, highlight, reference);
+    }
+    this.#references.forEach((line, vehicle) => {
+      const own = this.#shown.referenceColours[vehicle];
+      const colour = own ? mixed(vehicleColour(own), reference, FAINT) : reference;
+      line.paint(colour, mixed(colour, background, own ? LATER : 0.3));
     });
-    this.#reference.paint(reference, mixed(reference, background, 0.3));
     this.#target.paint(reference);
     this.#waypoints.paint(reference);
     this.#grid.paint(grid);
@@ -160,8 +209,10 @@ export class Scene {
   /** Other runs, or others of them. */
   set(shown: Shown): void {
     this.#shown = shown;
-    const seen = shown.tracks.flatMap((track) => (track ? [track.path] : []));
-    const held = [...seen, ...(shown.reference ? [shown.reference] : []), shown.waypoints];
+    this.#provide(shown.tracks, shown.references.length);
+    const seen = shown.tracks.flat().map(({ path }) => path);
+    const references = shown.references.filter((one) => one !== undefined);
+    const held = [...seen, ...references, shown.waypoints];
     const tight = boxOf(held, 0);
     const [largest, second] = extents(tight);
     this.#length = Math.max(OF_LARGEST * largest, OF_SECOND * second, LENGTH * shown.ell);
@@ -170,35 +221,43 @@ export class Scene {
     this.#scale = 1 / extents(this.#box)[0];
     this.#middle = this.#box.low.map((low, k) => (low + this.#box.high[k]) / 2) as Vector;
     this.#rows = 1;
-    this.#paths.forEach((line, k) => {
-      const track = shown.tracks[k];
-      line.mesh.visible = this.#vehicles[k].visible = track !== undefined;
+    for (const { controller, vehicle, path, mesh } of this.#drawings) {
+      const track = shown.tracks[controller]?.[vehicle];
+      path.mesh.visible = mesh.visible = track !== undefined;
       if (track) {
-        line.place(this.#sampled(track.path));
+        path.place(this.#sampled(track.path));
         this.#rows = Math.max(this.#rows, track.path.length / 3);
       }
+    }
+    this.#references.forEach((line, vehicle) => {
+      const points = shown.references[vehicle];
+      line.mesh.visible = points !== undefined;
+      if (points) line.place(this.#sampled(points));
     });
-    this.#reference.mesh.visible = this.#target.mesh.visible = shown.reference !== undefined;
-    if (shown.reference) this.#reference.place(this.#sampled(shown.reference));
+    this.#target.mesh.visible = references.length > 0;
     this.#waypoints.place(this.#crosses(shown.waypoints));
+    if (this.#palette) this.paint(this.#palette);
     this.show(this.#row);
   }
 
   /** The vehicles as they are in a row. */
   show(row: number): void {
     this.#row = Math.max(0, Math.min(row, this.#rows - 1));
-    const { tracks, reference } = this.#shown;
-    tracks.forEach((track, k) => {
-      if (!track) return;
+    const { tracks, references } = this.#shown;
+    for (const { controller, vehicle, path, mesh } of this.#drawings) {
+      const track = tracks[controller]?.[vehicle];
+      if (!track) continue;
       // A run that failed has fewer rows.
       const last = track.path.length / 3 - 1;
-      this.#paths[k].progress = last > 0 ? this.#row / last : 1;
-      this.#pose(this.#vehicles[k], track, Math.min(this.#row, last));
-    });
-    if (reference) {
-      const at = 3 * Math.min(this.#row, reference.length / 3 - 1);
-      this.#target.place(this.#placed(reference[at], reference[at + 1], reference[at + 2]));
+      path.progress = last > 0 ? this.#row / last : 1;
+      this.#pose(mesh, track, Math.min(this.#row, last));
     }
+    const targets = references.flatMap((points) => {
+      if (!points) return [];
+      const at = 3 * Math.min(this.#row, points.length / 3 - 1);
+      return this.#placed(points[at], points[at + 1], points[at + 2]);
+    });
+    this.#target.place(targets);
     this.draw();
   }
 

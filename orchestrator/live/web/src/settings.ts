@@ -25,16 +25,32 @@ export interface Settings {
   readonly edits: Readonly<Record<number, Edit>>;
   /** Labels of controllers that are not shown. */
   readonly hidden: readonly string[];
+  /** The vehicle that charts, indices and sliders are of. */
+  readonly vehicle: string;
 }
 
 export function presetOf(data: Data, name: string): Preset | undefined {
   return data.presets.find((preset) => preset.name === name);
 }
 
+/** The names of a preset's vehicles. */
+export function fleetOf(preset: Preset): readonly string[] {
+  return preset.loops[0].vehicles.map(({ name }) => name);
+}
+
 /** A preset as it is. */
 export function untouched(preset: Preset): Settings {
   const { name, stopTime, step, events } = preset;
-  return { preset: name, values: {}, stopTime, step, events, edits: {}, hidden: [] };
+  return {
+    preset: name,
+    values: {},
+    stopTime,
+    step,
+    events,
+    edits: {},
+    hidden: [],
+    vehicle: fleetOf(preset)[0],
+  };
 }
 
 /** All parameters that a preset's loops have, each once; the first loop's values count. */

@@ -43,7 +43,8 @@ export class Engine {
    * Throws `Refusal`, whose message is the FMU's own line, if a value or a time is not usable.
    */
   run(loop: LoopData, values: Values, options: Options): Result {
-    const experiment = new Experiment(options.stopTime, options.step, this.data.mostSteps);
+    const mostSteps = Math.floor(this.data.mostSteps / loop.vehicles.length);
+    const experiment = new Experiment(options.stopTime, options.step, mostSteps);
     const simulation = new Simulation(this.machine, this.data, loop, values, experiment);
     try {
       return simulation.result(options.events ?? [], options.spare);
@@ -63,6 +64,8 @@ class Simulation {
   private readonly refusals: string[] = [];
   private readonly instances = new Map<string, Instance>();
   private readonly row: Row;
+  /** FMUs by the names of the components. */
+  private readonly components: ReadonlyMap<string, string>;
 
   constructor(
     private readonly machine: Machine,
@@ -71,6 +74,7 @@ class Simulation {
     values: Values,
     private readonly experiment: Experiment,
   ) {
+    this.components = new Map(Object.entries(loop.components));
     for (const parameter of loop.parameters) this.take(parameter, values[parameter.name]);
     this.row = new Row(machine, loop, data.fmus);
     for (const [name, value] of Object.entries(this.parameters)) {
@@ -108,7 +112,7 @@ class Simulation {
     if (!fits) throw new Refusal(`${name} = ${value}: not a value of type ${type}`);
     this.parameters[name] = value;
     if (Object.is(value, parameter.default)) return;
-    const [component, port] = parted(name);
+    const [component, port] = parted(name, this.components);
     const values = this.given.get(component) ?? new Map<string, Value>();
     this.given.set(component, values.set(port, value));
   }
@@ -164,8 +168,8 @@ class Simulation {
     );
     for (const { connections } of this.loop.initial) {
       for (const [target, source] of connections) {
-        const [component, port] = parted(source);
-        if ((turn.get(component) ?? 0) < (turn.get(parted(target)[0]) ?? 0)) continue;
+        const [component, port] = parted(source, turn);
+        if ((turn.get(component) ?? 0) < (turn.get(parted(target, turn)[0]) ?? 0)) continue;
         const value = Number(this.instances.get(component)?.read(port));
         if (Number.isFinite(value)) this.row.values[this.row.column(source)] = value;
       }

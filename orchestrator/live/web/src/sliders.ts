@@ -1,5 +1,7 @@
 // Which parameters have sliders, under which headings, and how positions stand for values.
 
+import type { VehicleData } from "./types";
+
 /** Positions of a slider, from 0. */
 export const POSITIONS = 1000;
 
@@ -124,6 +126,21 @@ export const GROUPS: readonly Group[] = [
     ],
   },
 ];
+
+/** The same slider for the components of a vehicle; above they have the names of a single one. */
+export function of(vehicle: VehicleData, slider: Slider): Slider {
+  const names = { ...vehicle, plant: vehicle.vehicle };
+  const named = (text: string) =>
+    text.replace(/\b(plant|controller|planner|disturbance)(?=\.)/, (role) => {
+      return names[role as keyof typeof names];
+    });
+  const { spoken } = slider;
+  return {
+    ...slider,
+    names: slider.names.map(named),
+    ...(spoken === undefined ? {} : { spoken: named(spoken) }),
+  };
+}
 
 /** The value at a position, with no more digits than the position tells apart. */
 export function valueAt(scale: Scale, position: number): number {

@@ -23,9 +23,41 @@ export function property(name: string): string {
   return found;
 }
 
-function colour(name: string): Colour {
-  const text = property(name);
+/** The colour that `#rrggbb` is. */
+function parsed(text: string): Colour {
   return [1, 3, 5].map((i) => Number.parseInt(text.slice(i, i + 2), 16) / 255) as unknown as Colour;
+}
+
+function colour(name: string): Colour {
+  return parsed(property(name));
+}
+
+export function mixed(a: Colour, b: Colour, share: number): Colour {
+  return a.map((value, k) => value + (b[k] - value) * share) as unknown as Colour;
+}
+
+/** A vehicle's colour, lighter where the page is dark. */
+export function vehicleColour(text: string): Colour {
+  return mixed(parsed(text), [1, 1, 1], Number.parseFloat(property("--lighter")) / 100);
+}
+
+/** How much nearer to the text's the second controller's colour is, where both have a vehicle's. */
+const SECOND = 0.35;
+
+/** Has the lines of all controllers in a vehicle's colour; undefined: each in its own. */
+export function colourLines(text: string | undefined): void {
+  known.clear();
+  const { style } = document.documentElement;
+  for (const [name, share] of Object.entries({ "--first": 0, "--second": SECOND })) {
+    if (text === undefined) style.removeProperty(name);
+    else style.setProperty(name, written(mixed(vehicleColour(text), colour("--text"), share)));
+  }
+  known.clear();
+}
+
+function written(colour: Colour): string {
+  const parts = colour.map((part) => Math.round(255 * part).toString(16));
+  return `#${parts.map((part) => part.padStart(2, "0")).join("")}`;
 }
 
 export function palette(): Palette {

@@ -87,17 +87,34 @@ export interface Stage {
   readonly components: readonly string[];
 }
 
-/** A vehicle with its controller, ready to be run. */
+/** A vehicle: its components by their roles; what it lacks has a name that no component has. */
+export interface VehicleData {
+  readonly name: string;
+  readonly vehicle: string;
+  readonly controller: string;
+  readonly planner: string;
+  readonly disturbance: string;
+  /** What commands the actuators of a vehicle that takes no tau. */
+  readonly allocation: string;
+}
+
+/** Vehicles with their controllers, ready to be run. */
 export interface LoopData {
   /** For legends: `proposed`, `PD`, ... */
   readonly label: string;
   /** The scenario that `auv-fmu run` knows it by; absent: it has none of its own. */
   readonly scenario?: string;
+  /** At least one. */
+  readonly vehicles: readonly VehicleData[];
   /** FMUs by the names of the components, in the order of the table's columns. */
   readonly components: Readonly<Record<string, string>>;
   /** Entries of a scenario file with this loop. */
   readonly head: {
     readonly order: string | readonly string[] | null;
+    /** How many times the scenario has the closed loop; null: once, without names of vehicles. */
+    readonly vehicles: number | null;
+    /** Components that the scenario takes out of the closed loop. */
+    readonly absent: readonly string[];
     /** Empty: all components. */
     readonly only: readonly string[];
     readonly wires: Readonly<Record<string, string | boolean>>;
@@ -128,6 +145,10 @@ export interface Preset {
   readonly loops: readonly LoopData[];
   /** Places of the loops, in the order in which they are drawn. */
   readonly drawn: readonly number[];
+  /** A colour for each of several vehicles, `#rrggbb`; of a single one, none. */
+  readonly colours: readonly string[];
+  /** The same for their references: a grey where several vehicles follow the same one. */
+  readonly references: readonly string[];
 }
 
 /** Units as they are printed, by the members of a group; a single number has the member `""`. */
@@ -145,7 +166,7 @@ export interface IndexData {
 export interface Data {
   /** The preset that is shown first. */
   readonly opened: string;
-  /** Rows of more steps than this do not fit into a page. */
+  /** Rows of more steps than this, of all vehicles together, do not fit into a page. */
   readonly mostSteps: number;
   /** T_L of section 4.2 [s]. */
   readonly lastSeconds: number;

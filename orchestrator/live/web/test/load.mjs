@@ -28,7 +28,7 @@ const gains = [
   parameter("controller.eps_t", 10, { default: 1 }),
   parameter("controller.K1[1]", 10),
 ];
-const vehicle = [
+const ofPlant = [
   parameter("plant.noise.std", 0.001),
   parameter("plant.roll", true, { type: "Boolean" }),
   parameter("plant.integrator", "euler", { type: "String", choices: ["euler", "rk4"] }),
@@ -60,13 +60,22 @@ const components = (controller) => ({
   disturbance: "DisturbanceGenerator",
   planner: "MotionPlanner",
 });
+const vehicle = (prefix) => ({
+  name: prefix ? prefix.slice(0, -1) : "plant",
+  vehicle: `${prefix}plant`,
+  controller: `${prefix}controller`,
+  planner: `${prefix}planner`,
+  disturbance: `${prefix}disturbance`,
+  allocation: "",
+});
 const loop = (label, controller, more) => ({
   label,
+  vehicles: [vehicle("")],
   components: components(controller),
-  head: { order: null, only: [], wires: {} },
+  head: { order: null, vehicles: null, absent: [], only: [], wires: {} },
   initial: [],
   stages: [],
-  parameters: [...gains, ...vehicle],
+  parameters: [...gains, ...ofPlant],
   events,
   ...more,
 });
@@ -83,13 +92,52 @@ export const preset = {
   loops: [
     loop("proposed", "ObserverController", {
       scenario: "fault",
-      parameters: [...gains, parameter("controller.k_d", 50), ...vehicle],
+      parameters: [...gains, parameter("controller.k_d", 50), ...ofPlant],
     }),
     loop("PD", "PdController", {
-      head: { order: "jacobi", only: [], wires: { "controller.dy": "plant.dy" } },
+      head: {
+        order: "jacobi",
+        vehicles: null,
+        absent: [],
+        only: [],
+        wires: { "controller.dy": "plant.dy" },
+      },
     }),
   ],
   drawn: [0, 1],
+  colours: [],
+  references: [],
+};
+
+const ofEach = (name) =>
+  ["auv1", "auv2"]
+    .flatMap((prefix) =>
+      [...gains, ...ofPlant].map((one) => ({ ...one, name: `${prefix}.${one.name}` })),
+    )
+    .concat(parameter(`${name}.count`, 2));
+
+/** The same of two vehicles and a leader that is no part of them. */
+export const fleet = {
+  ...preset,
+  name: "fleet",
+  events: "",
+  loops: [
+    loop("PD", "PdController", {
+      vehicles: [vehicle("auv1."), vehicle("auv2.")],
+      components: {
+        "auv1.plant": "AuvPlant",
+        "auv1.controller": "PdController",
+        "auv2.plant": "AuvPlant",
+        leader: "PathPlanner",
+      },
+      head: { order: null, vehicles: 2, absent: ["auv2.disturbance"], only: [], wires: {} },
+      parameters: ofEach("leader"),
+      events: {},
+    }),
+  ],
+  drawn: [0],
+  colours: ["#0072B2", "#D55E00"],
+  references: ["#0072B2", "#D55E00"],
 };
 export const data = {
   opened: "fault",
@@ -97,6 +145,6 @@ export const data = {
   lastSeconds: 5,
   units: { e: {}, tau: {}, dy: {}, theta_hat: {} },
   fmus: {},
-  presets: [preset],
+  presets: [preset, fleet],
   indices: [],
 };

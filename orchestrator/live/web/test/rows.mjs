@@ -19,7 +19,9 @@ for (const { name, stopTime, step, events, loops } of content.presets) {
       failure,
       remark,
       messages,
-      metrics: metrics(result, content.lastSeconds),
+      metrics: loop.vehicles.map((vehicle) =>
+        metrics(result, vehicle, loop.vehicles, content.lastSeconds),
+      ),
     };
   }
 }

@@ -1,11 +1,14 @@
 // Settings, the link and the command line, against texts written out.
 import assert from "node:assert/strict";
 import test from "node:test";
-import { data, load, preset } from "./load.mjs";
+import { data, fleet, load, preset } from "./load.mjs";
 
 const { fromHash, toHash } = await load("link");
 const { untouched, withEdit, withValues, eventsOf } = await load("settings");
 const { commandLine, toToml } = await load("command");
+const { parted } = await load("events");
+const { names } = await load("field");
+const { GROUPS, of } = await load("sliders");
 
 const start = untouched(preset);
 
@@ -190,6 +193,62 @@ planner = "MotionPlanner"
 END
 auv-fmu run fault-PD.toml`,
   );
+});
+
+test("a name is parted after the longest component that it begins with", () => {
+  const components = new Set(["auv1.plant", "leader", "auv1"]);
+  assert.deepEqual(parted("auv1.plant.eta.x", components), ["auv1.plant", "eta.x"]);
+  assert.deepEqual(parted("leader.waypoint[1].x", components), ["leader", "waypoint[1].x"]);
+  assert.deepEqual(parted("auv1.eta.x", components), ["auv1", "eta.x"]);
+});
+
+test("a message names a parameter of one vehicle, and not the one of another", () => {
+  const said = "auv1.plant: m11 = -1: must be at least 1e-09";
+  assert.ok(names(said, "auv1.plant.m11"));
+  assert.ok(!names(said, "auv2.plant.m11"));
+  assert.ok(!names(said, "auv1.plant.m1"));
+  assert.ok(names("plant: m11 = -1", "plant.m11"));
+  assert.ok(names("auv1.plant.m11: not a number", "auv1.plant.m11"));
+});
+
+test("sliders set the parameters of their vehicle", () => {
+  const rows = GROUPS.flatMap((group) => group.rows);
+  const [own, other] = [preset, fleet].map(({ loops }) => loops[0].vehicles.at(-1));
+  for (const row of rows) {
+    assert.deepEqual(of(own, row), row);
+    assert.deepEqual(
+      of(other, row).names,
+      row.names.map((name) => `auv2.${name}`),
+    );
+  }
+  const spoken = rows.map((row) => of(other, row).spoken).filter(Boolean);
+  assert.ok(spoken.includes("limits of auv2.plant.tau.u"));
+});
+
+test("a link names a vehicle that is not the first", () => {
+  const begin = untouched(fleet);
+  assert.equal(toHash(begin, data), "#preset=fleet");
+  const changed = withValues({ ...begin, vehicle: "auv2" }, fleet, { "auv2.controller.eps_t": 3 });
+  const hash = toHash(changed, data);
+  assert.equal(hash, "#preset=fleet&auv2.controller.eps_t=3&vehicle=auv2");
+  assert.deepEqual(fromHash(hash, data), { settings: changed, unknown: [] });
+  assert.deepEqual(fromHash("#preset=fleet&vehicle=auv9", data), {
+    settings: begin,
+    unknown: ["vehicle=auv9"],
+  });
+});
+
+test("vehicles without a scenario are a scenario file with their number", () => {
+  const text = commandLine({ ...untouched(fleet), stopTime: 50 }, fleet, fleet.loops[0]);
+  const wanted = [
+    "stop_time = 50",
+    "vehicles = 2",
+    '"auv2.plant" = "AuvPlant"',
+    'leader = "PathPlanner"',
+    '"auv2.disturbance" = false',
+    '"auv1.controller.eps_t" = 10',
+  ];
+  for (const line of wanted) assert.ok(text.split("\n").includes(line), line);
 });
 
 test("all actions have their word in a scenario file", () => {
