@@ -7,7 +7,7 @@ stages a step has, which parameters a comparison shares, and to which inputs an 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import asdict, replace
 from functools import cache
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -45,11 +45,7 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
 from orchestrator.vehicle.indices import metrics
-from orchestrator.vehicle.reducers import (
-    LAST_SECONDS,
-    SMALLEST_DISTANCE,
-    SMALLEST_DISTANCE_LABEL,
-)
+from orchestrator.vehicle.reducers import LAST_SECONDS, SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
@@ -110,7 +106,7 @@ def page_data(opened: str) -> Plain:
     for run in both:
         # What an FMU refuses is refused here, before there is a page.
         run.run([])
-    others = [preset(name) for name in offered() if name != first["name"]]
+    others = [preset(name) for name in names() if name != first["name"]]
     return {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
@@ -125,11 +121,6 @@ def page_data(opened: str) -> Plain:
         ]
         + [_TOGETHER],
     }
-
-
-def offered() -> list[str]:
-    """The scenarios of the bundle that the page has."""
-    return [*names()]
 
 
 def _printed(units: Members) -> dict[str, str]:
@@ -275,14 +266,7 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
 
 
 def _vehicle(loop: Loop) -> dict[str, str]:
-    return {
-        "name": loop.name,
-        "vehicle": loop.vehicle,
-        "controller": loop.controller,
-        "planner": loop.planner,
-        "disturbance": loop.disturbance,
-        "allocation": loop.allocation if isinstance(loop, AllocatedLoop) else "",
-    }
+    return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
 def _stage(names: Sequence[str], connections: Iterable[Connection]) -> Plain:

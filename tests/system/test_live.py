@@ -25,6 +25,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
 from orchestrator.runs import bundle
 from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.scenario import names
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
 from support.live import TOLERANCE, needs_npm, needs_zig
@@ -48,7 +49,7 @@ SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 #: Changes of settings, each from the ones before it: all scenarios, then events and a path in
 #: others, and other values.
 CHANGES: list[dict[str, Any]] = [
-    *({"preset": name} for name in presets.offered()),
+    *({"preset": name} for name in names()),
     {"preset": "path", "events": "fault-sensor", "planner.waypoint[2].z": 2.5},
     {"preset": "fig4", "events": "fault-thruster", "stop_time": 70.0, "plant.noise.seed": 7},
     {"events": "", "stop_time": 10.01, "controller.saturation": "algebraic", "plant.roll": False},
@@ -104,7 +105,7 @@ def opened(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bro
         yield found
 
 
-@pytest.mark.parametrize("name", presets.offered())
+@pytest.mark.parametrize("name", names())
 def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows: Rows):
     """Of a scenario and of what it is compared with."""
     for i, run in enumerate(runs_of(name)):
@@ -144,7 +145,7 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
     for room in ("runs.loading", "runs.preparation"):
         monkeypatch.setattr(f"orchestrator.{room}.current_fmus", lambda *_: fmus)
     monkeypatch.setattr(presets, "_check", lambda _: None)
-    for name in presets.offered():
+    for name in names():
         for i, run in enumerate(presets.runs_of(name)):
             table = Table()
             ending = run.run([table])
