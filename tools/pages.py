@@ -6,9 +6,10 @@ against it. Pages are written by hand except what stands between `<!-- filled: N
 
 `parts` has the long texts. The other tools compute what takes minutes:
 `accuracy.py` prints the tables of docs/explanation/accuracy.md, `study_numbers.py` and
-`best_gains.py` the numbers below the figures of docs/explanation/ready-studies.md. `pictures.py`
-draws those figures and the ones of the scenarios, `benchmarks_page.py` fills in
-docs/reference/benchmarks.md, and `reference.py` writes `reference`.
+`best_gains.py` the numbers below the figures of docs/explanation/ready-studies.md, and
+`remus_numbers.py` those of docs/explanation/remus.md. `pictures.py` draws the figures of studies and
+scenarios, `benchmarks_page.py` fills in docs/reference/benchmarks.md, and `reference.py` writes
+`reference`.
 """
 
 from __future__ import annotations
