@@ -63,11 +63,6 @@ static double same_atan2(double y, double x) {
     return same_atan(y / x) + (x > 0.0 ? 0.0 : y < 0.0 ? -2.0 * HALF_PI : 2.0 * HALF_PI);
 }
 
-static double same_pow(double x, double y) {
-    if (y == 0.0 || x == 1.0) return 1.0;
-    return x > 0.0 ? same_exp(y * same_log(x)) : 0.0;
-}
-
 static double same_asin(double x) { return same_atan2(x, sqrt(1.0 - x * x)); }
 
 #define asin same_asin
