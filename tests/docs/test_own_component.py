@@ -58,7 +58,8 @@ def network(path: Path) -> None:
     onnx.save(make.make_model(graph, ir_version=8), str(path))
 
 
-@pytest.fixture(scope="module")
+# Once in a process: the page makes a module that is then known, and refuses a second of its name.
+@pytest.fixture(scope="session")
 def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A folder in which everything on the page was done, and what was printed."""
     folder, said = tmp_path_factory.mktemp("component"), io.StringIO()
