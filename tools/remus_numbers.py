@@ -8,6 +8,7 @@ limit, in pitch and yaw [%], the largest command in yaw [N.m], and the mean rate
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Mapping
 from typing import Any
 
@@ -73,6 +74,7 @@ def _numbers(scenario: str, changes: Mapping[str, Any]) -> str:
 
 def main() -> None:
     """Print all lines."""
+    argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     heading = f"{'first':>6}{'late':>6}{'q':>4}{'r':>4}{'yaw':>7}{'rate':>6}"
     print(f"{'changed':42}{heading}  |{heading}")
     for name, changes in _CHANGES.items():
