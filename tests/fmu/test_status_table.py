@@ -69,18 +69,18 @@ def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
 #: What stands for the others in the fast tests: every kind, and every one of the representatives.
 FAST = set(zip((*FIXTURES, FMI3), cycle(REPRESENTATIVES), strict=False))
 
-#: All components share what answers. So each cell is tried with both representatives, and with one
-#: of the others in turn.
-OTHERS = [name for name in NAMES if name not in REPRESENTATIVES]
+# All components share what answers. So each cell is tried with a representative of each kind, and
+# with one of the others in turn.
 
 
 def having(kind: str, place: Place, turn: int) -> Iterator[str]:
     """The components that a cell is tried with."""
     key, state = place
     able = [name for name in NAMES if not state or has_call(name, key)]
-    yield from (name for name in REPRESENTATIVES if name in able)
-    others = [name for name in (*OTHERS[turn % len(OTHERS) :], *OTHERS) if name in able]
-    yield from others[:1] if kind != FMI3 else ()
+    yield from (name for name in able if (kind, name) in FAST)
+    others = REPRESENTATIVES if kind == FMI3 else NAMES
+    ordered = [others[(turn + i) % len(others)] for i in range(len(others))]
+    yield from [name for name in ordered if name in able and (kind, name) not in FAST][:1]
 
 
 #: Kinds, components, and the cells that they have.
