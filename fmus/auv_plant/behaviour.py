@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple, TypedDict
 
 from auv_fmu import plant
-from auv_fmu.actuators import limit
 from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.plant import Parameters, PlantState
 from auv_fmu.vectors import Rotation, Vector3, Vector6
@@ -13,9 +12,6 @@ from fmus.ports.port import Refusal
 
 #: By how much the square of the length of a normalised quaternion is off.
 _ROUNDING = 2e-12
-
-#: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
-_MOST_DEVIATIONS = 9.0
 
 
 class Inputs(NamedTuple):
@@ -101,16 +97,10 @@ def expected(parameters: Parameters, state: PlantState, outputs: Outputs) -> Out
     if not parameters.roll.rolls:
         _check_level(state, rotation)
     seen = _seen(parameters, state, rotation)
-    most = _MOST_DEVIATIONS * parameters.noise.std
-    y, noisy = seen["y"], outputs["y"]
     return {
         "eta": seen["eta"],
         "nu": seen["nu"],
-        "y": (
-            y[0] + limit(noisy[0] - y[0], -most, most),
-            y[1] + limit(noisy[1] - y[1], -most, most),
-            y[2] + limit(noisy[2] - y[2], -most, most),
-        ),
+        "y": plant.measurable(seen["y"], outputs["y"], parameters.noise.std),
         "dy": seen["dy"],
         "tau_applied": plant.applied(parameters, seen["tau_applied"]),
         "nu_r": seen["nu_r"],

@@ -5,13 +5,9 @@ from __future__ import annotations
 from typing import NamedTuple, TypedDict
 
 from auv_fmu import plant, remus100
-from auv_fmu.actuators import limit
 from auv_fmu.remus100 import Parameters, RemusState
 from auv_fmu.vectors import Vector3, Vector6
 from fmus.ports.port import Refusal
-
-#: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
-_MOST_DEVIATIONS = 9.0
 
 #: Largest diameter of a hull per length: near 1, Lamb's factors are differences of equal numbers.
 _THICKEST = 0.9
@@ -83,16 +79,10 @@ def expected(parameters: Parameters, state: RemusState, outputs: Outputs) -> Out
         raise Refusal("its fins or its propeller are beyond their limits")
     remus100.check_speed(state)
     seen = _seen(parameters, state)
-    most = _MOST_DEVIATIONS * parameters.noise.std
-    y, noisy = seen["y"], outputs["y"]
     return {
         "eta": seen["eta"],
         "nu": seen["nu"],
-        "y": (
-            y[0] + limit(noisy[0] - y[0], -most, most),
-            y[1] + limit(noisy[1] - y[1], -most, most),
-            y[2] + limit(noisy[2] - y[2], -most, most),
-        ),
+        "y": plant.measurable(seen["y"], outputs["y"], parameters.noise.std),
         "dy": seen["dy"],
         "tau_applied": seen["tau_applied"],
         "nu_r": seen["nu_r"],

@@ -33,6 +33,9 @@ ETA_0: Vector6 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
 #: Initial velocity (u, v, w, p, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
 NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
+#: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
+_MOST_DEVIATIONS = 9.0
+
 _NO_FORCE = (0.0, 0.0, 0.0)
 _STILL = (0.0, 0.0, 0.0)
 
@@ -467,3 +470,17 @@ def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
 
     """
     return plus_scaled(y, std, n)
+
+
+def measurable(y: Vector3, measured: Vector3, std: float) -> Vector3:
+    """The measurement of y that is nearest to another one: as far off as noise can be.
+
+    Args:
+        y: control point [m], earth frame.
+        measured: what it is said to have been measured as [m].
+        std: standard deviation of each axis [m].
+
+    """
+    most = _MOST_DEVIATIONS * std
+    noise = limit_all(difference(measured, y), (-most, -most, -most), (most, most, most))
+    return total(y, noise)
