@@ -279,6 +279,37 @@ def test_what_fmus_say_and_how_a_run_ends_is_shown_without_an_alarm(opened, chro
     assert not opened.run("document.body.classList.contains('refused')")
 
 
+def test_a_chart_that_comes_into_sight_shows_the_time_that_the_others_show(opened):
+    """Also where it was drawn at another time."""
+    opened.resize(1280, 500)
+    last = "[...document.querySelectorAll('#series .chart')].filter((it) => !it.hidden).at(-1)"
+    value, scroll = f"{last}.querySelector('.value').textContent", f"{last}.scrollIntoView()"
+    opened.run(scroll)
+    opened.wait(f"{value} !== ''")
+    at_end = opened.run(value)
+    opened.run("scrollTo(0, 0)")
+    opened.wait("scrollY === 0")
+    time = "document.getElementById('time')"
+    opened.run(f"{time}.value = 200; {time}.dispatchEvent(new Event('input'))")
+    opened.wait("document.getElementById('now').textContent === '20.0 s'")
+    opened.run(scroll)
+    opened.wait(f"{value} !== {at_end!r}")
+    header, table = rows(opened.run(CSV))
+    known = table[np.isclose(table[:, 0], 20.0), header.index("controller.theta_hat[4]")]
+    assert float(opened.run(value).replace("\N{MINUS SIGN}", "-")) == pytest.approx(known[0], rel=5e-3)
+
+
+def test_remark_says_that_its_numbers_are_those_of_the_preset(opened):
+    head = "document.getElementById('remark-head').hidden"
+    faded = "document.querySelector('.outdated') !== null"
+    assert opened.run(f"[{head}, {faded}]") == [True, False]
+    for change in ('{"controller.k_d": 60}', '{preset: "fault-sensor", "events.1.at": 20}'):
+        opened.run(f"auvfmu.set({change})")
+        opened.wait(f"!{head} && {faded}")
+        opened.run("document.getElementById('reset-all').click()")
+        opened.wait(f"{head} && !{faded}")
+
+
 def test_wrong_time_of_an_event_stays_marked_until_it_is_reset(opened):
     opened.run('auvfmu.set({preset: "fault-thruster"})')
     opened.run(f"{EVENT}.closest('details').open = true")

@@ -46,6 +46,19 @@ export function short(value: number): string {
   return value.toFixed(digits).replace("-", "−");
 }
 
+/** A number on an axis: all its digits, and few characters. */
+export function tick(value: number): string {
+  const rounded = Number(value.toPrecision(6));
+  const size = Math.abs(rounded);
+  const isLong = size !== 0 && (size < 1e-4 || size >= 1e5);
+  const text = isLong ? rounded.toExponential().replace("e+", "e") : rounded.toString();
+  return text.replaceAll("-", "−");
+}
+
+function longestOf(texts: readonly string[]): number {
+  return Math.max(0, ...texts.map(({ length }) => length));
+}
+
 class Chart {
   readonly root: HTMLElement;
   readonly #panel: Panel;
@@ -95,7 +108,9 @@ class Chart {
     new IntersectionObserver(
       ([{ isIntersecting }]) => {
         this.#visible = isIntersecting;
-        if (isIntersecting && this.#stale) this.#redraw();
+        if (!isIntersecting || this.root.hidden) return;
+        if (this.#stale) this.#redraw();
+        else this.#point();
       },
       { rootMargin: "60px" },
     ).observe(this.root);
@@ -131,10 +146,10 @@ class Chart {
         { ...axis, size: TIME_AXIS, space: 55 },
         {
           ...axis,
-          size: VALUE_AXIS,
+          // Labels come as null before there are any.
+          size: (_, labels) => Math.max(VALUE_AXIS, 12 + 6 * longestOf(labels ?? [])),
           space: 26,
-          values: (_, found) =>
-            found.map((value) => Number(value.toPrecision(6)).toString().replace("-", "−")),
+          values: (_, found) => found.map(tick),
         },
       ],
       series: [
@@ -256,7 +271,7 @@ class Chart {
     this.root.classList.remove("pending");
     const empty = new Float64Array(0);
     this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
-    this.show(this.#time);
+    this.#point();
   }
 
   /** Begins at another time [s], so that small values can be seen once large ones are over. */
@@ -273,10 +288,14 @@ class Chart {
 
   show(time: number): void {
     this.#time = time;
-    if (!this.#visible || this.root.hidden || this.#stale) return;
-    const left = this.#plot.valToPos(time, "x");
+    if (this.#visible && !this.root.hidden && !this.#stale) this.#point();
+  }
+
+  /** Puts the cursor and the values at the time that is shown. */
+  #point(): void {
+    const left = this.#plot.valToPos(this.#time, "x");
     this.#plot.setCursor({ left: Number.isFinite(left) ? left : -10, top: 0 }, false);
-    const row = rowAt(this.#lines.time, time);
+    const row = rowAt(this.#lines.time, this.#time);
     this.#lines.values.forEach((values, k) => {
       this.#values[k].textContent = values?.length
         ? short(values[Math.min(row, values.length - 1)])

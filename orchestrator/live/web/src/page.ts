@@ -332,10 +332,13 @@ export class Page {
     const slider = element<HTMLInputElement>("stop-slider");
     slider.value = String(stopTime);
     slider.setAttribute("aria-valuetext", `${stopTime} s`);
-    const { vehicle } = this.#settings;
-    const own = toHash({ ...untouched(preset), vehicle }, this.#data);
+    const { hidden, vehicle } = this.#settings;
+    const own = toHash({ ...untouched(preset), hidden, vehicle }, this.#data);
     const isTouched = toHash(this.#settings, this.#data) !== own;
     element("reset-all").hidden = !isTouched;
+    // The remark gives numbers of the preset's own run.
+    element("remark-head").hidden = !isTouched;
+    element("remark").classList.toggle("outdated", isTouched);
   }
 
   #draw(): void {

@@ -4,6 +4,7 @@ import test from "node:test";
 import { load } from "./load.mjs";
 
 const { valueAt, positionOf, POSITIONS } = await load("sliders");
+const { tick } = await load("charts");
 const { boxOf, distanceFor, drawn, eyeAxes, rotation, ticks } = await load("space");
 
 const near = (found, wanted, tolerance = 1e-12) =>
@@ -87,4 +88,10 @@ test("the eye stands so far away that a cube just fits", () => {
       [0, 0, 1],
     ],
   );
+});
+
+test("labels of an axis are short, differ, and lose no digit", () => {
+  const labels = [0, 1, -0.5, 99999, 1e5, -1e6, 1.5e6, 2e9, 2.5e-5, 0.001].map(tick);
+  const wanted = ["0", "1", "−0.5", "99999", "1e5", "−1e6", "1.5e6", "2e9", "2.5e−5", "0.001"];
+  assert.deepEqual(labels, wanted);
 });
