@@ -9,6 +9,9 @@ Files change all at once. When all are whole and on the disk, the ledger says th
 places: from then on they are what the folder holds. If the process is killed meanwhile, the next
 one that writes goes on with it, and one that only reads looks where they are.
 
+Where that fails on the way, all files are where they were before. A ledger is believed only if it
+belongs to the user or to the owner of the folder that the file is in.
+
 Only the process that has locked the folder may use its ledger.
 """
 
@@ -28,7 +31,7 @@ from uuid import uuid4
 
 from orchestrator.machine.disk import sealed, unsealed, write_new, write_whole
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.operating_system import rename_to_new, sync_to_disk
+from orchestrator.machine.operating_system import is_mine, rename_to_new, sync_to_disk
 
 #: The ledger of a folder; what is being written there begins with the same letters.
 LEDGER, _UNFINISHED = ".auv-fmu.json", ".auv-fmu-"
@@ -38,6 +41,12 @@ RECORD = "run.json"
 
 #: So many folders above a file may hold the ledger that names it.
 _DEPTH = 4
+
+#: Largest ledger that is read [bytes]: it has some 150 for each file.
+_LARGEST = 64 * 2**20
+
+#: Files that make room for new ones, within the folder of what is being written.
+_EARLIER = ".earlier"
 
 #: Names and digests.
 Digests = dict[str, str]
@@ -76,6 +85,7 @@ class Ledger:
         self.token, self._files = found.identity, found.files
         self._moving, self._leaving = found.moving, found.leaving
         self.unfinished = folder / f"{_UNFINISHED}{self.token}"
+        self._earlier = self.unfinished / _EARLIER
         self._partial = folder / f"{_UNFINISHED}{self.token}.json"
         if self._moving:
             self._take_places()
@@ -135,7 +145,7 @@ class Ledger:
                     self._remove()
 
     def publish(self, old: Iterable[str] = ()) -> None:
-        """Have what was written take its place; what fails before changes nothing.
+        """Move what was written to its place; on failure nothing has changed.
 
         Args:
             old: names of what goes, if it is ours, because what was written replaces it.
@@ -162,7 +172,11 @@ class Ledger:
         except OSError:
             self._moving, self._leaving = {}, []
             raise
-        self._take_places()
+        try:
+            self._take_places()
+        except OSError:
+            self._forget_moving()
+            raise
 
     @contextmanager
     def changing(self) -> Iterator[Path]:
@@ -206,13 +220,22 @@ class Ledger:
         below = self.unfinished.name
         waiting = [name for name in self._moving if _is_plain(self.folder, f"{below}/{name}")]
         self.check(waiting)
-        if RECORD in waiting:
-            (self.folder / RECORD).unlink(missing_ok=True)
-        for name in sorted(waiting, key=lambda name: (name == RECORD, name)):
-            if name == RECORD:
-                sync_to_disk(self.folder)
-            (self.folder / name).parent.mkdir(parents=True, exist_ok=True)
-            (self.unfinished / name).replace(self.folder / name)
+        earlier = [*waiting, *filter(self.owns, self._leaving)]
+        moved: list[tuple[Path, Path]] = []
+        try:
+            # The record of a result goes first and comes last: where it is, everything is.
+            for name in sorted(earlier, key=lambda name: name != RECORD):
+                if os.path.lexists(self.folder / name):
+                    _move(self.folder / name, self._earlier / name, moved)
+            for name in sorted(waiting, key=lambda name: (name == RECORD, name)):
+                if name == RECORD:
+                    sync_to_disk(self.folder)
+                _move(self.unfinished / name, self.folder / name, moved)
+        except OSError:
+            for source, target in reversed(moved):
+                target.replace(source)
+            rmtree(self._earlier, ignore_errors=True)
+            raise
         leaving, self._leaving = self._leaving, []
         self._files |= self._moving
         self._moving = {}
@@ -225,9 +248,22 @@ class Ledger:
         self._discard()
         sync_to_disk(self.folder)
 
+    def _forget_moving(self) -> None:
+        """Do not go on with files that are all back where they were."""
+        if self._earlier.exists():
+            return
+        moving, leaving = self._moving, self._leaving
+        self._moving, self._leaving = {}, []
+        try:
+            self._write()
+        except OSError:
+            # Then the next one tries again.
+            self._moving, self._leaving = moving, leaving
+
     def _read(self) -> _Content | None:
         path = self.folder / LEDGER
-        found = _content(path)
+        is_believed = not os.path.lexists(path) or _is_believed(path, self.folder)
+        found = _content(path) if is_believed else None
         # One without a byte was about to be written.
         if found is None and os.path.lexists(path) and path.lstat().st_size:
             if not self._force:
@@ -278,10 +314,17 @@ class _Content(NamedTuple):
     leaving: list[str]
 
 
+def _move(source: Path, target: Path, moved: list[tuple[Path, Path]]) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    source.replace(target)
+    moved.append((source, target))
+
+
 def _content(path: Path) -> _Content | None:
     """What a ledger says; None: it is damaged, or none of ours."""
     try:
-        if not S_ISREG(path.lstat().st_mode):
+        found = path.lstat()
+        if not S_ISREG(found.st_mode) or found.st_size > _LARGEST:
             return None
         content = _Content(**unsealed(path.read_text(encoding="utf-8")))
         names = [Path(name) for name in (*content.files, *content.moving, *content.leaving)]
@@ -294,10 +337,22 @@ def _content(path: Path) -> _Content | None:
 
 
 def _naming(path: Path) -> Iterator[tuple[Path, str, _Content | None]]:
-    """The ledgers of the folders above a file, and its name from there on."""
+    """The ledgers of the folders above a file that are believed, and its name from there on."""
     for folder in path.parents[:_DEPTH]:
-        if os.path.lexists(folder / LEDGER):
-            yield folder, path.relative_to(folder).as_posix(), _content(folder / LEDGER)
+        ledger = folder / LEDGER
+        if os.path.lexists(ledger) and _is_believed(ledger, path.parent):
+            yield folder, path.relative_to(folder).as_posix(), _content(ledger)
+
+
+def _is_believed(ledger: Path, folder: Path) -> bool:
+    """Whether a ledger belongs to the user or to the owner of a folder below it.
+
+    Anybody could put one into a folder that all can write, such as /tmp.
+    """
+    found = ledger.lstat()
+    # One that is yet to take its place may be in a folder that is not there yet.
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    return is_mine(found) or found.st_uid == nearest.stat().st_uid
 
 
 def locate(path: Path) -> Path:

@@ -57,7 +57,7 @@ def replace_files(
                 yield unfinished
                 publish(ledger)
             except (OSError, MemoryError, Taken) as error:
-                rest = _rest(unfinished, folder) if keep() else ""
+                rest = _rest(unfinished, folder) if keep() and not ledger.is_moving else ""
                 raise InputError(_cannot_write(folder, error, rest)) from error
 
 

@@ -1,4 +1,4 @@
-"""Another user of this machine can neither feed a cache nor reach a sweep."""
+"""Another user of this machine can neither feed a cache, forge a result, nor reach a sweep."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import shutil
 import socket
 import subprocess
 from collections.abc import Callable, Iterator
+from hashlib import sha256
 from pathlib import Path
 from tempfile import mkdtemp
 from uuid import uuid4
@@ -15,7 +16,8 @@ from uuid import uuid4
 import pytest
 
 from orchestrator.machine.cache import read_cached, write_cached
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import process_folder, sealed
+from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, locate
 from orchestrator.master import stepper
 from orchestrator.studies.sweep import making_runs
 from support.machine import called
@@ -140,6 +142,31 @@ def test_a_folder_cannot_be_made_before_us(open_folder, other):
     with pytest.warns(UserWarning, match="only you can write"):
         [path] = write_cached("loop", "0", {"a": b""})
     assert path.is_relative_to(process_folder())
+
+
+def test_a_ledger_of_another_user_says_nothing_of_our_files(open_folder, other):
+    """In a folder that all can write, above a file of ours that has a ledger or none."""
+    forged = {"ours/a": sha256(b"forged").hexdigest()}
+    content = {"identity": "0" * 32, "files": {}, "moving": forged, "leaving": []}
+
+    def plant() -> None:
+        waiting = open_folder / (".auv-fmu-" + "0" * 32) / "ours"
+        waiting.mkdir(parents=True)
+        (waiting / "a").write_text("forged")
+        (open_folder / LEDGER).write_text(sealed(content))
+
+    file = open_folder / "ours" / "a"
+    file.parent.mkdir()
+    file.write_text("ours")
+    assert done_by(other, plant)
+    assert locate(file) == file
+    assert not is_changed(file)
+    with pytest.raises(Taken, match="damaged or not from auv-fmu"):
+        Ledger(open_folder)
+    # A whole folder of another user's is read as it is meant.
+    for path in (open_folder, file.parent, file):
+        os.chown(path, other, other)
+    assert locate(file).read_text() == "forged"
 
 
 def test_a_sweep_cannot_be_reached(other):

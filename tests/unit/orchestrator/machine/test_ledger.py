@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.machine.disk import sealed, unsealed
-from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, move_aside
+from orchestrator.machine.ledger import LEDGER, RECORD, Ledger, Taken, is_changed, move_aside
 from orchestrator.system.names import file_name
 from support.machine import contents
 
@@ -131,6 +131,46 @@ def test_no_link_is_written_through(tmp_path: Path):
     write(tmp_path / "r", "ours", "a")
     assert (tmp_path / "precious").read_text() == "mine"
     assert (tmp_path / "r" / "a").read_text() == "ours"
+
+
+@pytest.mark.parametrize("when", range(8))
+@pytest.mark.parametrize("kept", [["a", RECORD], ["a", "b", "below/c", "new", RECORD]])
+def test_files_that_cannot_take_their_places_leave_all_as_it_was(tmp_path, monkeypatch, kept, when):
+    """Whichever rename fails; and the next one succeeds."""
+    write(tmp_path, "first", "a", "b", "below/c", RECORD)
+    before, replace, calls = contents(tmp_path), Path.replace, iter(range(99))
+
+    def failing(path: Path, target: Path) -> Path:
+        if target.name != LEDGER and next(calls) == when:
+            raise PermissionError(1, "Operation not permitted", str(path))
+        return replace(path, target)
+
+    def publish(text: str) -> None:
+        ledger = Ledger(tmp_path)
+        with ledger.writing() as unfinished:
+            for name in kept:
+                (unfinished / name).parent.mkdir(exist_ok=True)
+                (unfinished / name).write_text(text)
+            ledger.publish(["a", "b", "below/c", RECORD])
+
+    monkeypatch.setattr(Path, "replace", failing)
+    with suppress(PermissionError):
+        publish("second")
+        assert next(calls) <= when
+    monkeypatch.setattr(Path, "replace", replace)
+    assert contents(tmp_path) in (before, dict.fromkeys(kept, b"second"))
+    assert not list(tmp_path.glob(".auv-fmu-*"))
+    publish("third")
+    assert contents(tmp_path) == dict.fromkeys(kept, b"third")
+
+
+def test_a_huge_ledger_is_not_read(tmp_path: Path):
+    (tmp_path / "a").write_text("mine")
+    with (tmp_path / LEDGER).open("wb") as file:
+        file.truncate(2**40)
+    assert is_changed(tmp_path / "a")
+    with pytest.raises(Taken, match="damaged or not from auv-fmu"):
+        Ledger(tmp_path)
 
 
 @pytest.mark.slow
