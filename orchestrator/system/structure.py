@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -110,12 +111,11 @@ class System:
     def meant(self, name: PortName) -> list[PortName]:
         """The ports or groups that a name with stars means; any other name means itself."""
         for like, port in splits(str(name)) if STAR in str(name) else ():
-            components = re.compile(re.escape(like).replace(re.escape(STAR), "[^.]*"))
             starts = tuple(port + mark for mark in _MEMBER)
             found = [
                 PortName(one, port)
                 for one, component in self.components.items()
-                if components.fullmatch(one)
+                if _is_like(one, like)
                 and any(v == port or v.startswith(starts) for v in component.variables)
             ]
             if found:
@@ -349,6 +349,13 @@ def _spread(name: PortName, value: Any, n: int) -> list[Any]:
     if not (is_finite(first) and is_finite(step)):
         raise InputError(f"{name}: first and step must be finite numbers")
     return [first + step * k for k in range(n)]
+
+
+def _is_like(name: str, pattern: str) -> bool:
+    """Whether a component's name fits a pattern, whose stars stand for text without dots."""
+    # Only stars are wildcards here. Those of fnmatch take no time that grows with their number.
+    parts, patterns = name.split("."), re.sub(r"[?[]", r"[\g<0>]", pattern).split(".")
+    return len(parts) == len(patterns) and all(map(fnmatchcase, parts, patterns))
 
 
 def _several(value: object) -> list[Any] | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.component import read_component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System, flattened, renamed
+from orchestrator.system.structure import System, _is_like, flattened, renamed
 from orchestrator.system.units import Linear
 from support.archives import fmu, variable
 
@@ -170,6 +171,21 @@ def test_a_star_stands_for_a_part_of_a_component_s_name(fleet, values, k):
     assert fleet.with_parameters({port_name(n): v for n, v in values.items()}).parameters == (
         expected
     )
+
+
+@given(
+    st.text("ab?[.", max_size=9).map(lambda text: f"a{text}"),
+    st.text("ab?[.*", max_size=9),
+)
+def test_stars_stand_for_text_without_dots(name, pattern):
+    """As words of a regular expression say it."""
+    words = "".join("[^.]*" if letter == "*" else re.escape(letter) for letter in pattern)
+    assert _is_like(name, pattern) == bool(re.fullmatch(words, name))
+
+
+def test_many_stars_are_matched_at_once():
+    """With time that doubles with each star, this would not end."""
+    assert not _is_like(100 * "a", 60 * "a*" + "b")
 
 
 def test_a_list_for_a_group_of_several_components_is_of_each(fleet):
