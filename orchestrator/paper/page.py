@@ -7,11 +7,12 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from itertools import groupby, pairwise
+from itertools import chain, groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
 from string import Template
 from typing import NamedTuple
+from urllib.parse import unquote
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
@@ -126,8 +127,8 @@ def html(text: str, folder: Path) -> str:
     tokens = _MARKDOWN.parse(text)
     [title, *_] = _headings(tokens)
     _name_cells(tokens)
+    _embed_pictures(tokens, folder)
     body = _MARKDOWN.renderer.render(tokens, _MARKDOWN.options, {})
-    body = re.sub(r'src="([^":]+\.png)"', lambda picture: _embedded(folder / picture[1]), body)
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(title=title.title, body=body)
 
 
@@ -147,9 +148,21 @@ def _name_cells(tokens: Sequence[Token]) -> None:
             column += 1
 
 
-def _embedded(file: Path) -> str:
-    content = base64.b64encode(file.read_bytes()).decode()
-    return f'loading="lazy" src="data:image/png;base64,{content}"'
+def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
+    """Put the pictures of a folder into the page; of any other, only its title stays."""
+    for part in chain.from_iterable(token.children or () for token in tokens):
+        if part.type == "image":
+            file = (folder / unquote(str(part.attrGet("src")))).resolve()
+            if file.is_relative_to(folder.resolve()) and file.is_file():
+                content = base64.b64encode(file.read_bytes()).decode()
+                part.attrs |= {"loading": "lazy", "src": f"data:image/png;base64,{content}"}
+            else:
+                part.type = "text"
+
+
+def without_pictures(text: str) -> str:
+    """Somebody's Markdown, in which pictures and HTML are text: a viewer would fetch them."""
+    return text.replace("<", "&lt;").replace("![", "&#33;[")
 
 
 def errata() -> str:

@@ -19,7 +19,13 @@ from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
-from orchestrator.paper.page import escape_markdown, picture, table, values_with_units
+from orchestrator.paper.page import (
+    escape_markdown,
+    picture,
+    table,
+    values_with_units,
+    without_pictures,
+)
 from orchestrator.runs.folder import inner_folder
 from orchestrator.runs.preparation import Prepared, prepare_request, with_companion
 from orchestrator.runs.request import Request
@@ -196,7 +202,7 @@ def section_text(
         yield picture(section.title, file.relative_to(folder).as_posix())
     yield from (f"Note: {escape_markdown(note)}." for note in notes)
     if scenario.remark:
-        yield scenario.remark
+        yield without_pictures(scenario.remark)
     made = {label: kept_runs[request] for label, request in section.runs.items()}
     for label, kept_run in made.items():
         if kept_run.failure is not None:
@@ -293,5 +299,5 @@ def study_sections(studies: Sequence[Study], kept: Path, folder: Path) -> Iterat
                 shutil.copy(file, folder / figures)
                 yield picture(f"{title}: {figure}", (figures / file.name).as_posix())
         if study.remark:
-            yield study.remark.strip()
+            yield without_pictures(study.remark.strip())
         yield f"- `auv-fmu sweep {study.name}`"

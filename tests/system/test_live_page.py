@@ -296,7 +296,7 @@ def test_a_chart_that_comes_into_sight_shows_the_time_that_the_others_show(opene
     opened.wait(f"{value} !== {at_end!r}")
     header, table = rows(opened.run(CSV))
     known = table[np.isclose(table[:, 0], 20.0), header.index("controller.theta_hat[4]")]
-    assert float(opened.run(value).replace("\N{MINUS SIGN}", "-")) == pytest.approx(known[0], rel=5e-3)
+    assert float(opened.run(value)) == pytest.approx(known[0], rel=5e-3)
 
 
 def test_remark_says_that_its_numbers_are_those_of_the_preset(opened):

@@ -4,6 +4,7 @@ import base64
 import re
 
 import pytest
+from markdown_it import MarkdownIt
 
 from orchestrator.paper.page import (
     actuator_values,
@@ -16,6 +17,7 @@ from orchestrator.paper.page import (
     picture,
     readings,
     table,
+    without_pictures,
 )
 
 
@@ -55,6 +57,27 @@ def test_pictures_are_within_the_page_and_lead_to_their_files(tmp_path):
     assert f"data:image/png;base64,{base64.b64encode(b'pixels').decode()}" in page
     assert '<a href="a.png">' in page
     assert 'src="a.png"' not in page
+
+
+@pytest.mark.parametrize(
+    "place", ["../private.png", "PRIVATE", "link.png", "lost.png", "http://x/a.png"]
+)
+@pytest.mark.parametrize(
+    "form", ["![seen]({})", "\\\\![seen]({})", "![seen][1]\n\n[1]: {}", "`![`![seen]({})"]
+)
+def test_pictures_from_elsewhere_are_not_in_the_page(tmp_path, place, form):
+    """A remark may be a stranger's, and name a picture of the user's, of the web, or none."""
+    (tmp_path / "private.png").write_bytes(b"private")
+    folder = tmp_path / "report"
+    folder.mkdir()
+    (folder / "link.png").symlink_to("../private.png")
+    text = form.format(place.replace("PRIVATE", str(tmp_path / "private.png")))
+    for remark in (text, without_pictures(text)):
+        page = html(f"# T\n\n{remark}", folder)
+        assert "<img" not in page
+        assert "seen" in page
+    for token in MarkdownIt().parse(without_pictures(text)):
+        assert "image" not in [part.type for part in token.children or ()]
 
 
 @pytest.mark.parametrize(
