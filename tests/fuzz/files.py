@@ -1,8 +1,9 @@
 """Attack the command line with files that are not what they should be.
 
-    python -m tests.fuzz.files --runs 1000                    all kinds of files, in turn
-    python -m tests.fuzz.files --runs 10000 --only table      one kind
-    python -m tests.fuzz.files --runs 1 --only ssd --seed 17  the one that a finding names
+    export PYTHONPATH=tests
+    python -m fuzz.files --runs 1000                    all kinds of files, in turn
+    python -m fuzz.files --runs 10000 --only table      one kind
+    python -m fuzz.files --runs 1 --only ssd --seed 17  the one that a finding names
 
 A valid file of each kind is mutated (:mod:`.files_mutators`) and handed to a command. Whatever it
 has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes into
@@ -51,6 +52,8 @@ from orchestrator.runs import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
+from orchestrator.system.units import Linear, Mapped
+from support import typed
 
 from . import files_mutators as mutators
 from .files_oracle import agreement
@@ -114,12 +117,18 @@ def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
         _tell(file, runs["jacobi"])
         columns = table.read_bytes()
     entries, fmu = _entries(archive), fmus["ObserverController.fmu"]
+    newer = _entries(_newer_system())
+    [newer_fmu] = [name for name in newer if name.endswith(".fmu")]
+    [newer_values] = [name for name in newer if name.endswith(".ssv")]
 
     def exported(content: bytes) -> Place:
         return Place({"mine.ssp": content}, ["export", "mine.ssp"])
 
-    def in_archive(name: str) -> Callable[[bytes], Place]:
+    def in_archive(entries: Mapping[str, bytes], name: str) -> Callable[[bytes], Place]:
         return lambda content: exported(_zipped({**entries, name: content}))
+
+    def within_fmu(content: bytes) -> Place:
+        return in_archive(newer, newer_fmu)(_zipped({_DESCRIPTION: content}))
 
     def as_controller(content: bytes) -> Place:
         scenario = b'[components]\ncontroller = "mine.fmu"\n'
@@ -135,9 +144,12 @@ def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
             lambda content: as_controller(_zipped({_DESCRIPTION: content})),
         ),
         "fmu": Kind(fmu, mutators.archive, as_controller),
-        "ssd": Kind(entries[_STRUCTURE], mutators.xml, in_archive(_STRUCTURE)),
-        "ssv": Kind(entries[_VALUES], mutators.xml, in_archive(_VALUES)),
+        "ssd": Kind(entries[_STRUCTURE], mutators.xml, in_archive(entries, _STRUCTURE)),
+        "ssv": Kind(entries[_VALUES], mutators.xml, in_archive(entries, _VALUES)),
         "ssp": Kind(archive, mutators.archive, exported),
+        "description3": Kind(typed.text().encode(), mutators.xml, within_fmu),
+        "ssd2": Kind(newer[_STRUCTURE], mutators.xml, in_archive(newer, _STRUCTURE)),
+        "ssv2": Kind(newer[newer_values], mutators.xml, in_archive(newer, newer_values)),
         "scenario": Kind(
             (SCENARIOS / "fig5.toml").read_bytes(),
             mutators.toml,
@@ -151,6 +163,22 @@ def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
     if find_spec("plotly") is None:
         del found["view"], found["record"]
     return found
+
+
+def _newer_system() -> bytes:
+    """An SSP 2.0 of FMUs of FMI 3.0, with ports of all types, arrays, and mappings."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "typed.fmu")
+        path.write_bytes(_zipped({_DESCRIPTION: typed.text().encode()}))
+        wires = {f"b.u_{kind}": f"a.y_{kind}" for kind in typed.SCALARS}
+        parameters = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
+        system = typed.system_of(path, "ab", wires, {**parameters, "a.M[2,1]": -0.5})
+        ways = {"Int64": Mapped(((1, 2), (3, -4))), "Float64": Linear(2.0, 1.0)}
+        connections = [
+            replace(wire, transformation=ways.get(wire.target.port.removeprefix("u_")))
+            for wire in system.connections
+        ]
+        return ssp_bytes(replace(system, connections=tuple(connections), stop_time=0.1, step=0.02))
 
 
 _DESCRIPTION, _STRUCTURE, _VALUES = (
@@ -344,7 +372,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
 
 def main() -> int:
     """Attack, and tell of what was found."""
-    parser = argparse.ArgumentParser(prog="python -m tests.fuzz.files", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m fuzz.files", description=__doc__)
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.add_argument("--runs", type=int, default=1000, help="of each kind; default: 1000")
     parser.add_argument("--seed", type=int, default=0, help="of the first run; default: 0")

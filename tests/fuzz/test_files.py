@@ -1,4 +1,4 @@
-"""Mutated files in a number that takes seconds; `tests.fuzz.files` makes as many as one likes."""
+"""Mutated files in a number that takes seconds; `fuzz.files` makes as many as one likes."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ TABLES = 200
 
 NAMES = (
     "description", "ssd", "scenario", "record", "table", "fmu", "ssv", "ssp", "plot", "view",
+    "description3", "ssd2", "ssv2",
 )  # fmt: skip
 
 
@@ -36,7 +37,7 @@ def test_mutated_files_are_taken_or_refused_in_one_line(kinds, name: str):
         try:
             files.attack(kinds[name], content)
         except files.Finding as finding:
-            pytest.fail(f"python -m tests.fuzz.files --only {name} --seed {seed}: {finding}")
+            pytest.fail(f"python -m fuzz.files --only {name} --seed {seed}: {finding}")
 
 
 def test_all_kinds_are_tried(kinds):
