@@ -228,7 +228,7 @@ class _Samples:
         """Take the samples that lie between some rows."""
         rows = np.vstack((self._last, rows))
         for place, standing in self._integers:
-            rows[:, place] = [float(standing.value(number)) for number in rows[:, place]]
+            rows[:, place] = standing.values(rows[:, place])
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 

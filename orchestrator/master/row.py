@@ -120,6 +120,10 @@ class Row:
         number = float(self.values[self.columns[port]])
         return self.standing[port].value(number) if port in self.standing else number
 
+    def inputs_of(self, fmi_type: str) -> list[int]:
+        """Where the inputs of a type are."""
+        return self._inputs.get(fmi_type, [])
+
     def wrong(self, components: Iterable[str]) -> str | None:
         """The first value that is not finite or not of an input's type, in words.
 
