@@ -33,6 +33,9 @@ _TYPE = re.compile(r"\[[A-Z]+\]$")
 #: What a file is not that cannot be read.
 _NO_RUN = "not a table of a run"
 
+#: What makes numbers of texts, by the places of columns.
+Converters = dict[int | str, Callable[[str], float]]
+
 #: The number of a line, and its values.
 Record = tuple[int, list[str]]
 
@@ -83,7 +86,8 @@ def read_rows(
         # Texts may have ends of lines in them, also of other systems.
         with open_lines(path, newline="") as lines:
             header = ("time", *_after_time(next(csv.reader(lines), ())))
-            converters = {place: numbers[n] for place, n in enumerate(header) if n in numbers}
+            places = enumerate(header)
+            converters: Converters = {i: numbers[name] for i, name in places if name in numbers}
             filled = (line for line in lines if converters or line.strip())
             for first in filled:
                 if not first.strip():
@@ -172,11 +176,11 @@ def _numbers(column: Any, convert: Callable[[Any], float] | None) -> Any:
     return list(map(convert, column.to_pylist()))
 
 
-def _loaded(lines: Iterable[str], converters: Mapping[int, Callable[[str], float]]) -> np.ndarray:
+def _loaded(lines: Iterable[str], converters: Converters) -> np.ndarray:
     try:
         return np.loadtxt(
             lines, delimiter=",", comments=None, quotechar='"', ndmin=2, max_rows=ROWS_AT_ONCE,
-            converters=dict(converters) or None,
+            converters=converters or None,
         )  # fmt: skip
     except ValueError as error:
         # What a converter says is clearer.

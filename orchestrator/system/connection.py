@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from sys import float_info
 
 import numpy as np
 from fmpy.model_description import ModelVariable
@@ -13,7 +12,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.system.values import EXACT, TYPES, unit_of
+from orchestrator.system.values import TYPES, unit_of
 
 #: What can be fed from another family of types, besides from its own.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
@@ -92,12 +91,10 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
             f"{how}"
         )
     if isinstance(connection.transformation, Mapped):
-        # Mappings are written in doubles.
-        exact = float_info.max if is_real else EXACT
-        least, most = max(of.least, -exact), min(of.most, exact)
         for _, value in connection.transformation.pairs:
-            if not least <= value <= most or (not is_real and value != int(value)):
+            if not of.least <= value <= of.most or value != (float if is_real else int)(value):
+                shown = value if isinstance(value, int) else f"{value:.16g}"
                 raise InputError(
-                    f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
+                    f"{connection.source} -> {connection.target}: is mapped to {shown}, which "
                     f"FMI type {fmi_type} cannot hold"
                 )

@@ -116,7 +116,7 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
             return _transferable(text)
         items = items_of(variable)
         number = real(text) if type_of(variable) == "Real" else integer(items.get(text, text))
-        if items and number not in map(int, items.values()):
+        if items and not any(number == int(value) for value in items.values()):
             raise ValueError(f"{number} is no item")
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
@@ -153,16 +153,7 @@ def cell(variable: ModelVariable, value: object, where: str = "") -> Value:
     if family == "Boolean" and word.lower() in BOOLEANS:
         return BOOLEANS[word.lower()]
     word = items_of(variable).get(word, word)
-    if family != "Real":
-        with suppress(ValueError):
-            return integer(word)
-    number = finite(word, where)
-    if family == "Real":
-        return number
-    # Other tools write whole numbers with a point.
-    if not number.is_integer():
-        raise ValueError(f"{where} {word[:40]!r} is not an integer")
-    return int(number)
+    return finite(word, where) if family == "Real" else whole(word, where)
 
 
 def real(text: str) -> float:
@@ -193,6 +184,25 @@ def finite(text: str, where: str) -> float:
     if not isfinite(number):
         raise ValueError(f"{where} {text[:40]!r} is not finite")
     return number
+
+
+def whole(text: str, where: str) -> int:
+    """An integer from a file, which other tools may have written with a point.
+
+    Args:
+        text: of the number.
+        where: it stands, for the message.
+
+    Raises:
+        ValueError: it is not one.
+
+    """
+    number = finite(text, where)
+    with suppress(ValueError):
+        return integer(text)
+    if not number.is_integer():
+        raise ValueError(f"{where} {text[:40]!r} is not an integer")
+    return int(number)
 
 
 def is_finite(value: object) -> bool:
@@ -411,6 +421,6 @@ class Standing(NamedTuple):
             return numbers.astype(self.c_type)
         return np.array(list(map(self.value, numbers.tolist())), dtype=self.c_type or str)
 
-    def number(self, value: str | int) -> float:
+    def number(self, value: str | float) -> float:
         """The number that stands for a value, or for the text of one."""
         return self.strings.stand_in(value if self.c_type is None else int(value))
