@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.formats.tables import places_of_time, port_of, records
+from orchestrator.formats.tables import places_of_time, port_of, records, time_of
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.master.observers.table import Table
 from orchestrator.system.component import Component
-from orchestrator.system.values import Value, cell, finite, type_of
+from orchestrator.system.values import Value, cell, type_of
 from orchestrator.system.variables import array_of
 
 
@@ -47,8 +47,8 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
             known.setdefault(array_of(variable), []).append(variable)
     with records(path, "not a table of values over time", places_of_time) as (names, rows):
         clocks = places_of_time(names)
-        if len(clocks) != 1:
-            raise ValueError(f"{len(clocks) or 'no'} columns of its first line are named time")
+        if not clocks:
+            raise ValueError("no column of its first line is named time")
         longest = max(map(len, known), default=0)
         ports = {
             place: known[name]
@@ -61,7 +61,7 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
         times: list[float] = []
         columns: dict[str, list[Value]] = {name: [] for name in found}
         for line, row in rows:
-            times.append(finite(row[clocks[0]], f"line {line}, time:"))
+            times.append(time_of(row, clocks, f"line {line}"))
             if len(times) > 1 and times[-1] < times[-2]:
                 raise ValueError(f"line {line}: times must not decrease")
             for place, group in ports.items():

@@ -16,7 +16,7 @@ import numpy as np
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, open_lines
-from orchestrator.system.values import EXACT
+from orchestrator.system.values import EXACT, finite
 
 #: Rows that are read at once, and that are written to Parquet at once.
 ROWS_AT_ONCE = 8192
@@ -131,10 +131,23 @@ def records(
 
 
 def places_of_time(names: Sequence[str]) -> list[int]:
-    """Where a table has its times; several places, or none, are a mistake."""
+    """Where a table has its times."""
     lowered = [name.strip().lower() for name in names]
     found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
     return next(filter(None, found), [])
+
+
+def time_of(row: Sequence[str], clocks: Sequence[int], where: str) -> float:
+    """The time of a row; some tools write it twice, once as a variable of an FMU.
+
+    Raises:
+        ValueError: it is not a finite number, or its columns differ.
+
+    """
+    time, *more = (finite(row[clock], f"{where}, time:") for clock in clocks)
+    if any(other != time for other in more):
+        raise ValueError(f"{where}: the columns of the time differ: {time:g} and {more[0]:g} s")
+    return time
 
 
 def port_of(name: str, known: Collection[str], longest: int) -> str | None:

@@ -137,13 +137,10 @@ def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: o
         ValueError: the variable cannot have this value.
 
     """
-    found = cell(variable, value, f"{name}:")
-    if not isinstance(found, str):
-        try:
-            found = typed(name, variable, found)
-        except InputError as error:
-            raise ValueError(str(error)) from None
-    return strings.stand_in(found)
+    try:
+        return strings.stand_in(typed(name, variable, cell(variable, value, f"{name}:")))
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 @dataclass(frozen=True)
@@ -327,8 +324,7 @@ def with_input_table(
     start = system.start_time or 0.0
     values = input_table.at(start, int((times <= start).sum()) - 1)
     first = {
-        target: value if isinstance(value, str) else _typed(system, target, value)
-        for target, value in zip(targets, values, strict=True)
+        target: _typed(system, target, value) for target, value in zip(targets, values, strict=True)
     }
     return replace(system, parameters={**system.parameters, **first}), input_table
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import isfinite
 
 import numpy as np
 from fmpy.model_description import ModelVariable
@@ -81,20 +82,25 @@ def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
 
 def _check_transformed(connection: Connection, fmi_type: str) -> None:
     """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
-    linear = isinstance(connection.transformation, Linear)
+    wire = f"{connection.source} -> {connection.target}"
     of = TYPES[fmi_type]
     is_real = of.family == "Real"
-    if of.family == "String" or (linear and not is_real):
-        how = "transformed linearly" if linear else "mapped"
-        raise InputError(
-            f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
-            f"{how}"
-        )
-    if isinstance(connection.transformation, Mapped):
-        for _, value in connection.transformation.pairs:
-            if not of.least <= value <= of.most or value != (float if is_real else int)(value):
-                shown = value if isinstance(value, int) else f"{value:.16g}"
+    match connection.transformation:
+        case Linear(factor, offset):
+            if not is_real:
                 raise InputError(
-                    f"{connection.source} -> {connection.target}: is mapped to {shown}, which "
-                    f"FMI type {fmi_type} cannot hold"
+                    f"{wire}: a value of type {fmi_type} cannot be transformed linearly"
                 )
+            if not (isfinite(factor) and isfinite(offset)):
+                raise InputError(
+                    f"{wire}: the factor {factor:g} or the offset {offset:g} is not finite"
+                )
+        case Mapped(pairs):
+            if of.family == "String":
+                raise InputError(f"{wire}: a value of type {fmi_type} cannot be mapped")
+            for _, value in pairs:
+                if not of.least <= value <= of.most or value != (float if is_real else int)(value):
+                    shown = value if isinstance(value, int) else f"{value:.16g}"
+                    raise InputError(
+                        f"{wire}: is mapped to {shown}, which FMI type {fmi_type} cannot hold"
+                    )

@@ -113,7 +113,7 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
         if type_of(variable) == "Boolean":
             return BOOLEANS[text.lower()]
         if type_of(variable) == "String":
-            return _transferable(text)
+            return _transferable(str(value))
         items = items_of(variable)
         number = real(text) if type_of(variable) == "Real" else integer(items.get(text, text))
         if items and not any(number == int(value) for value in items.values()):

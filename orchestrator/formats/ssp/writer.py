@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
+from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -132,8 +133,14 @@ def _text(component: Component, variable: ModelVariable, values: Mapping[str, Va
         raise InputError(
             f"{component.name}.{variable.name} has no value, and an SSP holds whole arrays only"
         )
-    items = (item for item, number in items_of(variable).items() if int(number) == value)
-    return next(items, literal(value))
+    items = items_of(variable)
+    names = [item for item, number in items.items() if int(number) == value]
+    if (isinstance(value, float) and not isfinite(value)) or (items and not names):
+        raise InputError(
+            f"{component.name}.{variable.name} = {literal(value)}: an SSP holds finite numbers and "
+            "items of enumerations only"
+        )
+    return names[0] if names else literal(value)
 
 
 def _add_dimensions(parent: Element, variable: ModelVariable) -> None:
