@@ -78,7 +78,7 @@ class Stopwatch:
 
 def write_metrics(folder: Path, values: Mapping[str, Any]) -> None:
     """Write metrics.json into a folder."""
-    (folder / METRICS).write_text(_in_json(values), encoding="utf-8")
+    (folder / METRICS).write_text(in_json(values), encoding="utf-8")
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
@@ -180,10 +180,11 @@ def copy_record(folder: Path, content: Mapping[str, object]) -> None:
     """Write a record as it is, but for the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     whole = {**content, "files": sorted(files | {RECORD})}
-    (folder / RECORD).write_text(_in_json(whole), encoding="utf-8")
+    (folder / RECORD).write_text(in_json(whole), encoding="utf-8")
 
 
-def _in_json(content: Mapping[str, object]) -> str:
+def in_json(content: Mapping[str, object]) -> str:
+    """A record or indices as JSON, with texts for numbers that are not finite."""
     return json.dumps(_as_texts(content), indent=2, allow_nan=False) + "\n"
 
 

@@ -97,7 +97,7 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
                 )
         case Mapped(pairs):
             if of.family == "String":
-                raise InputError(f"{wire}: a value of type {fmi_type} cannot be mapped")
+                raise InputError(f"{wire}: a {fmi_type} cannot be mapped")
             for _, value in pairs:
                 if not of.least <= value <= of.most or value != (float if is_real else int)(value):
                     shown = value if isinstance(value, int) else f"{value:.16g}"
