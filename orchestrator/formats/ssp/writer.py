@@ -177,16 +177,15 @@ def serialised(root: Element, whose: str = "") -> bytes:
 
 
 def _check_characters(element: Element, where: str) -> None:
-    name = element.get("name", "")
     for value in element.attrib.values():
         if (found := _FORBIDDEN.search(value)) is not None:
+            place = _FORBIDDEN.sub("?", where) or "the system"
             raise InputError(
-                f"{where or name}: {shortened(value)!r} holds the character {found[0]!r}, which "
-                "XML cannot hold"
+                f"{place}: {shortened(value)!r} holds the character {found[0]!r}, which XML cannot "
+                "hold"
             )
-    where = ".".join(filter(None, (where, name)))
     for child in element:
-        _check_characters(child, where)
+        _check_characters(child, ".".join(filter(None, (where, child.get("name", "")))))
 
 
 def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> bytes:
@@ -298,7 +297,7 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
     if isinstance(made, Linear) and made != Linear():
         numbers = {"factor": str(made.factor), "offset": str(made.offset)}
         _add(element, "ssc:LinearTransformation", **numbers)
-    elif isinstance(made, Mapped):
+    elif isinstance(made, Mapped) and made.pairs:
         fmi_type = type_of(system.component(source.component).variable(source.port))
         of = bool if fmi_type == "Boolean" else int
         # Numbers of an enumeration are integers as well.
