@@ -88,10 +88,8 @@ def read_rows(
             header = ("time", *_after_time(next(csv.reader(lines), ())))
             places = enumerate(header)
             converters: Converters = {i: numbers[name] for i, name in places if name in numbers}
-            filled = (line for line in lines if converters or line.strip())
+            filled = _filled(lines)
             for first in filled:
-                if not first.strip():
-                    continue
                 rows = _loaded(chain([first], filled), converters)
                 if rows.shape[1] != len(header):
                     raise ValueError(f"rows of {rows.shape[1]} values for {len(header)} columns")
@@ -176,6 +174,15 @@ def parquet() -> Any:
     if find_spec("pyarrow") is None:
         raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
     return import_module("pyarrow.parquet")
+
+
+def _filled(lines: Iterable[str]) -> Iterator[str]:
+    """Lines without empty ones, unless these are within a text."""
+    is_within = False
+    for line in lines:
+        if is_within or line.strip():
+            yield line
+        is_within ^= bool(line.count('"') % 2)
 
 
 def _numbers(column: Any, convert: Callable[[Any], float] | None) -> Any:
