@@ -64,6 +64,7 @@ class VisibleRows(Table):
     not grow with the length of the run, and its length need not be known before.
 
     Attributes:
+        whole_header: of the run, with columns of texts, of which nothing is seen.
         means: of a longer run, for the rows that are kept are its extremes and no sample of it: a
             row at the start, and at the end of each division the mean over it of all signals,
             linear between their rows. None: all rows are kept.
@@ -79,11 +80,13 @@ class VisibleRows(Table):
         """
         super().__init__()
         self._watched_names = watched
+        self.whole_header = self.header
         self.means: Table | None = None
 
     def begin(self, header: Header) -> None:
         """Make room for a run that is kept whole."""
-        # Of a text nothing is drawn, and an integer of 64 bits is drawn as a double.
+        self.whole_header = header
+        # An integer of 64 bits is drawn as a double.
         self._integers = [(i, one) for i, one in header.places() if one.c_type is not None]
         self._kept = [0, *(header.place[name] for name in header.numeric_columns)]
         header = replace(header, columns=header.numeric_columns, standing={})

@@ -83,12 +83,12 @@ def read_rows(
                     columns = [_numbers(column, numbers.get(name)) for name, column in named]
                     yield np.column_stack(columns).astype(float, copy=False)
             return
-        # Texts may have ends of lines in them, also of other systems.
-        with open_lines(path, newline="") as lines:
+        # Texts may have ends of lines in them, also of other systems, and empty lines.
+        with open_lines(path, newline="" if numbers else None) as lines:
             header = ("time", *_after_time(next(csv.reader(lines), ())))
             places = enumerate(header)
             converters: Converters = {i: numbers[name] for i, name in places if name in numbers}
-            filled = _filled(lines)
+            filled = _filled(lines) if numbers else (line for line in lines if line.strip())
             for first in filled:
                 rows = _loaded(chain([first], filled), converters)
                 if rows.shape[1] != len(header):

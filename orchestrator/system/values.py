@@ -423,4 +423,6 @@ class Standing(NamedTuple):
 
     def number(self, value: str | float) -> float:
         """The number that stands for a value, or for the text of one."""
-        return self.strings.stand_in(value if self.c_type is None else int(value))
+        if self.c_type is None:
+            return self.strings.number(str(value))
+        return self.strings.stand_in(int(value))

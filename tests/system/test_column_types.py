@@ -292,3 +292,24 @@ def test_a_table_with_every_type_is_verified(fmu: Path, tmp_path: Path):
     with pytest.raises(InputError) as error:
         verify(table, system, 0.0)
     assert mentions(str(error.value), "line 3 0.125")
+
+
+@pytest.mark.parametrize("ending", TABLES)
+def test_what_a_command_has_written_is_read_with_its_types(
+    fmu: Path, tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
+):
+    """All columns, or some of them; and drawn by a command."""
+    monkeypatch.chdir(tmp_path)
+    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
+    write_ssp(typed.system_of(fmu, parameters=values), tmp_path)
+    for chosen in ("a.*", "a.y_*64,a.y_String"):
+        arguments = ["run", "typed.ssp", "--stop-time", "0.25", "--step", "0.125", "--out", "r"]
+        arguments += ["--format", ending, "--columns", chosen, "--no-figures", "--isolate"]
+        assert main(arguments) == 0
+        stored = read("r")
+        kinds = values if chosen == "a.*" else {"a.u_Int64", "a.u_UInt64", "a.u_String"}
+        for name in kinds:
+            port = name.replace(".u_", ".y_")
+            assert stored[port].tolist() == [values[name]] * 3
+        assert stored.parameters["a.end_at"] == inf
+    assert main(["plot", "r", "a.y_Int64", "--out", "plot.png"]) == 0
