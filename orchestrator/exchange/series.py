@@ -138,4 +138,6 @@ def comparison(
 
 
 def _shown(value: object) -> str:
-    return repr(str(value)) if isinstance(value, str) else f"{value:.9g}"
+    if isinstance(value, float):
+        return f"{value:.9g}"
+    return repr(str(value)) if isinstance(value, str) else str(value)

@@ -74,8 +74,10 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         SubElement(root, tag).text = text
     simulators = SubElement(root, "Simulators")
     fmus = system.fmus(OSP_STRUCTURE)
+    digests = {component.fmu: component.digest for component in system.components.values()}
+    for fmu, name in fmus.items():
+        (folder / name).write_bytes(read_archive(fmu, digests[fmu]))
     for name, component in system.components.items():
-        (folder / fmus[component.fmu]).write_bytes(read_archive(component.fmu, component.digest))
         step = str(system.steps.get(name, system.step))
         named = {"name": name, "source": fmus[component.fmu], "stepSize": step}
         simulator = SubElement(simulators, "Simulator", named)

@@ -16,7 +16,7 @@ import numpy as np
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, open_lines
-from orchestrator.system.values import EXACT, finite
+from orchestrator.system.values import finite
 
 #: Rows that are read at once, and that are written to Parquet at once.
 ROWS_AT_ONCE = 8192
@@ -34,7 +34,7 @@ _TYPE = re.compile(r"\[[A-Z]+\]$")
 _NO_RUN = "not a table of a run"
 
 #: What makes numbers of texts, by the places of columns.
-Converters = dict[int | str, Callable[[str], float]]
+_Converters = dict[int | str, Callable[[str], float]]
 
 #: The number of a line, and its values.
 Record = tuple[int, list[str]]
@@ -87,7 +87,7 @@ def read_rows(
         with open_lines(path, newline="" if numbers else None) as lines:
             header = ("time", *_after_time(next(csv.reader(lines), ())))
             places = enumerate(header)
-            converters: Converters = {i: numbers[name] for i, name in places if name in numbers}
+            converters: _Converters = {i: numbers[name] for i, name in places if name in numbers}
             filled = _filled(lines) if numbers else (line for line in lines if line.strip())
             for first in filled:
                 rows = _loaded(chain([first], filled), converters)
@@ -187,16 +187,14 @@ def _filled(lines: Iterable[str]) -> Iterator[str]:
 
 def _numbers(column: Any, convert: Callable[[Any], float] | None) -> Any:
     """A column of Parquet as numbers."""
-    values = column.to_numpy(zero_copy_only=False)
-    is_exact = values.dtype.kind in "iu" and ((values >= -EXACT) & (values <= EXACT)).all()
-    if convert is None or is_exact:
-        return values
+    if convert is None:
+        return column.to_numpy(zero_copy_only=False)
     if column.null_count:
         raise ValueError("a value is missing")
     return list(map(convert, column.to_pylist()))
 
 
-def _loaded(lines: Iterable[str], converters: Converters) -> np.ndarray:
+def _loaded(lines: Iterable[str], converters: _Converters) -> np.ndarray:
     try:
         return np.loadtxt(
             lines, delimiter=",", comments=None, quotechar='"', ndmin=2, max_rows=ROWS_AT_ONCE,

@@ -85,7 +85,6 @@ class Inputs:
     file: Path
     between: str = "linear"
     wins: bool = False
-
     _read: dict[Any, list[np.ndarray]] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property

@@ -117,7 +117,7 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
         items = items_of(variable)
         number = real(text) if type_of(variable) == "Real" else integer(items.get(text, text))
         if items and not any(number == int(value) for value in items.values()):
-            raise ValueError(f"{number} is no item")
+            raise ValueError(f"{number} is not an item")
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
         names = ", ".join(items_of(variable))
