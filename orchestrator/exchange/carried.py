@@ -222,12 +222,9 @@ class Carried:
         step = first_given(step, system.step) or _interval(expected.times)
         hooks: list[Hook] = []
         if (stimuli := self._series(trial, _STIMULI)) is not None:
-            for name, column in stimuli.columns.items():
-                if column.dtype.kind == "U":
-                    raise InputError(f"{name} is a String: a table of inputs holds only numbers")
             names = [PortName(self._component.name, name) for name in stimuli.columns]
-            rows = np.column_stack((stimuli.times, *stimuli.columns.values()))
-            system, input_table = with_input_table(system, names, rows)
+            columns = list(stimuli.columns.values())
+            system, input_table = with_input_table(system, names, stimuli.times, columns)
             hooks.append(Playback(input_table))
             _note_unknown(stimuli, "the table of inputs", findings)
         table = Table()

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.formats.tables import places_of_time, port_of, records
+from orchestrator.formats.tables import places_of_time, port_of, records, time_of
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ROUNDING
 from orchestrator.master.observers.table import Table
 from orchestrator.system.component import Component
-from orchestrator.system.values import BOOLEANS, finite, integer, items_of, type_of
+from orchestrator.system.values import Value, cell, type_of
 from orchestrator.system.variables import array_of
 
 
@@ -48,8 +47,8 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
             known.setdefault(array_of(variable), []).append(variable)
     with records(path, "not a table of values over time", places_of_time) as (names, rows):
         clocks = places_of_time(names)
-        if len(clocks) != 1:
-            raise ValueError(f"{len(clocks) or 'no'} columns of its first line are named time")
+        if not clocks:
+            raise ValueError("no column of its first line is named time")
         longest = max(map(len, known), default=0)
         ports = {
             place: known[name]
@@ -60,9 +59,9 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
         if len({*found}) < len(found):
             raise ValueError("two columns belong to the same variable")
         times: list[float] = []
-        columns: dict[str, list[float | str]] = {name: [] for name in found}
+        columns: dict[str, list[Value]] = {name: [] for name in found}
         for line, row in rows:
-            times.append(finite(row[clocks[0]], f"line {line}, time:"))
+            times.append(time_of(row, clocks, f"line {line}"))
             if len(times) > 1 and times[-1] < times[-2]:
                 raise ValueError(f"line {line}: times must not decrease")
             for place, group in ports.items():
@@ -72,26 +71,12 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
                         f"line {line}, {names[place]}: {len(cells)} values of an array of "
                         f"{len(group)}"
                     )
-                for variable, cell in zip(group, cells, strict=True):
+                for variable, text in zip(group, cells, strict=True):
                     where = f"line {line}, {variable.name}:"
-                    columns[variable.name].append(_value(cell, variable, where))
+                    columns[variable.name].append(cell(variable, text, where))
     others = [text for place, text in enumerate(names) if place not in (*clocks, *ports)]
     arrays = {name: np.array(values) for name, values in columns.items()}
     return Series(np.array(times), arrays, others)
-
-
-def _value(text: str, variable: ModelVariable, where: str) -> float | str:
-    fmi_type, word = type_of(variable), text.strip().lower()
-    if fmi_type == "String":
-        return text
-    if fmi_type == "Boolean" and word in BOOLEANS:
-        return float(BOOLEANS[word])
-    number = str(items_of(variable).get(text, text))
-    if fmi_type != "Real":
-        # Of 64 bits, some are no doubles.
-        with suppress(ValueError):
-            return integer(number)
-    return finite(number, where)
 
 
 def comparison(
@@ -153,4 +138,6 @@ def comparison(
 
 
 def _shown(value: object) -> str:
-    return repr(str(value)) if isinstance(value, str) else f"{value:.9g}"
+    if isinstance(value, float):
+        return f"{value:.9g}"
+    return repr(str(value)) if isinstance(value, str) else str(value)

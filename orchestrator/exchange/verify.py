@@ -11,7 +11,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.formats.tables import SEPARATORS, Record, places_of_time, port_of, records
+from orchestrator.formats.tables import (
+    SEPARATORS,
+    Record,
+    places_of_time,
+    port_of,
+    records,
+    time_of,
+)
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import (
     DELAY,
@@ -78,8 +85,8 @@ def verify(
 ) -> str:
     """Compare a table from any tool with our own runs of the same system.
 
-    Every row after t = 0 and every column that is named after an output is compared. Columns of
-    inputs are not: tools write them before or after the exchange.
+    Every row after t = 0 and every column that is named after an output is compared, except texts.
+    Columns of inputs are not: tools write them before or after the exchange.
 
     Args:
         path: CSV with a time column and columns named after our ports.
@@ -106,6 +113,7 @@ def verify(
         str(PortName(component.name, variable.name)): type_of(variable)
         for component in system.components.values()
         for variable in component.having("output")
+        if type_of(variable) != "String"
     }
     known = {
         str(PortName(component.name, variable))
@@ -228,7 +236,7 @@ class _Samples:
         """Take the samples that lie between some rows."""
         rows = np.vstack((self._last, rows))
         for place, standing in self._integers:
-            rows[:, place] = [float(standing.value(number)) for number in rows[:, place]]
+            rows[:, place] = standing.values(rows[:, place])
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 
@@ -287,7 +295,8 @@ def _certificate(
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are not outputs: {enumerated(table.others, verbose)}"
+        what = "columns that are not outputs, or hold texts"
+        yield f"not compared: {what}: {enumerated(table.others, verbose)}"
     if absent := [name for name in outputs if name not in table.columns]:
         yield f"not in the table: {enumerated(absent, verbose)}"
 
@@ -330,7 +339,7 @@ def read_table(
 
     Raises:
         InputError: a row is not as long as the first, a time falls, a value is no number,
-            or a port has two columns.
+            or a port has two columns, or the time has two that differ.
 
     """
     what = "not a table that can be compared"
@@ -345,12 +354,10 @@ def _table(
     known: Collection[str],
     before: str,
 ) -> ForeignTable:
-    if not places_of_time(names):
+    clocks = places_of_time(names)
+    if not clocks:
         separators = ", ".join(SEPARATORS.values())
         raise ValueError(f"no column of its first line is named time (separators are {separators})")
-    clock, *more = places_of_time(names)
-    if more:
-        raise ValueError(f"{1 + len(more)} columns are named {names[clock].strip()}")
     places: dict[str, int] = {}
     longest = max(map(len, known), default=0)
     for place, name in enumerate(names):
@@ -358,14 +365,14 @@ def _table(
         port = port if port in ports else None
         if port in places:
             raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")
-        if port is not None and place != clock:
+        if port is not None and place not in clocks:
             places[port] = place
     time, columns = array("d"), {port: array("d") for port in places}
     for expected, (line, row) in enumerate(rows, start=2):
         if line != expected:
             raise ValueError(f"line {expected} is empty")
         where = f"line {line}"
-        time.append(finite(row[clock], f"{where}, time:"))
+        time.append(time_of(row, clocks, where))
         if time[-1] < 0.0:
             raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
         if len(time) > 1 and time[-1] < time[-2]:
@@ -374,7 +381,7 @@ def _table(
             )
         for port, place in places.items():
             columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))
-    others = [name for i, name in enumerate(names) if i not in (clock, *places.values())]
+    others = [name for i, name in enumerate(names) if i not in (*clocks, *places.values())]
     times = np.array(time)
     new = np.diff(times, prepend=-np.inf) > ROUNDING * times
     return ForeignTable(

@@ -89,14 +89,14 @@ def _events(runs: Sequence[Drawn]) -> dict[str, set[tuple[float, ...]]]:
 
 def _spans(run: Drawn) -> dict[str, list[tuple[float, ...]]]:
     """When each event of a run has begun, and ended, if it has."""
-    occurrences = run.result.ending.events[:_MOST_MARKS]
+    occurrences = run.result.ending.events
     found: dict[str, list[tuple[float, ...]]] = {}
-    for i, one in enumerate(occurrences):
+    for i, one in enumerate(occurrences[:_MOST_MARKS], start=1):
         if one.label:
             ends = (
                 other.time
-                for other in occurrences[i + 1 :]
-                if not other.label and other.text.startswith(one.text)
+                for other in occurrences[i:]
+                if not other.label and other.event == one.event
             )
             found.setdefault(one.label, []).append((one.time, *islice(ends, 1)))
     return found

@@ -74,7 +74,7 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
     """
     if not all(isinstance(pattern, str) for pattern in patterns):
         raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
-    names = list(dict.fromkeys(name for run in runs for name in run.result.columns))
+    names = list(dict.fromkeys(name for run in runs for name in run.result.header.numeric_columns))
     if not patterns:
         patterns = wanted_columns(names, [loop for run in runs for loop in run.loops], ())
     if not patterns:
@@ -167,7 +167,7 @@ def group_of(column: str) -> str:
 
 
 def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
-    time, values = table.time, table[name]
+    time, values = table.time, table[name].astype(float, copy=False)
     if table.header.units.get(name) == "rad":
         # An angle that wraps has a gap: a line across the panel would be no motion.
         wraps = 1 + np.flatnonzero(np.abs(np.diff(values)) > np.pi)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -63,6 +64,7 @@ class VisibleRows(Table):
     not grow with the length of the run, and its length need not be known before.
 
     Attributes:
+        whole_header: of the run, with columns of texts, of which nothing is seen.
         means: of a longer run, for the rows that are kept are its extremes and no sample of it: a
             row at the start, and at the end of each division the mean over it of all signals,
             linear between their rows. None: all rows are kept.
@@ -78,10 +80,16 @@ class VisibleRows(Table):
         """
         super().__init__()
         self._watched_names = watched
+        self.whole_header = self.header
         self.means: Table | None = None
 
     def begin(self, header: Header) -> None:
         """Make room for a run that is kept whole."""
+        self.whole_header = header
+        # An integer of 64 bits is drawn as a double.
+        self._integers = [(i, one) for i, one in header.places() if one.c_type is not None]
+        self._kept = [0, *(header.place[name] for name in header.numeric_columns)]
+        header = replace(header, columns=header.numeric_columns, standing={})
         self._enter(header, np.empty((_WHOLE, 1 + len(header.columns))))
         self._watched = [
             i for i, name in enumerate(header.columns, 1) if name in self._watched_names
@@ -93,6 +101,12 @@ class VisibleRows(Table):
 
     def take(self, rows: np.ndarray) -> None:
         """Keep what can be seen of some rows."""
+        if self._integers:
+            rows = rows.copy()
+            for place, standing in self._integers:
+                rows[:, place] = standing.values(rows[:, place])
+        if len(self._kept) < rows.shape[1]:
+            rows = rows[:, self._kept]
         if self._divisions:
             rows = np.vstack((self._last, rows))
         elif self._n + len(rows) <= _WHOLE:

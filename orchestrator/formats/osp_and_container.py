@@ -14,10 +14,11 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.formats.ssp.archive import Archive
+from orchestrator.formats.ssp.writer import serialised
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
-from orchestrator.machine.user_files import check_file, is_folder
+from orchestrator.machine.user_files import check_file, is_folder, read_archive
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, file_name, plain_file_names
@@ -73,8 +74,9 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         SubElement(root, tag).text = text
     simulators = SubElement(root, "Simulators")
     fmus = system.fmus(OSP_STRUCTURE)
+    digests = {component.fmu: component.digest for component in system.components.values()}
     for fmu, name in fmus.items():
-        shutil.copyfile(fmu, folder / name)
+        (folder / name).write_bytes(read_archive(fmu, digests[fmu]))
     for name, component in system.components.items():
         step = str(system.steps.get(name, system.step))
         named = {"name": name, "source": fmus[component.fmu], "stepSize": step}
@@ -90,9 +92,8 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         element = SubElement(connections, "VariableConnection")
         for end in (connection.source, connection.target):
             SubElement(element, "Variable", simulator=end.component, name=end.port)
-    ElementTree.indent(root)
     path = folder / OSP_STRUCTURE
-    path.write_bytes(ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True))
+    path.write_bytes(serialised(root))
     return [path, *(folder / name for name in fmus.values())]
 
 
@@ -319,8 +320,9 @@ def write_container(system: System, folder: Path) -> list[Path]:
         ],
     }
     with TemporaryDirectory(dir=process_folder()) as work:
-        for component, name in fmus.items():
-            shutil.copyfile(system.components[component].fmu, Path(work, name))
+        for name, component in system.components.items():
+            fmu = read_archive(component.fmu, component.digest)
+            Path(work, fmus[name]).write_bytes(fmu)
         Path(work, _CONTENT).write_text(json.dumps(content), encoding="utf-8")
         versions = {component.description.fmiVersion for component in system.components.values()}
         fmi = max(versions).partition(".")[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from importlib import import_module
 from importlib.util import find_spec
@@ -16,6 +16,7 @@ import numpy as np
 
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, open_lines
+from orchestrator.system.values import finite
 
 #: Rows that are read at once, and that are written to Parquet at once.
 ROWS_AT_ONCE = 8192
@@ -32,18 +33,25 @@ _TYPE = re.compile(r"\[[A-Z]+\]$")
 #: What a file is not that cannot be read.
 _NO_RUN = "not a table of a run"
 
+#: What makes numbers of texts, by the places of columns.
+_Converters = dict[int | str, Callable[[str], float]]
+
 #: The number of a line, and its values.
 Record = tuple[int, list[str]]
 
 
-def read_columns(path: Path) -> tuple[str, ...]:
+def read_columns(path: Path, what: str = _NO_RUN) -> tuple[str, ...]:
     """Return the names of the columns after the time.
 
+    Args:
+        path: of the file.
+        what: it is if there is a mistake in it.
+
     Raises:
-        InputError: the file is not the table of a run.
+        InputError: the file is not such a table.
 
     """
-    with explain_errors(path, _NO_RUN):
+    with explain_errors(path, what):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
                 return _after_time(file.schema_arrow.names)
@@ -51,37 +59,41 @@ def read_columns(path: Path) -> tuple[str, ...]:
             return _after_time(next(csv.reader(lines), ()))
 
 
-def read_rows(path: Path, strings: Collection[str] = ()) -> Iterator[np.ndarray]:
+def read_rows(
+    path: Path, numbers: Mapping[str, Callable[[Any], float]] | None = None, what: str = _NO_RUN
+) -> Iterator[np.ndarray]:
     """Yield the rows of a file, time first, some thousand at a time.
 
     Args:
         path: of the file.
-        strings: columns that hold texts, and are left out.
+        numbers: make numbers of the values of columns that do not hold doubles: of their texts in
+            CSV, of what Parquet has for them.
+        what: the file is if there is a mistake in it.
 
     Raises:
-        InputError: the file is not the table of a run.
+        InputError: the file is not such a table.
 
     """
-    with explain_errors(path, _NO_RUN):
+    numbers = numbers or {}
+    with explain_errors(path, what):
         if path.suffix == ".parquet":
             with parquet().ParquetFile(path) as file:
-                names = [name for name in file.schema_arrow.names if name not in strings]
-                for batch in file.iter_batches(ROWS_AT_ONCE, columns=names):
-                    columns = [column.to_numpy(zero_copy_only=False) for column in batch.columns]
+                for batch in file.iter_batches(ROWS_AT_ONCE):
+                    named = zip(batch.schema.names, batch.columns, strict=True)
+                    columns = [_numbers(column, numbers.get(name)) for name, column in named]
                     yield np.column_stack(columns).astype(float, copy=False)
             return
-        with open_lines(path) as lines:
+        # Texts may have ends of lines in them, also of other systems, and empty lines.
+        with open_lines(path, newline="" if numbers else None) as lines:
             header = ("time", *_after_time(next(csv.reader(lines), ())))
-            texts = [place for place, name in enumerate(header) if name in strings]
-            filled = (line for line in lines if line.strip())
+            places = enumerate(header)
+            converters: _Converters = {i: numbers[name] for i, name in places if name in numbers}
+            filled = _filled(lines) if numbers else (line for line in lines if line.strip())
             for first in filled:
-                rows = np.loadtxt(
-                    chain([first], filled), delimiter=",", comments=None, quotechar='"', ndmin=2,
-                    max_rows=ROWS_AT_ONCE, converters=dict.fromkeys(texts, lambda _: 0.0) or None,
-                )  # fmt: skip
+                rows = _loaded(chain([first], filled), converters)
                 if rows.shape[1] != len(header):
                     raise ValueError(f"rows of {rows.shape[1]} values for {len(header)} columns")
-                yield np.delete(rows, texts, axis=1) if texts else rows
+                yield rows
 
 
 @contextmanager
@@ -117,10 +129,23 @@ def records(
 
 
 def places_of_time(names: Sequence[str]) -> list[int]:
-    """Where a table has its times; several places, or none, are a mistake."""
+    """Where a table has its times."""
     lowered = [name.strip().lower() for name in names]
     found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
     return next(filter(None, found), [])
+
+
+def time_of(row: Sequence[str], clocks: Sequence[int], where: str) -> float:
+    """The time of a row; some tools write it twice, once as a variable of an FMU.
+
+    Raises:
+        ValueError: it is not a finite number, or its columns differ.
+
+    """
+    time, *more = (finite(row[clock], f"{where}, time:") for clock in clocks)
+    if any(other != time for other in more):
+        raise ValueError(f"{where}: the columns of the time differ: {time:g} and {more[0]:g} s")
+    return time
 
 
 def port_of(name: str, known: Collection[str], longest: int) -> str | None:
@@ -149,6 +174,35 @@ def parquet() -> Any:
     if find_spec("pyarrow") is None:
         raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
     return import_module("pyarrow.parquet")
+
+
+def _filled(lines: Iterable[str]) -> Iterator[str]:
+    """Lines without empty ones, unless these are within a text."""
+    is_within = False
+    for line in lines:
+        if is_within or line.strip():
+            yield line
+        is_within ^= bool(line.count('"') % 2)
+
+
+def _numbers(column: Any, convert: Callable[[Any], float] | None) -> Any:
+    """A column of Parquet as numbers."""
+    if convert is None:
+        return column.to_numpy(zero_copy_only=False)
+    if column.null_count:
+        raise ValueError("a value is missing")
+    return list(map(convert, column.to_pylist()))
+
+
+def _loaded(lines: Iterable[str], converters: _Converters) -> np.ndarray:
+    try:
+        return np.loadtxt(
+            lines, delimiter=",", comments=None, quotechar='"', ndmin=2, max_rows=ROWS_AT_ONCE,
+            converters=converters or None,
+        )  # fmt: skip
+    except ValueError as error:
+        # What a converter says is clearer.
+        raise error.__cause__ or error from None
 
 
 def _reader(lines: Iterable[str], separator: str, strict: bool = False) -> Any:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from io import BufferedReader
@@ -255,7 +255,7 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
     if digest is None:
         with ZipFile(file) as content:
             # Before the file is read to its end, which it may not have.
-            _check_entries(content.infolist())
+            _check_entries(content)
             if (size := os.fstat(file.fileno()).st_size) > _LONGEST_ARCHIVE:
                 raise ValueError(f"it is {size:,} bytes long, more than {_LONGEST_ARCHIVE:,}")
             file.seek(0)
@@ -319,14 +319,15 @@ def _check_room(whole: _Whole, files: int, size: int) -> None:
         )
 
 
-def _check_entries(entries: Sequence[ZipInfo]) -> None:
+def _check_entries(content: ZipFile) -> None:
     """Refuse what fills the disk or the memory, and what tools unpack in different ways."""
+    entries = content.infolist()
     if len(entries) > _MOST_FILES:
         raise ValueError(f"it holds {len(entries):,} files, more than {_MOST_FILES:,}")
     if sum(entry.file_size for entry in entries) > _MOST_BYTES:
         size = sum(entry.file_size for entry in entries)
         raise ValueError(f"it unpacks to more than {_MOST_BYTES:,} bytes: {size:,}")
-    names = set()
+    known: dict[PurePosixPath, ZipInfo] = {}
     for entry in entries:
         path = PurePosixPath(entry.filename.replace("\\", "/"))
         if path.is_absolute() or ".." in path.parts:
@@ -335,8 +336,15 @@ def _check_entries(entries: Sequence[ZipInfo]) -> None:
             raise ValueError(
                 f"it holds {path.parts[0]:.40}/…, {depth:,} folders deep, more than {_MOST_FOLDERS}"
             )
-        if path in names:
-            raise ValueError(f"it holds {entry.filename!r} twice")
-        names.add(path)
+        if not _are_same(content, entry, known.setdefault(path, entry)):
+            raise ValueError(f"it holds {entry.filename!r} twice, with different contents")
         if path.suffix in _DESCRIPTIONS and entry.file_size > _MOST_OF_A_DESCRIPTION:
             raise ValueError(f"{entry.filename!r} is longer than {_MOST_OF_A_DESCRIPTION:,} bytes")
+
+
+def _are_same(content: ZipFile, one: ZipInfo, other: ZipInfo) -> bool:
+    """Whether two entries of a path unpack to the same; some tools list one twice."""
+    if one is other:
+        return True
+    alike = all(getattr(one, of) == getattr(other, of) for of in ("filename", "file_size", "CRC"))
+    return alike and content.read(one) == content.read(other)

@@ -115,10 +115,18 @@ class Row:
         """What stands for a value in the row."""
         return self.strings.stand_in(value)
 
+    def number_of(self, port: PortName, value: float) -> float:
+        """What stands for a value of a port in the row."""
+        return self.standing[port].number(value) if port in self.standing else float(value)
+
     def value(self, port: PortName) -> Value:
         """The value of a port."""
         number = float(self.values[self.columns[port]])
         return self.standing[port].value(number) if port in self.standing else number
+
+    def inputs_of(self, fmi_type: str) -> list[int]:
+        """Where the inputs of a type are."""
+        return self._inputs.get(fmi_type, [])
 
     def wrong(self, components: Iterable[str]) -> str | None:
         """The first value that is not finite or not of an input's type, in words.
@@ -217,7 +225,12 @@ class Gathering:
                 case Linear(factor, offset):
                     gathering.set(place, factor, offset)
                 case Mapped(pairs):
-                    gathering.mapped[place] = dict(pairs)
+                    gathering.mapped[place] = {
+                        row.number_of(connection.source, before): row.number_of(
+                            connection.target, after
+                        )
+                        for before, after in pairs
+                    }
                     gathering.is_plain = False
         return gathering
 

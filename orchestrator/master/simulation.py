@@ -85,7 +85,7 @@ def simulate_plan(
         if growth.ports:
             observers, hooks = [*observers, growth], [*hooks, growth]
         with _told(header, observers, surroundings) as tell:
-            blocks = Blocks(len(row.shown), observers, surroundings.ours)
+            blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
             interrupts.hand_over = blocks.hand_over
             blocks.append(experiment.start_time, row.shown)
             overrides = Overrides(row, gatherings, system.connections)

@@ -24,7 +24,7 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
-from orchestrator.system.names import role_of
+from orchestrator.system.names import port_name, role_of
 from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
@@ -188,7 +188,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     if scenario.digest and companion.digest:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
     inputs = scenario.inputs or companion.inputs
-    followed = set(map(system.named, inputs.content[0])) if inputs else ()
+    followed = {system.named(port_name(name)) for name in inputs.names} if inputs else ()
     given = prepared.system.expanded(request.parameters)
     shared = {
         target: value

@@ -33,6 +33,7 @@ from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
+from orchestrator.system.values import TYPES, Standing, StringTable
 from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
 
 #: The indices of a run.
@@ -50,6 +51,13 @@ RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
 
 #: What a file is not that cannot be read.
 _NOT_A_RECORD = "not the record of a run"
+
+
+#: Numbers that JSON has no words for, by the texts that are written for them.
+_NOT_FINITE = {text: float(text) for text in ("inf", "-inf", "nan")}
+
+#: What in the indices holds texts of the user.
+_TEXTS = ("scenario", "order", "parameters")
 
 
 class Stopwatch:
@@ -70,7 +78,23 @@ class Stopwatch:
 
 def write_metrics(folder: Path, values: Mapping[str, Any]) -> None:
     """Write metrics.json into a folder."""
-    (folder / METRICS).write_text(json.dumps(values, indent=2) + "\n", encoding="utf-8")
+    (folder / METRICS).write_text(in_json(values), encoding="utf-8")
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Read metrics.json.
+
+    Raises:
+        InputError: it cannot be read.
+
+    """
+    with explain_errors(path, "not the indices of a run"):
+        values = json.loads(read_text(path, "not the indices of a run"))
+        if not isinstance(values, dict):
+            raise ValueError("it holds no names")
+        return {
+            name: value if name in _TEXTS else _as_numbers(value) for name, value in values.items()
+        }
 
 
 def write_record(
@@ -126,7 +150,10 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
         "messages": list(ending.messages),
         "experiment": vars(header.experiment),
         "loop": header.loop,
-        "texts": sorted(name for name, one in header.standing.items() if one.c_type is None),
+        "types": {
+            **{n: header.standing[n].fmi_type for n in header.columns if n in header.standing},
+            **{str(n): "String" for n, value in header.parameters.items() if type(value) is str},
+        },
         "units": dict(header.units),
         "vehicles": [asdict(loop) for loop in loops],
         "events": [occurrence._asdict() for occurrence in ending.events],
@@ -153,17 +180,43 @@ def copy_record(folder: Path, content: Mapping[str, object]) -> None:
     """Write a record as it is, but for the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     whole = {**content, "files": sorted(files | {RECORD})}
-    (folder / RECORD).write_text(json.dumps(whole, indent=2) + "\n", encoding="utf-8")
+    (folder / RECORD).write_text(in_json(whole), encoding="utf-8")
+
+
+def in_json(content: Mapping[str, object]) -> str:
+    """A record or indices as JSON, with texts for numbers that are not finite."""
+    return json.dumps(_as_texts(content), indent=2, allow_nan=False) + "\n"
+
+
+def _as_texts(content: object) -> object:
+    """The same with texts for numbers that are not finite."""
+    if isinstance(content, Mapping):
+        return {name: _as_texts(value) for name, value in content.items()}
+    if isinstance(content, list | tuple):
+        return list(map(_as_texts, content))
+    return str(content) if isinstance(content, float) and not isfinite(content) else content
+
+
+def _as_numbers(content: Any) -> Any:
+    """The same with the numbers for these texts."""
+    if isinstance(content, dict):
+        return {name: _as_numbers(value) for name, value in content.items()}
+    if isinstance(content, list):
+        return list(map(_as_numbers, content))
+    return _NOT_FINITE.get(content, content) if isinstance(content, str) else content
 
 
 def ending_in(record: dict[str, Any]) -> Ending:
     """How a run has ended, from its record."""
-    events = record.get("events", ())
+    events = (
+        Occurrence(float(e["time"]), str(e["text"]), str(e["label"]), int(e.get("event", 0)))
+        for e in record.get("events", ())
+    )
     return Ending(
         record.get("failure"),
         record.get("remark"),
         tuple(record.get("messages", ())),
-        events=tuple(Occurrence(float(e["time"]), str(e["text"]), str(e["label"])) for e in events),
+        events=tuple(events),
     )
 
 
@@ -171,13 +224,27 @@ def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
     stated = record["experiment"]
     known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
+    types, strings = _types_in(record), StringTable()
     return Header(
         columns,
         Experiment(**known),
-        {port_name(name): value for name, value in record["parameters"].items()},
+        {
+            port_name(name): value if types.get(name) == "String" else _as_numbers(value)
+            for name, value in record["parameters"].items()
+        },
         record.get("loop", "python"),
-        units=record.get("units", {}),
+        {name: Standing(types[name], strings) for name in columns if name in types},
+        record.get("units", {}),
     )
+
+
+def _types_in(record: dict[str, Any]) -> dict[str, str]:
+    """The types of columns and parameters that hold anything but doubles."""
+    # Earlier versions named columns of texts only.
+    types = record.get("types", dict.fromkeys(record.get("texts", ()), "String"))
+    if not all(TYPES[fmi_type].stands for fmi_type in types.values()):
+        raise ValueError("it holds types that no run has")
+    return dict(types)
 
 
 def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
@@ -216,20 +283,21 @@ def read_result(
 
 
 def stored_rows(file: Path, record: dict[str, Any]) -> tuple[Header, Iterator[np.ndarray]]:
-    """The header and the rows of a stored table, block by block, without columns of texts.
+    """The header and the rows of a stored table, block by block.
 
     Raises:
         InputError: it cannot be read, or has no rows.
 
     """
-    texts = record.get("texts", [])
     place = locate(file)
-    columns = tuple(name for name in read_columns(place) if name not in texts)
-    blocks = read_rows(place, texts)
+    columns = read_columns(place)
+    header = header_in(record, columns) if record else None
+    standing = header.standing if header else {}
+    blocks = read_rows(place, {name: one.number for name, one in standing.items()})
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
-    return _header(record, columns, first, file), chain([first], blocks)
+    return header or _header(columns, first, file), chain([first], blocks)
 
 
 def table_in(path: Path) -> Path:
@@ -267,26 +335,18 @@ def read_record(table: Path) -> dict[str, Any]:
             if table.name not in record["files"]:
                 return {}
             header, *_ = header_in(record, ()), ending_in(record), loops_in(record)
-            frozenset(record.get("texts", []))
         except (KeyError, TypeError, AttributeError):
             raise ValueError("it lacks what a run writes") from None
         except InputError as error:
             raise ValueError(str(error)) from None
-        if not all(map(_is_value, header.parameters.values())):
-            raise ValueError("it holds parameters that no run has")
+        for name, value in header.parameters.items():
+            if not isinstance(value, float | int | str):
+                raise ValueError(f"the parameter {name} is {value!r}")
     return dict(record)
 
 
-def _is_value(value: object) -> bool:
-    return isfinite(value) if isinstance(value, float) else isinstance(value, int | str)
-
-
-def _header(
-    record: dict[str, Any], columns: tuple[str, ...], rows: np.ndarray, file: Path
-) -> Header:
-    """The header of a table, with its first rows; where no record tells the step, the first is."""
-    if record:
-        return header_in(record, columns)
+def _header(columns: tuple[str, ...], rows: np.ndarray, file: Path) -> Header:
+    """The header of a table without a record: its first rows tell the step."""
     step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
     if not 0.0 < step < inf:
         raise InputError(f"{file}: times must increase")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -17,7 +16,6 @@ import numpy as np
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.ledger import locate
-from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.master.experiment import format_order
 from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
 from orchestrator.master.observers.observer import Occurrence
@@ -30,6 +28,7 @@ from orchestrator.runs.record import (
     copy_record,
     ending_in,
     loops_in,
+    read_metrics,
     read_record,
     stored_rows,
     table_in,
@@ -182,7 +181,10 @@ class Result(Table):
         import pandas as pd  # noqa: PLC0415
 
         index = pd.Index(self.time, name="time")
-        return pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
+        frame = pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
+        for place, standing in self.header.places():
+            frame.isetitem(place - 1, standing.values(self.rows[:, place]))
+        return frame
 
     def plot(self, *what: str | Result) -> Figure:
         """Plot columns over time, with one panel for each group such as `plant.y`.
@@ -308,12 +310,7 @@ class _OnDisk:
 
     def metrics(self, _: Result) -> dict[str, Any]:
         """What the run wrote: the table may have fewer rows and columns."""
-        path = locate(self._file.with_name(METRICS))
-        with explain_errors(path, "not the indices of a run"):
-            values = json.loads(read_text(path, "not the indices of a run"))
-            if not isinstance(values, dict):
-                raise ValueError("it holds no names")
-            return values
+        return read_metrics(locate(self._file.with_name(METRICS)))
 
     def write_ends(self, folder: Path, result: Result) -> None:
         """Write what the files hold, once more."""
@@ -326,8 +323,6 @@ def read(path: str | Path) -> Result:
     """Read a result that `auv-fmu run` or :meth:`Result.save` has written.
 
         result = read("results/fig4")
-
-    Columns with texts are left out.
 
     Args:
         path: path of the folder, or of a table in it.

@@ -333,8 +333,8 @@ class _Unfinished:
         for run in reversed(done):
             write_metrics(run.folder, run.metrics)
             write_record(
-                run.folder, run.prepared, run.seen.header, run.ending, self._command, self._clock,
-                run.remarks,
+                run.folder, run.prepared, run.seen.whole_header, run.ending, self._command,
+                self._clock, run.remarks,
             )  # fmt: skip
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import tomllib
-from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from fmpy.model_description import ModelVariable
 
 from auv_fmu import path_planner
 from auv_fmu.actuators import Limits
@@ -24,7 +26,17 @@ from orchestrator.master.hooks.timing import InputTable
 from orchestrator.runs import SCENARIOS_FOLDER
 from orchestrator.system.names import PortName, file_name, flatten, for_each, port_name
 from orchestrator.system.structure import System, is_spread
-from orchestrator.system.values import EXACT, finite, type_of, typed
+from orchestrator.system.values import (
+    TYPES,
+    Standing,
+    StringTable,
+    Value,
+    cell,
+    finite,
+    items_of,
+    type_of,
+    typed,
+)
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
@@ -32,6 +44,9 @@ _NOT_A_SCENARIO = "not a scenario"
 
 #: The name of a scenario that has no file.
 _NAMELESS = "scenario"
+
+#: What a message calls a table that cannot be read.
+_NO_INPUTS = "not a table of inputs"
 
 #: What is run besides the scenarios that come with the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
@@ -70,17 +85,61 @@ class Inputs:
     file: Path
     between: str = "linear"
     wins: bool = False
+    _read: dict[Any, list[np.ndarray]] = field(default_factory=dict, repr=False, compare=False)
 
     @cached_property
-    def content(self) -> tuple[list[PortName], np.ndarray]:
-        """Ports by the names of its columns, and its rows, time first; read once for all systems.
+    def names(self) -> tuple[str, ...]:
+        """The names of its columns, after the time.
 
         Raises:
             InputError: the table cannot be read.
 
         """
-        names = [port_name(name) for name in read_columns(self.file)]
-        return names, np.vstack([np.empty((0, 1 + len(names))), *read_rows(self.file)])
+        return read_columns(self.file, _NO_INPUTS)
+
+    def columns(self, variables: Sequence[ModelVariable]) -> list[np.ndarray]:
+        """The times, and the columns in the types of their variables.
+
+        Systems whose variables are alike share what was read.
+
+        Raises:
+            InputError: the table cannot be read, or holds what is not of such a type.
+
+        """
+        kinds = tuple((v.type, v.min, v.max, *items_of(v).items()) for v in variables)
+        if kinds not in self._read:
+            self._read[kinds] = self._columns(variables)
+        return self._read[kinds]
+
+    def _columns(self, variables: Sequence[ModelVariable]) -> list[np.ndarray]:
+        strings = StringTable()
+        numbers: dict[str, Callable[[object], float]] = {}
+        for name, variable in zip(self.names, variables, strict=True):
+            of = TYPES[variable.type]
+            if of.stands or of.family in ("Boolean", "Enumeration"):
+                numbers[name] = partial(_stand_in, name, variable, strings)
+        blocks = read_rows(self.file, numbers, _NO_INPUTS)
+        rows = np.vstack([np.empty((0, 1 + len(variables))), *blocks])
+        times, *columns = rows.T
+        return [times] + [
+            Standing(variable.type, strings).values(column)
+            if TYPES[variable.type].stands
+            else column
+            for variable, column in zip(variables, columns, strict=True)
+        ]
+
+
+def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: object) -> float:
+    """The number for a cell of a table.
+
+    Raises:
+        ValueError: the variable cannot have this value.
+
+    """
+    try:
+        return strings.stand_in(typed(name, variable, cell(variable, value, f"{name}:")))
+    except InputError as error:
+        raise ValueError(str(error)) from None
 
 
 @dataclass(frozen=True)
@@ -214,16 +273,28 @@ def read_inputs(
         InputError: the table cannot be read, or a column is not an available input.
 
     """
+    columns = inputs.names
+    with _in_file(inputs.file):
+        targets = [system.named(port_name(name)) for name in columns]
+        variables = [system.component(one.component).variable(one.port) for one in targets]
+    times, *values = inputs.columns(variables)
+    with _in_file(inputs.file):
+        return with_input_table(system, targets, times, values, given, inputs.between)
+
+
+@contextmanager
+def _in_file(file: Path) -> Iterator[None]:
     try:
-        return with_input_table(system, *inputs.content, given, inputs.between)
+        yield
     except InputError as error:
-        raise InputError(f"{inputs.file}: {error}") from error
+        raise InputError(f"{file}: {error}") from error
 
 
 def with_input_table(
     system: System,
     names: Sequence[PortName],
-    rows: np.ndarray,
+    times: np.ndarray,
+    columns: Sequence[np.ndarray],
     given: Collection[PortName] = (),
     between: str = "linear",
 ) -> tuple[System, InputTable]:
@@ -232,7 +303,8 @@ def with_input_table(
     Args:
         system: that has the inputs.
         names: of the inputs.
-        rows: their values, time first.
+        times: of their values [s].
+        columns: their values, of each input in its type or as doubles.
         given: ports that have values already.
         between: what continuous Real inputs do between two rows.
 
@@ -241,28 +313,34 @@ def with_input_table(
 
     """
     targets = tuple(map(system.named, names))
-    _check_rows(rows, targets)
-    for target, column in zip(targets, rows[:, 1:].T, strict=True):
+    _check_rows(times, columns, targets)
+    for target, column in zip(targets, columns, strict=True):
         if target in map(system.named, given):
             raise InputError(f"{target} is given both a value and a column of the table")
         _check_column(system, target, column)
     linear = [_is_linear(system, target, between) for target in targets]
-    input_table = InputTable(targets, rows[:, 0], rows[:, 1:], np.array(linear))
+    input_table = InputTable.of(targets, times, columns, linear)
     start = system.start_time or 0.0
-    values = map(_number, input_table.at(start, int((input_table.times <= start).sum()) - 1))
-    return system.with_parameters(dict(zip(targets, values, strict=True))), input_table
+    values = input_table.at(start, int((times <= start).sum()) - 1)
+    first = {
+        target: _typed(system, target, value) for target, value in zip(targets, values, strict=True)
+    }
+    return replace(system, parameters={**system.parameters, **first}), input_table
 
 
-def _check_rows(rows: np.ndarray, targets: tuple[PortName, ...]) -> None:
-    if not len(rows) or not targets:
+def _check_rows(
+    times: np.ndarray, columns: Sequence[np.ndarray], targets: tuple[PortName, ...]
+) -> None:
+    if not len(times) or not targets:
         raise InputError("holds no inputs: write a column time, one for each input, and rows")
     if len(set(targets)) < len(targets):
         raise InputError("two columns have the same name")
-    if not np.isfinite(rows).all():
+    numbers = [times, *(column for column in columns if column.dtype.kind == "f")]
+    if not all(np.isfinite(column).all() for column in numbers):
         raise InputError("all times and values must be finite")
-    if (rows[1:, 0] < rows[:-1, 0]).any():
+    if (times[1:] < times[:-1]).any():
         raise InputError("times must not decrease")
-    if rows[-1, 0] / 2 - rows[0, 0] / 2 > _FARTHEST / 2:
+    if times[-1] / 2 - times[0] / 2 > _FARTHEST / 2:
         raise InputError(f"times must be less than {_FARTHEST:g} s apart")
 
 
@@ -271,21 +349,19 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
     variable = system.component(target.component).variable(target.port)
     if variable.causality != "input":
         raise InputError(f"{target} has causality {variable.causality}, not input")
-    if type_of(variable) == "String":
-        raise InputError(f"{target} is a String: a table holds only numbers")
     for connection in system.connections:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
     is_real = type_of(variable) == "Real"
-    if type_of(variable) == "Integer" and abs(column).max() > EXACT:
-        raise InputError(f"{target}: a table holds integers up to 2^53 only")
-    for value in (column.min(), column.max()) if is_real else np.unique(column):
-        typed(str(target), variable, _number(value))
+    values = np.array([column.min(), column.max()]) if is_real else np.unique(column)
+    for value in values.tolist():
+        _typed(system, target, value)
 
 
-def _number(value: float) -> str:
-    """A number as an Integer is written as well: without a point where it is whole."""
-    return f"{value:.17g}"
+def _typed(system: System, target: PortName, value: Value) -> Value:
+    """A value of a table in the type of an input, which takes whole doubles as integers, too."""
+    variable = system.component(target.component).variable(target.port)
+    return typed(str(target), variable, f"{value:.17g}" if isinstance(value, float) else value)
 
 
 def _is_linear(system: System, target: PortName, between: str) -> bool:

@@ -40,7 +40,8 @@ class InputsTable(TomlTable):
 
     file: str = needed(
         "A table in CSV or Parquet, its path relative to this file: `time` [s] first, then inputs "
-        "that nothing feeds, as `component.port`.",
+        "that nothing feeds, as `component.port`. It holds numbers, `true` and `false`, names of "
+        "items of an Enumeration, and texts of a String.",
         '"inputs.csv"',
     )
     between: Annotated[str, OneOf(INTERPOLATIONS)] = entry(

@@ -6,6 +6,7 @@ import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from fmus.kinds import AUTO, KindName
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.experiment import CouplingName, Order
 from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.loop import LOOPS, LoopName
+from orchestrator.master.loop import LOOPS, PYTHON_LOOP, LoopName
 from orchestrator.master.observers.observer import Observer, Progress
 from orchestrator.runs.folder import lock_folder, make_folder
 from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
@@ -37,7 +38,8 @@ class _Made:
     """Where a result comes from that was computed in this process."""
 
     def __init__(self, prepared: Prepared) -> None:
-        self._prepared, self._clock = prepared, Stopwatch()
+        # The loop is not needed any more, and another process could not have its library.
+        self._prepared, self._clock = replace(prepared, stepping=PYTHON_LOOP), Stopwatch()
 
     @property
     def scenario(self) -> Scenario:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from sys import float_info
+from math import isfinite
 
 import numpy as np
 from fmpy.model_description import ModelVariable
@@ -13,7 +13,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.system.values import EXACT, TYPES, unit_of
+from orchestrator.system.values import TYPES, unit_of
 
 #: What can be fed from another family of types, besides from its own.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
@@ -82,22 +82,25 @@ def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
 
 def _check_transformed(connection: Connection, fmi_type: str) -> None:
     """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
-    linear = isinstance(connection.transformation, Linear)
+    wire = f"{connection.source} -> {connection.target}"
     of = TYPES[fmi_type]
     is_real = of.family == "Real"
-    if of.family == "String" or (linear and not is_real):
-        how = "transformed linearly" if linear else "mapped"
-        raise InputError(
-            f"{connection.source} -> {connection.target}: a value of type {fmi_type} cannot be "
-            f"{how}"
-        )
-    if isinstance(connection.transformation, Mapped):
-        # Mappings are written in doubles.
-        exact = float_info.max if is_real else EXACT
-        least, most = max(of.least, -exact), min(of.most, exact)
-        for _, value in connection.transformation.pairs:
-            if not least <= value <= most or (not is_real and value != int(value)):
+    match connection.transformation:
+        case Linear(factor, offset):
+            if not is_real:
                 raise InputError(
-                    f"{connection.source} -> {connection.target}: is mapped to {value:.16g}, which "
-                    f"FMI type {fmi_type} cannot hold"
+                    f"{wire}: a value of type {fmi_type} cannot be transformed linearly"
                 )
+            if not (isfinite(factor) and isfinite(offset)):
+                raise InputError(
+                    f"{wire}: the factor {factor:g} or the offset {offset:g} is not finite"
+                )
+        case Mapped(pairs):
+            if of.family == "String":
+                raise InputError(f"{wire}: a {fmi_type} cannot be mapped")
+            for _, value in pairs:
+                if not of.least <= value <= of.most or value != (float if is_real else int)(value):
+                    shown = value if isinstance(value, int) else f"{value:.16g}"
+                    raise InputError(
+                        f"{wire}: is mapped to {shown}, which FMI type {fmi_type} cannot hold"
+                    )

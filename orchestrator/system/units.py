@@ -36,7 +36,7 @@ class Mapped:
     """The target takes what stands beside the source's value; any other value stays as it is.
 
     Attributes:
-        pairs: values of source and target, truth values as zero and one.
+        pairs: values of source and target, truth values as zero and one, integers exact.
 
     """
 

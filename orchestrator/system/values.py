@@ -113,14 +113,15 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
         if type_of(variable) == "Boolean":
             return BOOLEANS[text.lower()]
         if type_of(variable) == "String":
-            return _transferable(text)
-        if type_of(variable) == "Enumeration":
-            text = items_of(variable).get(text, text)
-        number = real(text) if type_of(variable) == "Real" else integer(text)
+            return _transferable(str(value))
+        items = items_of(variable)
+        number = real(text) if type_of(variable) == "Real" else integer(items.get(text, text))
+        if items and not any(number == int(value) for value in items.values()):
+            raise ValueError(f"{number} is not an item")
     except (KeyError, ValueError):
         # Python itself refuses to write and to read integers of very many digits.
-        items = ", ".join(items_of(variable))
-        words = f"one of {items}" if items else _IN_WORDS.get(type_of(variable), "an integer")
+        names = ", ".join(items_of(variable))
+        words = f"one of {names}" if names else _IN_WORDS.get(type_of(variable), "an integer")
         raise InputError(f"{name}{shown}: not {words}") from None
     if isinstance(number, float) and not isfinite(number):
         raise InputError(f"{name}{shown}: must be finite")
@@ -131,6 +132,28 @@ def typed(name: str, variable: ModelVariable, value: object) -> Value:
         raise InputError(f"{name}{shown}: must be at most {_written(upper)}")
     # What the FMU will hold.
     return ctypes.c_float(number).value if variable.type == "Float32" else number
+
+
+def cell(variable: ModelVariable, value: object, where: str = "") -> Value:
+    """A value of a table: numbers, truth values and names of items as a run or a user writes them.
+
+    Args:
+        variable: whose column it is in; only its type and the names of its items count.
+        value: a number, a truth value or a text.
+        where: it stands, for the message.
+
+    Raises:
+        ValueError: it is neither a finite number nor another value of the type.
+
+    """
+    text, family = str(value), type_of(variable)
+    if family == "String":
+        return _transferable(text)
+    word = text.strip()
+    if family == "Boolean" and word.lower() in BOOLEANS:
+        return BOOLEANS[word.lower()]
+    word = items_of(variable).get(word, word)
+    return finite(word, where) if family == "Real" else whole(word, where)
 
 
 def real(text: str) -> float:
@@ -161,6 +184,25 @@ def finite(text: str, where: str) -> float:
     if not isfinite(number):
         raise ValueError(f"{where} {text[:40]!r} is not finite")
     return number
+
+
+def whole(text: str, where: str) -> int:
+    """An integer from a file, which other tools may have written with a point.
+
+    Args:
+        text: of the number.
+        where: it stands, for the message.
+
+    Raises:
+        ValueError: it is not one.
+
+    """
+    number = finite(text, where)
+    with suppress(ValueError):
+        return integer(text)
+    if not number.is_integer():
+        raise ValueError(f"{where} {text[:40]!r} is not an integer")
+    return int(number)
 
 
 def is_finite(value: object) -> bool:
@@ -263,6 +305,12 @@ def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
     return np.asarray(fit)
 
 
+def as_float32(numbers: np.ndarray) -> np.ndarray:
+    """Numbers as a Float32 holds them; those that are too large for one stay as they are."""
+    fit = np.abs(numbers) <= TYPES["Float32"].most
+    return np.where(fit, np.where(fit, numbers, 0.0).astype(np.float32), numbers)
+
+
 def unit_of(variable: ModelVariable) -> str | None:
     """The unit of a variable, its own or its type's."""
     declared = variable.declaredType
@@ -362,6 +410,19 @@ class Standing(NamedTuple):
         """
         return self.strings.text(number) if self.c_type is None else self.strings.integer(number)
 
-    def number(self, value: str | int) -> float:
-        """The number that stands for a value."""
-        return self.strings.stand_in(value)
+    def values(self, numbers: np.ndarray) -> np.ndarray:
+        """A column in its type, from its numbers in the row.
+
+        Raises:
+            ValueError: a number stands for no value.
+
+        """
+        if self.c_type is not None and (np.abs(numbers) < _BEYOND).all():
+            return numbers.astype(self.c_type)
+        return np.array(list(map(self.value, numbers.tolist())), dtype=self.c_type or str)
+
+    def number(self, value: str | float) -> float:
+        """The number that stands for a value, or for the text of one."""
+        if self.c_type is None:
+            return self.strings.number(str(value))
+        return self.strings.stand_in(int(value))

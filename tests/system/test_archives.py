@@ -99,6 +99,24 @@ def test_archive_that_tools_unpack_differently_is_refused(dist, tmp_path, name):
         read_ssp(archive)
 
 
+@pytest.mark.filterwarnings("ignore:Duplicate name")
+def test_an_entry_that_is_listed_twice_alike_is_one(dist: Path, tmp_path: Path):
+    """As a Reference FMU has a folder; another content of the same length is another file."""
+    for second, same in ((b"same", True), (b"sama", False)):
+        archive = tmp_path / f"{same}.fmu"
+        with zipfile.ZipFile(archive, "w") as content:
+            for entry, data in entries(dist / "AuvPlant.fmu").items():
+                content.writestr(zipfile.ZipInfo(entry), data)
+            for data in (b"same", second):
+                content.writestr(zipfile.ZipInfo("extra/"), b"")
+                content.writestr(zipfile.ZipInfo("extra/a"), data)
+        if same:
+            assert (read_component("plant", archive).folder / "extra" / "a").read_bytes() == b"same"
+        else:
+            with pytest.raises(InputError, match="twice"):
+                read_component("plant", archive)
+
+
 def test_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """A megabyte of zeros, a thousand files, a long description: each beyond a bound set lower."""
     monkeypatch.setattr(user_files, "_MOST_BYTES", 500_000)

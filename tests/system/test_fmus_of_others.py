@@ -12,6 +12,7 @@ import fmpy
 import numpy as np
 import pytest
 
+from orchestrator import read
 from orchestrator.commands.main import main
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
@@ -100,6 +101,7 @@ def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form
     _, table, *_ = read_result(Path("r"))
     assert (table["a.y"] == 101325.0).all()
     assert "a.heard" not in table
+    assert read(Path("r"))["a.heard"].tolist() == [said] * 4
 
 
 @EVERY_WAY

@@ -24,7 +24,7 @@ from orchestrator.formats.ssp.hierarchy import (
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.system.names import listed
 from orchestrator.system.units import Linear, Mapped, Transformation, Unit, combine
-from orchestrator.system.values import BOOLEANS, family_of, finite
+from orchestrator.system.values import BOOLEANS, family_of, finite, whole
 from orchestrator.system.variables import element_names
 
 _TABLES = (
@@ -65,20 +65,18 @@ def _transformation(content: Element, source: Items, target: Items) -> Transform
     return None
 
 
-def _value(table: str, entry: Element, end: str, items: Items) -> float:
+def _value(table: str, entry: Element, end: str, items: Items) -> int:
     """One value of a table, as the number that FMI has for it."""
     text = entry.get(end, "")
     if table.startswith("Boolean"):
         if text not in BOOLEANS:
             raise ValueError(f"{end} {text!r} of a mapping is neither true nor false")
-        return float(BOOLEANS[text])
+        return int(BOOLEANS[text])
     if table.startswith("Enumeration"):
         if text not in items:
             raise ValueError(f"{end} {text!r} of a mapping is not in its enumeration")
-        return float(items[text])
-    if (value := finite(text, end)) != int(value):
-        raise ValueError(f"{end} {text!r} of a mapping is not an integer")
-    return value
+        return int(items[text])
+    return whole(text, f"{end} of a mapping:")
 
 
 def _converts_units(content: Element) -> bool:

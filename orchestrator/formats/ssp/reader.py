@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
@@ -18,8 +19,8 @@ from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName, listed
 from orchestrator.system.structure import System
-from orchestrator.system.units import Transformation, Unit, combine
-from orchestrator.system.values import BOOLEANS, Value, real, typed
+from orchestrator.system.units import Mapped, Transformation, Unit, combine
+from orchestrator.system.values import BOOLEANS, Value, integer, real, typed
 
 #: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
 #: and ecos, of Vico, and of OMSimulator.
@@ -299,7 +300,7 @@ class _Ports:
         items = {**connector.items, **given.items}
         value: object = items.get(given.text, given.text)
         if whole is not None:
-            value = whole(_number(port, str(value)))
+            value = whole(_number(port, str(value), isinstance(whole, Mapped)))
         if isinstance(value, float) and value.is_integer() and connector.type != "Real":
             value = int(value)
         self.parameters[port] = typed(str(port), component.variable(port.port), value)
@@ -310,8 +311,11 @@ class _Ports:
             raise InputError(f"{port} = {shortened(text)}: sizes of arrays cannot be changed")
 
 
-def _number(port: PortName, text: str) -> float:
-    """A value that is transformed, as a number."""
+def _number(port: PortName, text: str, is_mapped: bool) -> float:
+    """A value that is transformed, as a number; one that is mapped is exact."""
+    if is_mapped:
+        with suppress(ValueError):
+            return integer(text)
     try:
         return float(BOOLEANS[text]) if text in BOOLEANS else real(text)
     except ValueError:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Mapping, Sequence
 from io import BytesIO
-from operator import itemgetter
+from math import isfinite
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree import ElementTree
@@ -15,7 +16,8 @@ from fmpy.model_description import ModelVariable
 
 from orchestrator.formats.ssp import LEFT_OPEN, OMS, ORDER, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.formats.ssp.nesting import End, Line, Nest, nested, order_of
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import InputError, shortened
+from orchestrator.machine.user_files import read_archive
 from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
 from orchestrator.system.structure import System, flattened
@@ -34,6 +36,9 @@ _LIBCOSIM = "com.opensimulationplatform"
 
 #: What marks annotations of this master.
 _OURS = "auv-fmu"
+
+#: What XML 1.0 cannot hold.
+_FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 #: Where tools draw the components: size of a box, and the distance to the next.
 _BOX, _GAP = (40.0, 60.0), 30.0
@@ -66,10 +71,11 @@ def ssp_bytes(system: System, flat: bool = False) -> bytes:
         for name, source in _parameter_sources(system).items():
             values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
-        fmus = {sources[name]: component.fmu for name, component in system.components.items()}
+        fmus = {sources[name]: component for name, component in system.components.items()}
         # In the order of their paths, as before there were copies.
-        for source, fmu in sorted(fmus.items(), key=itemgetter(1)):
-            content.writestr(ZipInfo(source, _EPOCH), fmu.read_bytes())
+        for source, component in sorted(fmus.items(), key=lambda one: one[1].fmu):
+            fmu = read_archive(component.fmu, component.digest)
+            content.writestr(ZipInfo(source, _EPOCH), fmu)
     return archive.getvalue()
 
 
@@ -117,7 +123,7 @@ def parameter_set_xml(
             for text in texts:
                 _add(value, "ssv:Value", value=text)
         _add_dimensions(element, members[0])
-    return _serialised(root)
+    return serialised(root, component.name)
 
 
 def _text(component: Component, variable: ModelVariable, values: Mapping[str, Value]) -> str:
@@ -127,8 +133,14 @@ def _text(component: Component, variable: ModelVariable, values: Mapping[str, Va
         raise InputError(
             f"{component.name}.{variable.name} has no value, and an SSP holds whole arrays only"
         )
-    items = (item for item, number in items_of(variable).items() if int(number) == value)
-    return next(items, literal(value))
+    items = items_of(variable)
+    names = [item for item, number in items.items() if int(number) == value]
+    if (isinstance(value, float) and not isfinite(value)) or (items and not names):
+        raise InputError(
+            f"{component.name}.{variable.name} = {literal(value)}: an SSP holds finite numbers and "
+            "items of enumerations only"
+        )
+    return names[0] if names else literal(value)
 
 
 def _add_dimensions(parent: Element, variable: ModelVariable) -> None:
@@ -145,12 +157,35 @@ def _add(parent: Element, tag: str, /, **attributes: str) -> Element:
     return SubElement(parent, _tag(tag), attributes)
 
 
-def _serialised(root: Element) -> bytes:
+def serialised(root: Element, whose: str = "") -> bytes:
+    """An element as a file of XML.
+
+    Args:
+        root: the element.
+        whose: it is, for the message.
+
+    Raises:
+        InputError: it holds a character that XML has no words for.
+
+    """
+    _check_characters(root, whose)
     for prefix, namespace in _PREFIXES.items():
         ElementTree.register_namespace(prefix, namespace)
     ElementTree.indent(root)
     content: bytes = ElementTree.tostring(root, encoding="UTF-8", xml_declaration=True)
     return content
+
+
+def _check_characters(element: Element, where: str) -> None:
+    for value in element.attrib.values():
+        if (found := _FORBIDDEN.search(value)) is not None:
+            place = _FORBIDDEN.sub("?", where) or "the system"
+            raise InputError(
+                f"{place}: {shortened(value)!r} holds the character {found[0]!r}, which XML cannot "
+                "hold"
+            )
+    for child in element:
+        _check_characters(child, ".".join(filter(None, (where, child.get("name", "")))))
 
 
 def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> bytes:
@@ -175,7 +210,7 @@ def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> b
     _add_enumerations(root, system)
     _add_units(root, system)
     _add_experiment(root, system, order_of(nest))
-    return _serialised(root)
+    return serialised(root)
 
 
 class _Given(NamedTuple):
@@ -262,7 +297,7 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
     if isinstance(made, Linear) and made != Linear():
         numbers = {"factor": str(made.factor), "offset": str(made.offset)}
         _add(element, "ssc:LinearTransformation", **numbers)
-    elif isinstance(made, Mapped):
+    elif isinstance(made, Mapped) and made.pairs:
         fmi_type = type_of(system.component(source.component).variable(source.port))
         of = bool if fmi_type == "Boolean" else int
         # Numbers of an enumeration are integers as well.

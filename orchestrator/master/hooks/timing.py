@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from math import ceil, isfinite, log
@@ -14,6 +15,7 @@ import numpy as np
 from orchestrator.machine.errors import InputError
 from orchestrator.master.hooks.hook import NEVER, Run
 from orchestrator.system.names import PortName
+from orchestrator.system.values import Value
 
 #: The clock is looked at after as many steps as take so long by it [s].
 _GRAIN = 1e-3
@@ -39,6 +41,8 @@ class InputTable:
         values: of each input at each time, (times, targets).
         linear: which inputs go from one value to the next in a straight line; the others hold a
             value until the next.
+        exact: columns of texts and of integers of 64 bits, by their places; `values` has zeros
+            there.
 
     """
 
@@ -46,15 +50,30 @@ class InputTable:
     times: np.ndarray
     values: np.ndarray
     linear: np.ndarray
+    exact: Mapping[int, np.ndarray] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls,
+        targets: tuple[PortName, ...],
+        times: np.ndarray,
+        columns: Sequence[np.ndarray],
+        linear: Sequence[bool],
+    ) -> InputTable:
+        """A table of columns, each in its type."""
+        exact = {place: one for place, one in enumerate(columns) if one.dtype.kind != "f"}
+        nothing = np.zeros(len(times))
+        values = [nothing if place in exact else one for place, one in enumerate(columns)]
+        return cls(targets, times, np.column_stack(values), np.array(linear), exact)
 
     @property
     def digest(self) -> str:
         """Another one for other values."""
         names = " ".join(map(str, self.targets)).encode()
-        arrays = (self.times, self.values, self.linear)
+        arrays = (self.times, self.values, self.linear, *self.exact.values())
         return sha256(names + b"".join(array.tobytes() for array in arrays)).hexdigest()
 
-    def at(self, time: float, row: int) -> np.ndarray:
+    def at(self, time: float, row: int) -> list[Value]:
         """The values at a time [s], of which a row is the last that is not after it."""
         row = max(row, 0)
         here, following = self.values[row], self.values[min(row + 1, len(self.values) - 1)]
@@ -64,7 +83,9 @@ class InputTable:
             line = (1.0 - passed) * here + passed * following
         else:
             line = here + passed * (following - here)
-        between: np.ndarray = np.where(self.linear, line, here)
+        between: list[Value] = np.where(self.linear, line, here).tolist()
+        for place, column in self.exact.items():
+            between[place] = column[row].item()
         return between
 
     @cached_property
@@ -92,7 +113,7 @@ class Playback:
             self._steps = np.array([run.experiment.reaching(time) for time in input_table.times])
         row = int(np.searchsorted(self._steps, run.made, side="right")) - 1
         for target, value in zip(input_table.targets, input_table.at(run.time, row), strict=True):
-            run.overrides.supply(target, float(value))
+            run.overrides.supply(target, value)
         if row + 1 == len(self._steps):
             return NEVER
         return run.made + 1 if input_table.linear.any() else int(self._steps[row + 1])

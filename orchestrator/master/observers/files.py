@@ -103,9 +103,11 @@ class CsvLines:
 
         """
         self._file.check_place()
-        text = StringIO(newline="")
-        csv.writer(text, lineterminator="\n").writerows(lines)
-        content = text.getvalue().encode()
+        text = _in_csv(lines)
+        if "\r" in text:
+            # Readers take one outside quotes for the end of a line, and Python puts it in none.
+            text = _in_csv(lines, csv.QUOTE_NONNUMERIC)
+        content = text.encode()
         begin, n = self._file.tell(), 0
         try:
             while n < len(content):
@@ -117,6 +119,12 @@ class CsvLines:
     def close(self) -> None:
         """Close the file."""
         self._file.close()
+
+
+def _in_csv(lines: Sequence[Sequence[object]], quoting: Any = csv.QUOTE_MINIMAL) -> str:
+    text = StringIO(newline="")
+    csv.writer(text, lineterminator="\n", quoting=quoting).writerows(lines)
+    return text.getvalue()
 
 
 class CsvFile:
@@ -135,8 +143,8 @@ class CsvFile:
         """Write some rows."""
         lines = rows.tolist()
         for place, standing in self._standing:
-            for line in lines:
-                line[place] = standing.value(line[place])
+            for line, value in zip(lines, standing.values(rows[:, place]).tolist(), strict=True):
+                line[place] = value
         self._lines.write(lines)
 
     def end(self, ending: Ending) -> None:
@@ -201,7 +209,7 @@ class ParquetFile:
     def _write(self, rows: np.ndarray) -> None:
         columns = [self._arrow.array(column) for column in rows.T]
         for place, standing in self._standing:
-            values = [standing.value(number) for number in rows[:, place]]
+            values = standing.values(rows[:, place])
             columns[place] = self._arrow.array(values, self._schema.types[place])
         self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
         self._n += 1

@@ -23,7 +23,7 @@ import numpy as np
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
 from orchestrator.master.experiment import ROUNDING, Experiment
 from orchestrator.system.names import PortName
-from orchestrator.system.values import Standing
+from orchestrator.system.values import Standing, as_float32
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2
@@ -62,6 +62,12 @@ class Header:
     def parameter_names(self) -> frozenset[str]:
         """`component.name` of every parameter."""
         return frozenset(map(str, self.parameters))
+
+    @property
+    def numeric_columns(self) -> tuple[str, ...]:
+        """The columns that do not hold texts."""
+        texts = {name for name, one in self.standing.items() if one.c_type is None}
+        return tuple(name for name in self.columns if name not in texts)
 
     def places(self) -> list[tuple[int, Standing]]:
         """Where these are in a row, time first, and what their numbers stand for."""
@@ -148,6 +154,7 @@ class Blocks:
         width: int,
         observers: Sequence[Observer],
         ours: Callable[[], AbstractContextManager[None]] = nullcontext,
+        rounded: Sequence[int] = (),
     ) -> None:
         """Make room for one block.
 
@@ -155,6 +162,7 @@ class Blocks:
             width: values in a row, without the time.
             observers: to be told.
             ours: a context that they are told in.
+            rounded: places of values that FMUs get as Float32.
 
         """
         self._rows = np.empty((_ROWS, 1 + width))
@@ -162,6 +170,7 @@ class Blocks:
         self.block = CBlock(self._rows.ctypes.data, _ROWS)
         self.due = monotonic() + _PATIENCE
         self._observers, self._ours = observers, ours
+        self._rounded = list(rounded)
 
     def append(self, t: float, values: np.ndarray) -> None:
         """Take a row."""
@@ -183,6 +192,9 @@ class Blocks:
         if n := self.block.n:
             # Counted as told before they are told: an observer that fails is not told twice.
             self.block.n = 0
+            if self._rounded:
+                values = self._values[:n]
+                values[:, self._rounded] = as_float32(values[:, self._rounded])
             with self._ours():
                 self._tell(self._rows[:n])
         self.due = monotonic() + _PATIENCE

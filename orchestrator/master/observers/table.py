@@ -98,9 +98,7 @@ class Table:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), self.header.place)}")
         values = self.rows[:, self.header.place[column]]
         standing = self.header.standing.get(column)
-        if standing is None:
-            return values
-        return np.array([standing.value(number) for number in values], dtype=standing.c_type)
+        return values if standing is None else standing.values(values)
 
     @property
     def rows(self) -> np.ndarray:

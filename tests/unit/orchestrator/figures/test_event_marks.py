@@ -28,9 +28,9 @@ def numbers_in(axes):
 
 def test_events_have_numbers_in_the_panels_and_their_names_below_the_figure():
     table = with_events(
-        Occurrence(2.0, "drop plant.y", "no position"),
-        Occurrence(4.00000001, "drop plant.y, ended"),
-        Occurrence(5.0, "stop", "power lost"),
+        Occurrence(2.0, "drop plant.y", "no position", 0),
+        Occurrence(4.00000001, "drop plant.y, ended", event=0),
+        Occurrence(5.0, "stop", "power lost", 1),
     )
     figure, _ = compose("", FIGURES["comparison"][""], [Drawn("run", table)])
     assert figure.get_supxlabel() == "1: no position, 2 to 4 s; 2: power lost, 5 s"
@@ -42,7 +42,7 @@ def test_events_have_numbers_in_the_panels_and_their_names_below_the_figure():
 
 
 def test_events_leave_the_axes_as_they_are():
-    table = with_events(Occurrence(2.0, "stop", "power lost"))
+    table = with_events(Occurrence(2.0, "stop", "power lost", 1))
     limits = [
         panel(compose("", FIGURES["comparison"][""], [Drawn("run", one)])[0], "$e_x$ [m]")
         for one in (table, loop_table())
@@ -67,3 +67,24 @@ def test_numbers_of_events_do_not_lie_upon_each_other():
     boxes = [text.get_window_extent() for text in numbers_in(panel(figure, "$e_x$ [m]"))]
     assert len(boxes) == 5
     assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_an_event_has_its_own_end_whatever_the_texts_begin_with():
+    """One lasts to the end of the run; those of the others begin with its text."""
+    events = [
+        Occurrence(1.0, "freeze a.u", "for ever", 0),
+        Occurrence(2.0, "freeze a.u, a.v", "both", 1),
+        Occurrence(3.0, "freeze a.u, a.v, ended", event=1),
+        Occurrence(3.5, "override a.u = 1", "one", 2),
+        Occurrence(4.0, "override a.u = 10", "ten", 3),
+        Occurrence(5.0, "override a.u = 10, ended", event=3),
+        Occurrence(6.0, "override a.u = 1, ended", event=2),
+        *(Occurrence(6.0 + 0.01 * i, "pulse", "pulse", 4) for i in range(20)),
+        Occurrence(7.0, "pulse, ended", event=4),
+    ]
+    figure, _ = compose("", FIGURES["comparison"][""], [Drawn("run", with_events(*events))])
+    said = figure.get_supxlabel().replace("\n", " ")
+    assert said.startswith(
+        "1: for ever, 1 s; 2: both, 2 to 3 s; 3: one, 3.5 to 6 s; 4: ten, 4 to 5 s; "
+        "5: pulse, 6 to 7 s"
+    )

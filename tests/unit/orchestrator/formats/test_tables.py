@@ -69,8 +69,29 @@ def test_missing_file_is_refused(tmp_path: Path):
         read_columns(tmp_path / "missing.csv")
 
 
-def test_texts_among_numbers_are_left_out_whatever_they_hold(tmp_path: Path):
+def test_texts_among_numbers_are_handed_over_as_they_are(tmp_path: Path):
+    path, texts = tmp_path / "texts.csv", []
+    path.write_bytes(b'time,a.s,b.x\n0,"1,""2""",5\n\n1,"two\n\nlines,\r\n",6\n2,,7\n3, x ,8\n')
+    [rows] = read_rows(path, {"a.s": lambda text: texts.append(text) or len(texts)})
+    np.testing.assert_array_equal(rows, [[0, 1, 5], [1, 2, 6], [2, 3, 7], [3, 4, 8]])
+    assert texts == ['1,"2"', "two\n\nlines,\r\n", "", " x "]
+
+
+def test_what_cannot_be_a_number_is_said_by_who_makes_it_one(tmp_path: Path):
+    def refuse(text: str) -> float:
+        raise ValueError(f"a.s: {text} is no colour")
+
     path = tmp_path / "texts.csv"
-    path.write_text('time,a.s,b.x\n0,"1,""2""",5\n1,"two\n\nlines, and",6\n2,,7\n')
-    [rows] = read_rows(path, {"a.s"})
-    np.testing.assert_array_equal(rows, [[0, 5], [1, 6], [2, 7]])
+    path.write_text("time,a.s\n0,much\n")
+    with pytest.raises(InputError) as error:
+        list(read_rows(path, {"a.s": refuse}, "not a table of inputs"))
+    assert str(error.value) == f"{path}: not a table of inputs: a.s: much is no colour"
+
+
+def test_a_value_that_is_missing_in_parquet_is_no_text(tmp_path: Path):
+    arrow = pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
+    parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `parquet`")
+    path = tmp_path / "other.parquet"
+    parquet.write_table(arrow.table({"time": [0.0, 1.0], "a.s": ["x", None]}), path)
+    with pytest.raises(InputError, match="missing"):
+        list(read_rows(path, {"a.s": len}))

@@ -129,6 +129,9 @@ class FourValues(SimpleNamespace):
         columns = {OUT: 0, FED: 1, ALSO: 2, FREE: 3}
         super().__init__(values=values, columns=columns, number=float)
 
+    def number_of(self, _: PortName, value: float) -> float:
+        return value
+
     def places(self, connections):
         return np.array([[self.columns[c.target], self.columns[c.source]] for c in connections]).T
 

@@ -23,6 +23,7 @@ from orchestrator.runs.record import (
     content_of,
     ending_in,
     header_in,
+    in_json,
     leave_checkpoints,
     loops_in,
     read_record,
@@ -35,7 +36,7 @@ from orchestrator.vehicle.signals import STANDARD, Loop
 from support.linear import SINE, linear, system_of
 from support.texts import mentions
 
-NUMBERS = st.floats(allow_nan=False, allow_infinity=False)
+NUMBERS = st.floats(allow_nan=False)
 WORDS = st.text(max_size=20)
 NAMES = st.text("abc_", min_size=1, max_size=5)
 TIMES = st.floats(0.0, 1e6)
@@ -53,7 +54,8 @@ HEADERS = st.builds(
     st.just(("a.x", "b.y")),
     EXPERIMENTS,
     st.dictionaries(
-        st.builds(PortName, NAMES, WORDS.filter(bool)), NUMBERS | st.booleans() | WORDS
+        st.builds(PortName, NAMES, WORDS.filter(bool)),
+        NUMBERS | st.booleans() | WORDS | st.just("-inf"),
     ),
     st.sampled_from(["python", "compiled"]),
     units=st.dictionaries(st.just("a.x"), NAMES),
@@ -63,14 +65,14 @@ ENDINGS = st.builds(
     st.none() | WORDS,
     st.none() | WORDS,
     st.lists(WORDS).map(tuple),
-    events=st.lists(st.builds(Occurrence, TIMES, WORDS, WORDS, st.just(0))).map(tuple),
+    events=st.lists(st.builds(Occurrence, TIMES, WORDS, WORDS, st.integers(0, 9))).map(tuple),
 )
 LOOPS = st.lists(st.builds(Loop, NAMES, NAMES, NAMES, NAMES), min_size=1, max_size=3).map(tuple)
 
 
 @given(HEADERS, ENDINGS, LOOPS)
 def test_all_that_is_written_of_a_table_is_read_again(header, ending, loops):
-    content = json.loads(json.dumps(content_of(header, ending, loops)))
+    content = json.loads(in_json(content_of(header, ending, loops)), parse_constant=pytest.fail)
     found = header_in(content, header.columns)
     assert found == header
     # Equality does not look at these, nor tell 1, 1.0 and True apart.
@@ -118,7 +120,7 @@ def test_a_table_is_read_with_its_record_or_without(folder):
     "change",
     [
         {"files": None}, {"experiment": None}, {"experiment": {"step": 0.5}}, {"events": [{}]},
-        {"parameters": {"a.k": float("nan")}}, {"parameters": {"a.k": [1]}},
+        {"types": {"a.x": "Real"}}, {"types": ["a.x"]}, {"parameters": {"a.k": [1]}},
         {"parameters": {"a": 1.0}}, {"vehicles": [{"ship": "a"}]}, {"texts": 3},
         {"experiment": {"step": -0.5, "stop_time": 1.0}},
     ],

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import multiprocessing
+import pickle
+from concurrent.futures import ProcessPoolExecutor
+from copy import deepcopy
 from html.parser import HTMLParser
 
 import numpy as np
@@ -13,7 +17,9 @@ import orchestrator
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.figures.drawing import save
+from orchestrator.machine.children import find_compiler
 from orchestrator.system.names import PortName
+from support.tiers import slow
 
 
 @pytest.fixture(scope="module")
@@ -45,12 +51,53 @@ def test_stored_result_is_the_same_again(result, tmp_path):
             _ = again.system
 
 
+def is_the_same(one: Result, other: Result) -> bool:
+    return (
+        np.array_equal(one.rows, other.rows)
+        and repr(one) == repr(other)
+        and one.metrics() == other.metrics()
+        and dict(one.parameters) == dict(other.parameters)
+        and one.events == other.events
+        and str(one.system) == str(other.system)
+    )
+
+
+@pytest.mark.parametrize("loop", ["python", "compiled"])
+def test_a_result_is_copied_with_all_that_it_has(tmp_path, loop):
+    if loop == "compiled" and find_compiler() is None:
+        pytest.skip("there is no C compiler")
+    events = [{"at": 0.04, "lose": "controller.tau.r"}]
+    made = simulate("fig4", stop_time=0.1, events=events, loop=loop)
+    for again in (deepcopy(made), pickle.loads(pickle.dumps(made))):
+        assert is_the_same(again, made)
+        folders = [one.save(tmp_path / name) for one, name in ((made, "made"), (again, "again"))]
+        for name in ("result.csv", "metrics.json"):
+            first, second = ((folder / name).read_bytes() for folder in folders)
+            assert first == second
+        stored = read(folders[0])
+        assert np.array_equal(pickle.loads(pickle.dumps(stored)).rows, made.rows)
+        assert again.figure().axes
+
+
+@pytest.mark.parametrize("method", ["spawn", *slow("fork", "forkserver")])
+def test_a_result_comes_out_of_a_pool_of_processes(tmp_path, method):
+    """Also after the process that has made it has ended, with all that it had unpacked."""
+    if method not in multiprocessing.get_all_start_methods():
+        pytest.skip(f"there is no {method} here")
+    context = multiprocessing.get_context(method)
+    loop = "python" if find_compiler() is None else "compiled"
+    with ProcessPoolExecutor(1, mp_context=context) as pool:
+        found = pool.submit(simulate, "fig4", stop_time=0.1, loop=loop).result()
+    assert is_the_same(found, simulate("fig4", stop_time=0.1))
+    assert np.array_equal(read(found.save(tmp_path)).rows, found.rows)
+
+
 def test_failure_and_events_are_read_again(tmp_path):
     events = [{"at": 0.04, "lose": "controller.tau.r"}, {"at": 0.08, "stop": True}]
     made = simulate("fig4", stop_time=0.2, events=events)
     again = read(made.save(tmp_path / "stopped"))
     assert len(again.events) == 2
-    assert [(e.time, e.text) for e in again.events] == [(e.time, e.text) for e in made.events]
+    assert again.events == made.events
     failed = simulate("fig4", {"plant.d11": 1e4})
     assert failed.failure is not None
     assert read(failed.save(tmp_path / "failed")).failure == failed.failure

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
+from hypothesis import given
+from hypothesis import strategies as st
 from lxml import etree
 
 from orchestrator.formats.osp_and_container import write_container, write_osp
@@ -18,9 +21,12 @@ from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.system.component import read_component
+from orchestrator.system.connection import Connection
 from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName, plain_file_names
 from orchestrator.system.structure import System
+from orchestrator.system.units import Linear, Mapped
+from support import small_fmus, typed
 from support.archives import (
     archive,
     binding,
@@ -33,6 +39,7 @@ from support.archives import (
     system,
     variable,
 )
+from support.texts import mentions
 
 
 @pytest.fixture(scope="module")
@@ -233,3 +240,116 @@ def test_ssp_2_that_is_written_is_valid(mixed: System, tmp_path: Path):
                 what = "Description" if name.endswith(".ssd") else "ParameterValues"
                 schema = etree.parse(schemas / f"SystemStructure{what}.xsd")
                 etree.XMLSchema(schema).assertValid(etree.fromstring(content.read(name)))
+
+
+#: What XML 1.0 can hold, and what it cannot.
+_PLAIN = st.characters(codec="utf-8", exclude_categories=["Cc"], exclude_characters="\ufffe\uffff")
+LEGAL = st.text(_PLAIN | st.sampled_from("\t\n\r<>&\"' \x85\u2028"), max_size=8)
+ILLEGAL = st.sampled_from("\x01\x08\x0b\x0c\x0e\x1f\ufffe\uffff")
+
+#: Names of components; a dot would put one into another system.
+LEGAL_NAMES = LEGAL.filter(lambda text: text.strip() and "." not in text)
+
+NUMBERS = st.floats(allow_nan=False, allow_infinity=False) | st.sampled_from([-0.0, 2.0**63])
+WIDE = st.integers(0, 2**64 - 1) | st.sampled_from([2**53 + 1, 2**63, 2**64 - 1])
+GIVEN = st.fixed_dictionaries(
+    {},
+    optional={
+        "u_Float64": NUMBERS,
+        "u_Int64": st.sampled_from([-(2**63), 2**63 - 1, -(2**53) - 1]),
+        "counts_from": WIDE,
+        "complains": st.booleans(),
+        "u_Enumeration": st.sampled_from([1, 4]),
+        "names[2]": LEGAL,
+        "u_String": LEGAL,
+        "M[1,2]": NUMBERS,
+    },
+)
+
+
+@pytest.fixture(scope="module")
+def every_type(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return small_fmus.write(tmp_path_factory.mktemp("typed") / "typed.fmu", typed.text())
+
+
+@given(
+    names=st.lists(LEGAL_NAMES, min_size=2, max_size=2, unique=True),
+    values=GIVEN,
+    change=st.builds(Linear, NUMBERS, NUMBERS),
+    pairs=st.dictionaries(WIDE, WIDE, max_size=3),
+    times=st.tuples(st.floats(-1e9, 0.0), st.floats(0.0, 1e9), st.floats(5e-324, 1e300)),
+)
+def test_numbers_texts_and_names_are_read_as_they_were(
+    every_type: Path, names, values, change, pairs, times
+):
+    first, second = names
+    start, stop, step = times
+    made = small_fmus.connected("a", dict.fromkeys(names, every_type))
+    wires = {"Float64": change, "UInt64": Mapped(tuple(pairs.items()))}
+    system = replace(
+        made,
+        parameters={PortName(second, port): value for port, value in values.items()},
+        connections=tuple(
+            Connection(PortName(first, f"y_{of}"), PortName(first, f"u_{of}"), how)
+            for of, how in wires.items()
+        ),
+        **{"start_time": start, "stop_time": stop, "step": step, "steps": {second: 2 * step}},
+    )
+    assert not list(system.problems())
+    with TemporaryDirectory() as folder:
+        [path] = write_ssp(system, Path(folder))
+        again = read_ssp(path, findings=Findings(strict=True))
+    assert list(again.components) == names
+    for one, other in zip(again.connections, system.connections, strict=True):
+        assert (one.source, one.target) == (other.source, other.target)
+        # No file has an empty table, which changes nothing.
+        how = Linear() if other.transformation == Mapped(()) else other.transformation
+        assert repr(one.transformation) == repr(how)
+    # Of an array, all elements are written.
+    elements = {"names[2]": ["a", "b"], "M[1,2]": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}
+    expected = dict(values)
+    for element, starts in elements.items():
+        if element in values:
+            array = made.components[second].elements(element.partition("[")[0])
+            for other, value in zip(array, starts, strict=True):
+                expected.setdefault(other.name, value)
+    found = {name.port: value for name, value in again.parameters.items()}
+    assert {port: repr(value) for port, value in found.items()} == {
+        port: repr(value) for port, value in expected.items()
+    }
+    # The start time may be minus zero, which is zero.
+    assert (again.start_time, again.stop_time, again.step) == (start, stop, step)
+    assert again.steps == system.steps
+
+
+@given(before=LEGAL, character=ILLEGAL, where=st.sampled_from(["u_String", "names[1]", "name"]))
+def test_what_xml_cannot_hold_is_refused_by_name(every_type: Path, before, character, where):
+    text = f"{before}{character}"
+    name = text if where == "name" else "lag"
+    values = {} if where == "name" else {PortName(name, where): text}
+    system = replace(small_fmus.connected("a", {name: every_type}), parameters=values)
+    with TemporaryDirectory() as folder, pytest.raises(InputError) as error:
+        write_ssp(system, Path(folder))
+    assert repr(character) in str(error.value)
+    assert where == "name" or str(error.value).startswith(f"lag.{where.partition('[')[0]}: ")
+
+
+@pytest.mark.parametrize("start", ["INF", "-1e999", "NaN"])
+def test_an_array_with_a_start_that_is_not_finite_is_refused_by_name(tmp_path: Path, start: str):
+    text = typed.text().replace('start="1 2 3 4 5 6"', f'start="1 2 {start} 4 5 6"')
+    made = small_fmus.connected("a", {"lag": small_fmus.write(tmp_path / "a.fmu", text)})
+    with pytest.raises(InputError) as error:
+        write_ssp(replace(made, parameters={PortName("lag", "M[1,1]"): 2.0}), tmp_path)
+    assert mentions(str(error.value), "lag.M[1,3] finite")
+
+
+@pytest.mark.parametrize("write", [write_ssp, write_osp, write_container])
+def test_an_fmu_that_has_changed_since_it_was_read_is_refused(tmp_path: Path, write):
+    """As by every other command that takes it along."""
+    path = fmu(tmp_path / "a.fmu", variable("u", "input"), variable("y", "output"))
+    system = replace(small_fmus.connected("a", {"a": path, "b": path}), step=0.1)
+    (tmp_path / "out").mkdir()
+    path.write_bytes(path.read_bytes() + b"more")
+    with pytest.raises(InputError) as error:
+        write(system, tmp_path / "out")
+    assert mentions(str(error.value), "a.fmu changed")
