@@ -2,7 +2,7 @@
 
 `python tools/noise_numbers.py` prints them in Markdown, each over many draws of the noise. A number
 of a draw is given by its median, with what 5 and 95 % of the draws stay below. It needs the extra
-`studies`, and takes a minute.
+`studies`, and takes some minutes.
 """
 
 from __future__ import annotations

@@ -96,6 +96,15 @@ _LINES = {
         max peak_command_r by step noise_std | proposed
         bound saturated by noise_std | proposed and step == 0.02
         bound saturated by noise_std | proposed and step == 0.005
+        min way by step noise_std | proposed and saturated
+        max way by step noise_std | proposed and not saturated
+        median peak_command_u by step noise_std | proposed and 30 / 1.1 < way < 30 * 1.1
+        median peak_command_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
+        median peak_command_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
+        median peak_command_u by step noise_std | proposed and way > 9e3
+        median saturated_fraction_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
+        median saturated_fraction_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
+        median saturated_fraction_u by step noise_std | proposed and way > 9e3
         min peak_command_u by step noise_std | PD
         median peak_command_u by step noise_std | PD and way < 11
         median peak_command_u by step noise_std | PD and 30 / 1.1 < way < 30 * 1.1
