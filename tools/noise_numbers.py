@@ -150,9 +150,12 @@ def later(runs: Runs) -> None:
         ("fig4", {"controller.eps_t": 10.0}, 1000.0),
         ("fig5", {}, 1000.0),
         ("fig6", {}, 1000.0),
-        ("fig4", {"controller.k_d": 10.0}, 1000.0),
+        ("fig4", {"controller.k_d": 20.0}, 1000.0),
     ):
-        firsts, shares, peaks, estimates = [], [], [], []
+        firsts: list[float] = []
+        shares: list[list[float]] = []
+        peaks: list[float] = []
+        estimates: list[float] = []
         for seed in range(1, SOME + 1):
             made = runs.table(name, seed, values, stop_time)
             beyond = (np.abs(made.group(*STANDARD.commanded)) > limits(made)[1]).any(axis=1)
@@ -171,8 +174,8 @@ def later(runs: Runs) -> None:
                 band(estimates),
             ]
         )
-    shares = [f"% of steps until {until} s" for until in (200, 500, 1000)]
-    show(["", "first beyond a limit [s]", *shares, "peak u", "theta_hat_1"], rows)
+    until = [f"% of steps until {time} s" for time in (200, 500, 1000)]
+    show(["", "first beyond a limit [s]", *until, "peak u", "theta_hat_1"], rows)
 
 
 def distance_of(made: Table) -> np.ndarray:

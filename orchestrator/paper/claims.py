@@ -156,12 +156,10 @@ def no_saturation(quiet: KeptRun) -> Finding:
 
 
 @claim(
-    f"Figs. 4 and 5: the proposed controller does not saturate, {_WITH_NOISE} (Fig. 5 with eps_t = "
-    "10, and 1)",
+    f"Figs. 4 and 5: the proposed controller does not saturate, {_WITH_NOISE} (eps_t = 1, and 10)",
     "no saturation",
     *noisy(QUIET),
     *noisy(FIVE),
-    *noisy(SHARP),
 )
 def no_saturation_with_noise(*runs: KeptRun) -> Finding:
     """The largest of all draws, and their largest share of steps."""
@@ -170,11 +168,22 @@ def no_saturation_with_noise(*runs: KeptRun) -> Finding:
         actuator_values(np.max([run.metrics["peak_command"] for run in draws], axis=0).tolist())
         for draws in each
     )
-    shares = [100 * max(max(run.metrics["saturated_fraction"]) for run in draws) for draws in each]
+    share = 100.0 * max(max(run.metrics["saturated_fraction"]) for run in runs)
     return Finding(
-        f"largest peaks of {len(_SEEDS)} draws {peaks}; at most {numbers(shares)} % of the steps",
-        f"{said(not any(shares))}; in longer runs noise ends it (reading 7)",
+        f"largest peaks of {len(_SEEDS)} draws {peaks}; at most {share:.2g} % of the steps of a "
+        "draw saturate",
+        f"{said(share == 0.0)}; in longer runs they do (reading 7)",
     )
+
+
+@claim(
+    f"Fig. 5: the same with eps_t = 1, {_WITH_NOISE}",
+    "no saturation",
+    *noisy(SHARP),
+)
+def no_saturation_with_noise_and_sharp(*runs: KeptRun) -> Finding:
+    """The paper may mean 10 for the PD controller only."""
+    return no_saturation_with_noise(*runs)
 
 
 @claim("Fig. 4: the tracking errors converge to a neighbourhood of the origin", "no numbers", QUIET)
@@ -431,8 +440,8 @@ def intolerable_chattering(largest: KeptRun) -> Finding:
         f"peaks of (c) {actuator_values(largest.metrics['peak_command'])} of 80",
         said(True)
         if saturates
-        else "**not seen** in Fig. 7: at the largest disturbance it shows every command stays "
-        "within the limits",
+        else "**not seen** in Fig. 7: at the largest disturbance it shows, without noise, every "
+        "command stays within the limits",
     )
 
 
