@@ -26,7 +26,7 @@ from orchestrator.paper.page import table
 from orchestrator.studies.batch.kernel import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.vehicle.signals import STANDARD, true_control_point
+from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
 
 Values = Mapping[str, Any]
 
@@ -163,12 +163,15 @@ def printed_numbers(runs: Runs) -> None:
     show([f"`{CHAOTIC}`", *HEADS], rows)
     rows = []
     for name, until in (("fig5", SCENARIOS["fig5"]), ("fig6", 60.0)):
-        ratios = (
+        ratios = [
             total_variation_until(runs.table(f"{name}-pd", *way), until)
             / total_variation_until(runs.table(name, *way), until)
             for way in WAYS
-        )
-        rows.append([f"`{name}`, {until:g} s", *(number(ratio, 2) for ratio in ratios)])
+        ]
+        rows += [
+            [f"`{name}`, {until:g} s, {k}", *(number(ratio, 2) for ratio in column)]
+            for k, column in zip(ACTUATORS, np.transpose(ratios), strict=True)
+        ]
     show(["TV, PD over proposed", *HEADS], rows)
 
 

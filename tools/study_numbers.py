@@ -44,6 +44,7 @@ _MADE = {
     "noise": {"product": "k_d * noise_std", "gain": "estimate_error / product"},
     "robustness": {
         "ratio_of_fig_7": "omega_d == 0.1 and abs(A_d - 2 * A_f) < 1e-9",
+        "chattering": "ratio_of_fig_7 and 6 < A_f < 22",
         "valley": "omega_d == 1 and abs(A_d - A_f) < 1e-9",
     },
     "sampling": {"product": "k_d * step"},
@@ -55,69 +56,82 @@ _COMPONENT = re.compile(r"^(auv\*\.)?(plant|controller|disturbance|link)\.")
 #: The lines of each study, in the order of its text.
 _LINES = {
     "attraction": """
-        n | proposed and h_max == 0.002
-        n | proposed and h_max == 0.002 and physical
-        share failed | h_max == 0.002
-        max late_error by scenario | h_max == 0.002
-        bound lost | proposed and h_max == 0.002
-        bound lost | proposed and h_max == 0.002 and physical
-        n by scenario | h_max == 0.02 and failed
-        min speed | failed
-        min turn | failed
-        max ended | failed
-        max late_error by scenario | h_max == 0.02 and not failed
-        share saturated by scenario | h_max == 0.002 and physical
-        median saturated_fraction_u by scenario | h_max == 0.002 and physical
-        median peak_command_u by scenario | h_max == 0.002 and physical
-        share saturated | proposed and h_max == 0.002 and speed < 1
-        share saturated | proposed and h_max == 0.002 and 6 < speed < 12
-        share saturated | proposed and h_max == 0.002 and speed > 12
-        median peak_command_u | proposed and h_max == 0.002 and speed < 1
-        median peak_command_u | proposed and h_max == 0.002 and 6 < speed < 12
-        median peak_command_u | proposed and h_max == 0.002 and speed > 12
-        median peak_command_u by scenario | h_max == 0.002 and physical and way < 12
-        median peak_command_u by scenario | h_max == 0.002 and physical and 25 < way < 35
-        median peak_command_u by scenario | h_max == 0.002 and physical and way > 70
-        median time_to_reach by scenario | h_max == 0.002 and physical and 45 < way < 55
-        median late_error by scenario | h_max == 0.002 and physical and 45 < way < 55
+        n by noise_std | proposed and h_max == 0.002
+        n by noise_std | proposed and h_max == 0.002 and physical
+        share failed by noise_std | h_max == 0.002
+        max late_error by scenario noise_std | h_max == 0.002
+        bound lost by noise_std | proposed and h_max == 0.002
+        bound lost by noise_std | proposed and h_max == 0.002 and physical
+        n by scenario noise_std | h_max == 0.02 and failed
+        min speed by noise_std | failed
+        min turn by noise_std | failed
+        max ended by noise_std | failed
+        max late_error by scenario noise_std | h_max == 0.02 and not failed
+        n by scenario noise_std | h_max == 0.02 and not failed and lost
+        share saturated by scenario noise_std | h_max == 0.002 and physical
+        median saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
+        max saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
+        share saturated by scenario noise_std | h_max == 0.002 and physical and way < 20
+        share saturated by scenario noise_std | h_max == 0.002 and physical and way > 70
+        median peak_command_u by scenario noise_std | h_max == 0.002 and physical
+        share saturated by noise_std | proposed and h_max == 0.002 and speed < 1
+        share saturated by noise_std | proposed and h_max == 0.002 and 6 < speed < 12
+        share saturated by noise_std | proposed and h_max == 0.002 and speed > 12
+        median peak_command_u by noise_std | proposed and h_max == 0.002 and speed < 1
+        median peak_command_u by noise_std | proposed and h_max == 0.002 and 6 < speed < 12
+        median peak_command_u by noise_std | proposed and h_max == 0.002 and speed > 12
+        median peak_command_u by scenario noise_std | h_max == 0.002 and physical and way < 12
+        median peak_command_u by scenario noise_std | h_max == 0.002 and physical and 25 < way < 35
+        median peak_command_u by scenario noise_std | h_max == 0.002 and physical and way > 70
+        median time_to_reach by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
+        median late_error by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
     """,
     "distance": """
-        n by scenario step
-        median peak_command_u by step | proposed
-        median peak_command_q by step | proposed
-        median peak_command_r by step | proposed
-        max peak_command_u by step | proposed
-        max peak_command_q by step | proposed
-        max peak_command_r by step | proposed
-        bound saturated | proposed and step == 0.02
-        bound saturated | proposed and step == 0.005
-        min peak_command_u by step | PD
-        median peak_command_u by step | PD and way < 11
-        median peak_command_u by step | PD and 30 / 1.1 < way < 30 * 1.1
-        median peak_command_u by step | PD and 100 / 1.1 < way < 100 * 1.1
-        median peak_command_u by step | PD and 1e3 / 1.1 < way < 1e3 * 1.1
-        max peak_command_u by step | PD
-        max peak_command_q by step | PD
-        max peak_command_r by step | PD
-        median saturated_fraction_u by step | PD and 50 / 1.1 < way < 50 * 1.1
-        median saturated_fraction_u by step | PD and 100 / 1.1 < way < 100 * 1.1
-        median saturated_fraction_q by step | PD and 100 / 1.1 < way < 100 * 1.1
-        median saturated_fraction_r by step | PD and 100 / 1.1 < way < 100 * 1.1
-        min saturated_fraction_u by step | PD and way > 300
-        min saturated_fraction_q by step | PD and way > 300
-        min saturated_fraction_r by step | PD and way > 300
-        median time_to_reach by scenario step | 100 / 1.1 < way < 100 * 1.1
-        max time_to_reach by scenario step
-        min effort_ratio by step | PD and way > 100
-        max effort_ratio by step | PD and way > 100
-        median final_error by scenario step | 100 / 1.1 < way < 100 * 1.1
-        median final_error by scenario step | 1e3 / 1.1 < way < 1e3 * 1.1
-        median final_error by scenario step | way < 11
-        median final_error by scenario step | way > 9e3
-        median theta_hat_end_1 by scenario step | way < 11
-        median theta_hat_end_1 by scenario step | way > 9e3
-        max theta_hat_end_1 by scenario step
-        median theta_hat_end_1 by scenario step | 1e3 / 1.1 < way < 1e3 * 1.1
+        n by scenario step noise_std
+        median peak_command_u by step noise_std | proposed
+        median peak_command_q by step noise_std | proposed
+        median peak_command_r by step noise_std | proposed
+        max peak_command_u by step noise_std | proposed
+        max peak_command_q by step noise_std | proposed
+        max peak_command_r by step noise_std | proposed
+        bound saturated by noise_std | proposed and step == 0.02
+        bound saturated by noise_std | proposed and step == 0.005
+        min way by step noise_std | proposed and saturated
+        max way by step noise_std | proposed and not saturated
+        median peak_command_u by step noise_std | proposed and 30 / 1.1 < way < 30 * 1.1
+        median peak_command_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
+        median peak_command_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
+        median peak_command_u by step noise_std | proposed and way > 9e3
+        median saturated_fraction_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
+        median saturated_fraction_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
+        median saturated_fraction_u by step noise_std | proposed and way > 9e3
+        min peak_command_u by step noise_std | PD
+        median peak_command_u by step noise_std | PD and way < 11
+        median peak_command_u by step noise_std | PD and 30 / 1.1 < way < 30 * 1.1
+        median peak_command_u by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
+        median peak_command_u by step noise_std | PD and 1e3 / 1.1 < way < 1e3 * 1.1
+        max peak_command_u by step noise_std | PD
+        max peak_command_q by step noise_std | PD
+        max peak_command_r by step noise_std | PD
+        median saturated_fraction_u by step noise_std | PD and 50 / 1.1 < way < 50 * 1.1
+        median saturated_fraction_u by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
+        median saturated_fraction_q by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
+        median saturated_fraction_r by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
+        min saturated_fraction_u by step noise_std | PD and way > 300
+        min saturated_fraction_q by step noise_std | PD and way > 300
+        min saturated_fraction_r by step noise_std | PD and way > 300
+        median time_to_reach by scenario step noise_std | 100 / 1.1 < way < 100 * 1.1
+        max time_to_reach by scenario step noise_std
+        min effort_ratio by step noise_std | PD and way > 100
+        max effort_ratio by step noise_std | PD and way > 100
+        median final_error by scenario step noise_std | 100 / 1.1 < way < 100 * 1.1
+        median final_error by scenario step noise_std | 1e3 / 1.1 < way < 1e3 * 1.1
+        median final_error by scenario step noise_std | way < 11
+        median final_error by scenario step noise_std | way > 9e3
+        median theta_hat_end_1 by scenario step noise_std | way < 11
+        median theta_hat_end_1 by scenario step noise_std | way > 9e3
+        max theta_hat_end_1 by scenario step noise_std
+        median theta_hat_end_1 by scenario step noise_std | 1e3 / 1.1 < way < 1e3 * 1.1
     """,
     "formation": """
         n
@@ -208,22 +222,23 @@ _LINES = {
         median saturated_fraction_u | proposed and k_d > 20 and 0.06 < noise_std
     """,
     "robustness": """
-        n
-        share failed
-        max A_f by scenario omega_d | step == 0.02 and A_d == 1 and kept_f
-        max A_f by scenario omega_d | step == 0.005 and A_d == 1 and kept_f
-        max A_d by scenario omega_d | step == 0.02 and A_f == 0.5 and kept_d
-        max A_d by scenario omega_d | step == 0.005 and A_f == 0.5 and kept_d
-        max late_error by A_f step | proposed and ratio_of_fig_7 and A_f < 6
-        min A_f by scenario step | ratio_of_fig_7 and lost
-        max late_error by scenario step | ratio_of_fig_7 and 6.9 < A_f < 7
-        max peak_command_u by scenario step | ratio_of_fig_7 and 6.9 < A_f < 7
-        max A_f by scenario step | valley and not lost
-        min A_f by scenario step | valley and lost
-        max late_error by scenario step
-        min A_d | late_error > 180
-        max total_variation_u by A_f scenario | step == 0.02 and ratio_of_fig_7 and 6 < A_f < 22
-        max total_variation_u by A_f scenario | step == 0.005 and ratio_of_fig_7 and 6 < A_f < 22
+        n by noise_std
+        share failed by noise_std
+        max A_f by scenario omega_d noise_std | step == 0.02 and A_d == 1 and kept_f
+        max A_f by scenario omega_d noise_std | step == 0.005 and A_d == 1 and kept_f
+        max A_d by scenario omega_d noise_std | step == 0.02 and A_f == 0.5 and kept_d
+        max A_d by scenario omega_d noise_std | step == 0.005 and A_f == 0.5 and kept_d
+        max late_error by A_f step noise_std | proposed and ratio_of_fig_7 and A_f < 6
+        min A_f by scenario step noise_std | ratio_of_fig_7 and lost
+        min A_f by scenario step noise_std | ratio_of_fig_7 and saturated
+        max late_error by scenario step noise_std | ratio_of_fig_7 and 6.9 < A_f < 7
+        max peak_command_u by scenario step noise_std | ratio_of_fig_7 and 6.9 < A_f < 7
+        max A_f by scenario step noise_std | valley and not lost
+        min A_f by scenario step noise_std | valley and lost
+        max late_error by scenario step noise_std
+        min A_d by noise_std | late_error > 180
+        max total_variation_u by A_f scenario noise_std | step == 0.02 and chattering
+        max total_variation_u by A_f scenario noise_std | step == 0.005 and chattering
     """,
     "sampling": """
         n
@@ -297,11 +312,13 @@ def prepared(study: str, runs: pd.DataFrame) -> pd.DataFrame:
         runs[name] = runs.eval(made)
     if study == "distance":
         # The proposed controller's run of a point comes first.
-        proposed = runs.groupby(["step", "way"]).l2_effort_u.transform("first")
+        proposed = runs.groupby(["step", "noise_std", "way"]).l2_effort_u.transform("first")
         runs["effort_ratio"] = runs.l2_effort_u / proposed
     for amplitude, other in (("A_f", "A_d"), ("A_d", "A_f")) if study == "robustness" else ():
         # Whether it is kept with this disturbance, and with all weaker ones on the line.
-        line = runs.sort_values(amplitude).groupby(["scenario", "step", "omega_d", other])
+        line = runs.sort_values(amplitude).groupby(
+            ["scenario", "step", "noise_std", "omega_d", other]
+        )
         runs[f"kept_{amplitude[-1]}"] = ~line.lost.cummax()
     return runs
 

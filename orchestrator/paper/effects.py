@@ -162,7 +162,9 @@ def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
 @effect("effect-order", "Jacobi against Gauss-Seidel", FIVE, _JACOBI, FIVE_PD, _JACOBI_PD)
 def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Shown:
     """What a delay of one step does to the two controllers."""
-    variation = [sum(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)]
+    variation = [
+        actuator_values(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)
+    ]
     figure = Figure(figsize=(FIGURE_WIDTH, 4.5))
     panels = figure.subplots(3, 2, sharex=True, width_ratios=(1, 2))
     for column, (title, runs) in enumerate(
@@ -177,8 +179,8 @@ def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Sh
     name_runs(figure, drawn)
     return Shown(
         "A Jacobi master adds a delay of 20 ms to the loop (reading 5). Total variation of the "
-        f"three signals of Fig. 5 (N, N·m): proposed {variation[0]:.4g} in Gauss-Seidel order and "
-        f"{variation[1]:.4g} in Jacobi order; PD {variation[2]:.4g} and {variation[3]:.4g}.",
+        f"signals of Fig. 5: proposed {variation[0]} in Gauss-Seidel order and {variation[1]} in "
+        f"Jacobi order; PD {variation[2]} and {variation[3]}.",
         figure,
     )
 
@@ -245,8 +247,9 @@ def noise(*runs: KeptRun) -> Shown:
     _draw_limit(peak, runs[0])
     peak.legend()
     return Shown(
-        "The observer multiplies the noise by k_d = 50 (reading 7). White noise of 1 mm leaves "
-        f"the peaks of Fig. 4 at {actuator_values(one_mm['peak_command'])}; 1 cm drives them to "
+        "The observer multiplies the noise by k_d = 50 (reading 7). In one draw of 100 s, white "
+        "noise of 1 mm leaves the peaks of Fig. 4 at "
+        f"{actuator_values(one_mm['peak_command'])}; 1 cm drives them to "
         f"{actuator_values(one_cm['peak_command'])}, and "
         f"{100 * max(one_cm['saturated_fraction']):.3g} % of the steps saturate.",
         figure,

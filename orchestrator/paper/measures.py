@@ -116,10 +116,11 @@ def turning_radius(table: Table) -> float:
     return float(np.hypot(u, v) / abs(r))
 
 
-def total_variation_until(table: Table, stop_time: float) -> float:
-    """Sum of |difference| of the three applied signals up to a time."""
+def total_variation_until(table: Table, stop_time: float) -> np.ndarray:
+    """Sum of |difference| of each applied signal up to a time, in the order u, q, r."""
     applied = table.group(*STANDARD.applied)[table.time <= stop_time]
-    return float(np.abs(np.diff(applied[1:], axis=0)).sum())
+    variation: np.ndarray = np.abs(np.diff(applied[1:], axis=0)).sum(axis=0)
+    return variation
 
 
 def largest_error_after(table: Table, start: float) -> float:

@@ -39,6 +39,9 @@ _FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
 #: The files.
 _NAMES = _PAGE, _MARKDOWN = "report.html", "report.md"
 
+#: So many runs of a claim are not named one by one; the end of the report lists all.
+_MANY = 5
+
 _TITLE = "# Section 4 reproduced"
 
 _INTRODUCTION = """\
@@ -195,7 +198,8 @@ def _claims(kept_runs: KeptRuns) -> str:
         finding = claim.finding([kept_runs[request] for request in claim.runs])
         verdicts.append(finding.verdict)
         cells = [claim.title, claim.published, finding.ours, finding.verdict]
-        runs = ", ".join(f"`{kept_runs.label(request)}`" for request in claim.runs)
+        labels = [f"`{kept_runs.label(request)}`" for request in claim.runs]
+        runs = ", ".join(labels if len(labels) < _MANY else [labels[0], "...", labels[-1]])
         rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
     return f"{counted(verdicts)}\n\n" + table(["claim", "paper", "ours", "verdict", "run"], rows)
 

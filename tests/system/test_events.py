@@ -288,31 +288,33 @@ def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, ca
 # What is said of the scenarios
 
 #: Of each controller: largest error in the 20 s before the event and after it, when it is below
-#: half a metre for good after the event has ended, and the largest force that is commanded.
+#: half a metre for good after the event has ended, and what the commanded force stays below.
 SAID = {
-    "fault-thruster": {"proposed": (0.26, 0.88, 2.2, 30.3), "PD": (0.22, 0.87, 2.9, 16.8)},
-    "fault-sensor": {"proposed": (0.26, 5.66, 6.6, 217), "PD": (0.22, 1.18, 1.8, 63.1)},
-    "current-step": {"proposed": (0.26, 0.51, None, 26.4), "PD": (0.22, 0.43, None, 15.1)},
+    "fault-thruster": {"proposed": (0.26, 0.88, 2.2, 40.0), "PD": (0.22, 0.87, 2.9, 40.0)},
+    "fault-sensor": {"proposed": (0.26, 5.7, 6.6, 219.0), "PD": (0.22, 1.18, 1.8, 80.0)},
+    "current-step": {"proposed": (0.26, 0.51, None, 40.0), "PD": (0.22, 0.43, None, 40.0)},
 }
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
 @pytest.mark.parametrize("name", SAID)
-def test_what_is_said_of_the_scenarios_is_so(name):
+def test_what_is_said_of_the_scenarios_is_so_in_every_draw_of_the_noise(name, seed):
     scenario = read_scenario(name)
     [event] = scenario.events
     begin, end = event["at"], event["at"] + event.get("for", 0.0)
-    own = prepare(
-        scenario, load_scenario(name, "native")[1], Request(kind="native", loop="compiled")
-    )
-    for prepared in with_companion(own, Request(kind="native", loop="compiled")):
+    request = Request(kind="native", loop="compiled", parameters={"plant.noise.seed": seed})
+    own = prepare(scenario, load_scenario(name, "native")[1], request)
+    for prepared in with_companion(own, request):
         table = Table()
         prepared.run([table])
         error = np.linalg.norm(tracking_error(table), axis=1)
         time, after = table.time, table.time >= begin
-        before, largest, below, force = SAID[name][prepared.scenario.label]
-        assert error[(time >= begin - 20.0) & ~after].max() == pytest.approx(before, abs=0.005)
-        assert error[after].max() == pytest.approx(largest, abs=0.005)
-        assert np.abs(table["controller.tau.u"][after]).max() == pytest.approx(force, rel=0.005)
+        before, largest, below, most = SAID[name][prepared.scenario.label]
+        assert error[(time >= begin - 20.0) & ~after].max() == pytest.approx(before, abs=0.0055)
+        assert error[after].max() == pytest.approx(largest, rel=0.01, abs=0.0055)
+        force = np.abs(table["controller.tau.u"][after]).max()
+        assert force < most
+        assert force > 216.0 or most < 219.0, "that of the remark"
         if below is not None:
             last = time[np.flatnonzero(error > 0.5)[-1]]
             assert last - end == pytest.approx(below, abs=0.05)

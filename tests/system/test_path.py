@@ -26,17 +26,23 @@ from support.texts import mentions
 TABLE = "t,x,y,z\n3,3,6,0\n23,13,6,2\n33,13,6,2\n60,13,16,2\n"
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3, 4])
 @pytest.mark.parametrize(
-    ("name", "distances", "peak"), [("path", (0.65, 0.32), 47.0), ("path-pd", (0.84, 0.41), 29.0)]
+    ("name", "distances", "peaks"),
+    [("path", (0.65, 0.32), (43.0, 56.0)), ("path-pd", (0.84, 0.41), (28.9, 29.1))],
 )
-def test_controllers_follow_the_survey_as_its_remark_says(native: Path, name, distances, peak):
-    """In the first pair of corners, and in the second."""
-    result = run(closed_loop(native, read_scenario(name)), 100.0, 0.02)
+def test_controllers_follow_the_survey_as_its_remark_says(
+    native: Path, name: str, distances, peaks, seed: int
+):
+    """In the first pair of corners, and in the second; peaks of all of 1,000 draws."""
+    system = closed_loop(native, read_scenario(name))
+    noise = {PortName("plant", "noise.seed"): seed}
+    result = run(system.with_parameters(noise), 100.0, 0.02, loop="compiled")
     assert result.failure is None
     away = np.linalg.norm(tracking_error(result), axis=1)
     corners = [away[(result.time > a) & (result.time < b)].max() for a, b in ((25, 50), (55, 80))]
-    assert corners == pytest.approx(distances, abs=0.006)
-    assert np.abs(result["controller.tau.u"]).max() == pytest.approx(peak, abs=0.5)
+    assert corners == pytest.approx(distances, abs=0.01)
+    assert peaks[0] < np.abs(result["controller.tau.u"]).max() < peaks[1]
     assert away[-250:].max() < 0.05
 
 

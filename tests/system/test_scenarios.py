@@ -53,8 +53,9 @@ def run(dist: Path) -> Runner:
     return runner
 
 
-def variation(result: Table) -> float:
-    return sum(metrics_of(result).found()["total_variation"])
+def variation(result: Table) -> np.ndarray:
+    """Of each actuator."""
+    return np.array(metrics_of(result).found()["total_variation"])
 
 
 def test_all_figures_are_there():
@@ -120,7 +121,7 @@ def test_fig5_proposed_does_not_saturate(run: Runner, eps_t: float):
 def test_fig5_pd_saturates_chatters_and_ends_more_accurate(run: Runner):
     proposed, pd = run("fig5"), run("fig5-pd")
     assert all(metrics_of(pd).found()["saturated_fraction"])
-    assert variation(pd) >= 3.0 * variation(proposed)
+    assert (variation(pd) >= np.array([2.3, 5.0, 11.0]) * variation(proposed)).all()
     assert (final_error(proposed) >= 5.0 * final_error(pd)).all()
 
 
@@ -133,7 +134,7 @@ def test_published_efforts_are_met_within_a_factor_of_2(run: Runner, name, publi
 
 def test_fig6_pd_chatters_severely(run: Runner):
     pd, proposed = (total_variation_until(run(name), 60.0) for name in ("fig6-pd", "fig6"))
-    assert pd >= 300.0 * proposed
+    assert (pd >= 400.0 * proposed).all()
 
 
 def test_fig5_passes_the_vertical_without_a_jump(run: Runner):
@@ -167,14 +168,15 @@ def test_fig7_errors_stay_small(run: Runner, letter: str, bound: float):
 
 
 def test_jacobi_order_makes_pd_chatter_and_leaves_the_proposed_controller_alone(run: Runner):
-    assert variation(run("fig5", order="jacobi")) < 1.2 * variation(run("fig5"))
-    assert variation(run("fig5-pd", order="jacobi")) > 10.0 * variation(run("fig5-pd"))
+    assert (variation(run("fig5", order="jacobi")) < 1.2 * variation(run("fig5"))).all()
+    times = variation(run("fig5-pd", order="jacobi")) / variation(run("fig5-pd"))
+    assert (times > (100.0, 1.3, 1.2)).all()
 
 
 def test_jacobian_as_printed_saturates_where_the_full_attitude_does_not(run: Runner):
     printed = metrics_of(run("fig5", controller__printed_jacobian=True)).found()
     assert any(printed["saturated_fraction"])
-    assert sum(printed["total_variation"]) > 3.0 * variation(run("fig5"))
+    assert (np.array(printed["total_variation"]) > 3.0 * variation(run("fig5"))).all()
 
 
 def test_noise_of_1_cm_saturates_and_1_mm_does_not(run: Runner):

@@ -118,7 +118,23 @@ def test_final_errors_are_given_in_parts_of_the_published_ones():
         (
             claims.pd_chatters,
             [kept_run(total_variation=ONES), kept_run(total_variation=TWOS)],
-            [kept_run(total_variation=TWOS), kept_run(total_variation=ONES)],
+            [kept_run(total_variation=TWOS), kept_run(total_variation=(3.0, 3.0, 1.0))],
+        ),
+        (
+            # By medians: one draw out of five says nothing.
+            claims.pd_chatters_with_noise,
+            [kept_run(total_variation=ONES)] * 4
+            + [kept_run(total_variation=THREES)]
+            + [kept_run(total_variation=TWOS)] * 5,
+            [kept_run(total_variation=TWOS)] * 5
+            + [kept_run(total_variation=THREES)] * 2
+            + [kept_run(total_variation=ONES)] * 3,
+        ),
+        (
+            claims.no_saturation_with_noise,
+            [kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))] * 10,
+            [kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.0))] * 9
+            + [kept_run(peak_command=ONES, saturated_fraction=(0.0, 0.0, 0.001))],
         ),
         (
             claims.pd_is_accurate,
@@ -132,8 +148,8 @@ def test_final_errors_are_given_in_parts_of_the_published_ones():
                 kept_run(total_variation=ONES, final_error=TWOS),
             ],
             [
-                kept_run(total_variation=TWOS, final_error=TWOS),
-                kept_run(total_variation=ONES, final_error=ONES),
+                kept_run(total_variation=TWOS, final_error=ONES),
+                kept_run(total_variation=(1.0, 3.0, 1.0), final_error=TWOS),
             ],
         ),
         (
@@ -165,13 +181,22 @@ def applied(values):
 def test_total_variation_counts_the_steps_until_a_time():
     """|2 - 5| + |5 - 4| in each of three signals: the first row ends no step."""
     table = applied([100.0, 2.0, 5.0, 4.0, 50.0])
-    assert total_variation_until(table, 3.0) == pytest.approx(3 * (3.0 + 1.0))
+    assert total_variation_until(table, 3.0).tolist() == [3.0 + 1.0] * 3
+
+
+def test_of_draws_the_largest_peak_of_each_figure_counts():
+    runs = [
+        kept_run(peak_command=(i, 20.0 - i, 5.0), saturated_fraction=(0.0, i * 1e-4, 0.0))
+        for i in range(10)
+    ]
+    found = claims.no_saturation_with_noise(*runs)
+    assert tells(found.ours, (5, 4, 20, 5, 9, 15, 5, 0.09))
 
 
 def test_severe_chattering_is_held_against_the_first_minute():
     smooth, rough = applied([0.0, 1.0, 2.0]), applied([0.0, 1.0, 5.0])
     found = claims.pd_chatters_severely(kept_run(smooth), kept_run(rough))
-    assert found.verdict.startswith("agrees") and numbers_in(found.verdict) == [4]
+    assert found.verdict.startswith("agrees") and numbers_in(found.verdict) == [4, 4, 4]
     assert claims.pd_chatters_severely(kept_run(rough), kept_run(smooth)).verdict.startswith("**")
 
 
@@ -270,16 +295,20 @@ def test_estimates_are_bounded():
 
 
 def test_more_effort_means_effort_gain_and_chattering():
-    """3-4-12: the norm of the three efforts is 13."""
+    """Of each actuator: no sum of newtons and newton metres hides one that falls."""
     runs = [
         estimating(i, l2_effort=np.multiply(i, (3.0, 4.0, 12.0)), total_variation=(i, i, i))
         for i in (1.0, 2.0, 3.0)
     ]
     found = claims.more_effort(*runs)
-    assert tells(found.ours, (13, 26, 39))
+    assert tells(found.ours, (3, 4, 12, 6, 8, 24, 9, 12, 36), (1, 1, 1, 2, 2, 2, 3, 3, 3))
     assert found.verdict == "agrees"
-    less = estimating(1.5, l2_effort=(30.0, 40.0, 120.0), total_variation=THREES)
-    assert claims.more_effort(*runs[:2], less).verdict == "**differs**"
+    for less in (
+        estimating(1.5, l2_effort=(30.0, 40.0, 120.0), total_variation=THREES),
+        estimating(3.0, l2_effort=(30.0, 7.0, 120.0), total_variation=THREES),
+        estimating(3.0, l2_effort=(30.0, 40.0, 120.0), total_variation=(3.0, 3.0, 1.5)),
+    ):
+        assert claims.more_effort(*runs[:2], less).verdict == "**differs**"
 
 
 def test_intolerable_chattering_is_not_said_to_be_seen_where_it_is_not():

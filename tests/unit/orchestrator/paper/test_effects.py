@@ -49,7 +49,7 @@ def test_names_are_apart():
         (
             "effect-order",
             [{"total_variation": (i, i, i)} for i in (1.0, 2.0, 3.0, 136.0)],
-            [(3, 6, 9, 408)],
+            [(1, 1, 1, 2, 2, 2), (3, 3, 3, 136, 136, 136)],
         ),
         (
             "effect-saturation",
