@@ -59,7 +59,9 @@ export function trackingError(result: Result, vehicle: VehicleData): Columns | u
   if (wanted === undefined) return undefined;
   return made(errors, result, vehicle, () => {
     const { leader, planner } = vehicle;
-    const e = controlPoint(result, vehicle).map((y, i) => y.map((value, k) => value - wanted[i][k]));
+    const e = controlPoint(result, vehicle).map((y, i) =>
+      y.map((value, k) => value - wanted[i][k]),
+    );
     if (!leader) return e;
     return e.map((one, i) => {
       const leading = result.column(`${leader}.y_d.${AXES[i]}`);
