@@ -1,10 +1,10 @@
 """The numbers that docs/explanation/remus.md says of runs: `python tools/remus_numbers.py`.
 
 Each line is a change of the scenarios `remus` and `remus-pd`. For both controllers it has the
-largest error in the first 40 s and from 120 s on [m], the largest part of the latter across the path
-[m], the share of steps in which a fin is at its limit, in pitch and yaw [%], the largest command in
-yaw [N.m], and the mean rate of the rudder [degrees/s]. Lines after these have the error after the
-end of the path, and steady turns with full rudder.
+largest error in the first 40 s and from 120 s on [m], the largest part of the latter across the
+path [m], the share of steps in which a fin is at its limit, in pitch and yaw [%], the largest
+command in yaw [N.m], and the mean rate of the rudder [degrees/s]. Lines after these have the error
+after the end of the path, and steady turns with full rudder.
 """
 
 from __future__ import annotations

@@ -84,8 +84,6 @@ def water(
     u, v, w = velocity
     # Above still water everything moves as on it.
     rise = w if position[2] >= 0.0 else 0.0
-    shear = ocean_current.velocity(
-        current, variation, ocean_current.slope(current.root, z, depth)
-    )
+    shear = ocean_current.velocity(current, variation, ocean_current.slope(current.root, z, depth))
     convective = plus_scaled(waves.along(moved.gradient, (u, v, rise)), rise, shear)
     return WaterMotion(velocity, total(moved.acceleration, convective), moved.elevation)

@@ -304,9 +304,7 @@ def within(z: float, depth: float) -> float:
     return depth if 0.0 < depth < z else z
 
 
-def motion(
-    waves: Waves, rows: Components, depth: float, position: Vector3, t: float
-) -> WaveMotion:
+def motion(waves: Waves, rows: Components, depth: float, position: Vector3, t: float) -> WaveMotion:
     """How waves move the water.
 
     Args:
