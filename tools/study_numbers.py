@@ -40,7 +40,12 @@ _MADE = {
         "physical": "speed < 80 / 30 and turn < 80 / 20",
     },
     "distance": {"way": "eta0_z"},
-    "formation": {"close": "smallest_distance < 2"},
+    "formation": {
+        "close": "smallest_distance < 2",
+        "leader_saturates": "auv1_saturated_fraction_u > 0",
+        "follower_saturates": "auv2_saturated_fraction_u + auv3_saturated_fraction_u > 0",
+        "good": "A_d < 5 and latency < 2 and loss < 0.5",
+    },
     "noise": {"product": "k_d * noise_std", "gain": "estimate_error / product"},
     "robustness": {
         "ratio_of_fig_7": "omega_d == 0.1 and abs(A_d - 2 * A_f) < 1e-9",
@@ -140,8 +145,15 @@ _LINES = {
         min smallest_distance
         share close
         share close | A_d < 5
-        share close | A_d < 5 and latency < 2 and loss < 0.5
-        min smallest_distance | A_d < 5 and latency < 2 and loss < 0.5
+        share close | good
+        min smallest_distance | good
+        share leader_saturates
+        share follower_saturates
+        share follower_saturates | good
+        median auv2_peak_command_u
+        median auv2_peak_command_u | good
+        median auv2_saturated_fraction_u
+        median auv2_saturated_fraction_u | good
         share close | A_d < 5 and loss > 0.8
         share close | A_d < 5 and latency > 3.5
         share close | A_d > 10

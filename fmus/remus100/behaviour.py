@@ -14,10 +14,11 @@ _THICKEST = 0.9
 
 
 class Inputs(NamedTuple):
-    """Commands of fins and propeller, and the velocity of the water."""
+    """Commands of fins and propeller, and how the water moves."""
 
     command: Vector3
     water: Vector3
+    dwater: Vector3
 
 
 class Outputs(TypedDict):
@@ -57,7 +58,8 @@ def advance(
     parameters: Parameters, state: RemusState, inputs: Inputs, h: float, n: int
 ) -> tuple[RemusState, Outputs]:
     """State and outputs after n steps of h seconds."""
-    state = remus100.steps(parameters, state, inputs.command, inputs.water, h, n)
+    command, water, dwater = inputs
+    state = remus100.steps(parameters, state, command, water, dwater, h, n)
     return state, _seen(parameters, state)
 
 

@@ -16,7 +16,7 @@ from fmus.ports.port import (
     parameters,
     setting,
 )
-from fmus.ports.quantities import ETA, NU, POSITION, TAU, VELOCITY
+from fmus.ports.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
 from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 from fmus.ports.vehicle import CONTROL_POINT
 
@@ -123,4 +123,6 @@ PORTS: tuple[Port, ...] = (
     *outputs("actuator", TAIL_COMMAND, "What rudder, stern planes and propeller are"),
     *PARAMETERS.ports,
     H_MAX,
+    # At the end: value references of the ports before it stay as they were.
+    *inputs("dwater", ACCELERATION, "Acceleration of the water in the earth frame"),
 )

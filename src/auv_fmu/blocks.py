@@ -31,9 +31,9 @@ from auv_fmu.path_planner import Corner, PathState
 from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
 from auv_fmu.plant import PlantOutputs, PlantState
 from auv_fmu.remus100 import RemusState
-from auv_fmu.sea import Sea
+from auv_fmu.sea import Sea, WaterMotion
 from auv_fmu.vectors import Rotation, Vector3, Vector4, Vector6
-from auv_fmu.waves import Components, WaterMotion
+from auv_fmu.waves import Components
 
 #: Of water that flows steadily: its acceleration [m/s2].
 _STEADY: Vector3 = (0.0, 0.0, 0.0)
@@ -396,7 +396,8 @@ def remus_steps(
     n: int,
 ) -> tuple[RemusState, Nothing]:
     """The REMUS 100 after n steps of h seconds; no disturbance acts on it."""
-    return remus100.steps(parameters, state, drive, water.velocity, h, n), derived
+    flow, dwater = water.velocity, water.acceleration
+    return remus100.steps(parameters, state, drive, flow, dwater, h, n), derived
 
 
 def remus_acting(parameters: remus100.Parameters, state: RemusState) -> Vector3:

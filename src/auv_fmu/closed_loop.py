@@ -17,8 +17,8 @@ from auv_fmu.disturbance import Disturbance, disturbance
 from auv_fmu.euler import STEP, internal_steps, longest_step
 from auv_fmu.output_feedback import Gains
 from auv_fmu.pd import PdGains
+from auv_fmu.sea import WaterMotion
 from auv_fmu.vectors import Vector3, Vector6
-from auv_fmu.waves import WaterMotion
 
 #: Before the first instant.
 _NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)

@@ -88,16 +88,26 @@ def profile(root: float, z: float, depth: float) -> float:
     return math.pow(1.0 - z / depth, 1.0 / root)
 
 
-def velocity(current: Current, variation: Variation, z: float, depth: float) -> Vector3:
-    """Velocity of the water [m/s], earth frame.
+def slope(root: float, z: float, depth: float) -> float:
+    """Derivative of :func:`profile` with respect to z [1/m]; at the bottom 0, not infinite.
+
+    Args:
+        root, z, depth: as of the profile.
+
+    """
+    if depth == 0.0 or root == 0.0 or z == depth:
+        return 0.0
+    return -profile(root, z, depth) / root / (depth - z)
+
+
+def velocity(current: Current, variation: Variation, share: float) -> Vector3:
+    """Velocity of the water [m/s], or its derivative with respect to z [1/s], earth frame.
 
     Args:
         current, variation: mean and random part.
-        z: depth below still water, from 0 to that of the bottom [m].
-        depth: of the water [m]; 0: it is deep.
+        share: the profile at a depth, or its slope.
 
     """
-    share = profile(current.root, z, depth)
     return (
         share * (current.speed * cos(current.direction) + variation.north),
         share * (current.speed * sin(current.direction) + variation.east),

@@ -54,7 +54,7 @@ class RemusState(NamedTuple):
     euler: Vector3  #: roll, pitch, yaw [rad]
     nu: Vector6  #: (u, v, w, p, q, r) over ground [m/s, rad/s], body frame
     actuator: Vector3  #: (delta_r, delta_s, n) [rad, rad, rad/s]
-    water: Vector3  #: velocity of the water in the last step [m/s], earth frame
+    water: Vector3  #: velocity of the water at the end of the last step [m/s], earth frame
 
 
 def water_in_body(psi: float, water: Vector3) -> Vector3:
@@ -183,6 +183,31 @@ def step(
     )
 
 
+def carried(state: RemusState, dwater: Vector3, h: float) -> RemusState:
+    """The state after a step in which the water has speeded up, from that after a step without.
+
+    As in :func:`auv_fmu.plant.carried`: the vehicle is as heavy as the water that it displaces, so
+    its velocity over ground changes by that of the water, and that through the water does not.
+
+    Args:
+        state: of the vehicle after the step, with the water as it was at the beginning.
+        dwater: acceleration of the water [m/s2], earth frame.
+        h: step [s].
+
+    """
+    if not (dwater[0] or dwater[1] or dwater[2]):
+        return state
+    x, y, z = water_in_body(state.euler[2], dwater)
+    u, v, w, p, q, r = state.nu
+    return RemusState(
+        plus_scaled(state.position, 0.5 * h * h, dwater),
+        state.euler,
+        (u + h * x, v + h * y, w + h * z, p, q, r),
+        state.actuator,
+        plus_scaled(state.water, h, dwater),
+    )
+
+
 def check_speed(state: RemusState) -> None:
     """Refuse a motion for which the model does not hold.
 
@@ -218,7 +243,13 @@ def begin(parameters: Parameters, water: Vector3) -> RemusState:
 
 
 def steps(
-    parameters: Parameters, state: RemusState, command: Vector3, water: Vector3, h: float, n: int
+    parameters: Parameters,
+    state: RemusState,
+    command: Vector3,
+    water: Vector3,
+    dwater: Vector3,
+    h: float,
+    n: int,
 ) -> RemusState:
     """State after n steps of h seconds under held inputs.
 
@@ -226,7 +257,9 @@ def steps(
         parameters: of the vehicle.
         state: at the beginning.
         command: (delta_r, delta_s, n) [rad, rad, rad/s].
-        water: velocity of the water, beside `current` [m/s], earth frame.
+        water: velocity of the water at the beginning of each of them, beside `current` [m/s],
+            earth frame.
+        dwater: its acceleration [m/s2], earth frame.
         h: step [s].
         n: how many.
 
@@ -236,7 +269,7 @@ def steps(
     for _ in range(n):
         state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
         check_speed(state)
-        state = step(parameters, mass, state, command, h)
+        state = carried(step(parameters, mass, state, command, h), dwater, h)
         check_speed(state)
     return state
 

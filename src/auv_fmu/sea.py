@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from auv_fmu import ocean_current, waves
 from auv_fmu.ocean_current import Current, Variation
-from auv_fmu.vectors import Vector3, total
-from auv_fmu.waves import Components, WaterMotion, Waves
+from auv_fmu.vectors import Vector3, plus_scaled, total
+from auv_fmu.waves import Components, Waves
 
 
 class ImpossibleSea(ArithmeticError):
@@ -22,6 +22,14 @@ class Sea(NamedTuple):
     current: Current = Current()
     depth: float = 50.0  #: of the water [m]; 0: deeper than waves reach
     g: float = 9.81  #: acceleration of gravity [m/s2]
+
+
+class WaterMotion(NamedTuple):
+    """How water moves at a place."""
+
+    velocity: Vector3  #: [m/s], earth frame
+    acceleration: Vector3  #: [m/s2], earth frame, of the water that is there
+    elevation: float  #: of the surface above that of still water [m]
 
 
 def check(sea: Sea) -> None:
@@ -57,7 +65,8 @@ def water(
 ) -> WaterMotion:
     """How the water moves at a place.
 
-    The acceleration is that of the waves: the current changes slowly.
+    The acceleration is that of the water itself, du/dt + (u . grad) u. The velocity u is that of
+    waves and current; only the change of the current in time is left out.
 
     Args:
         sea: parameters.
@@ -67,7 +76,14 @@ def water(
         t: time [s].
 
     """
-    moved, acceleration, elevation = waves.motion(sea.waves, components, sea.depth, position, t)
-    z = waves.within(position[2], sea.depth)
-    carried = ocean_current.velocity(sea.current, variation, z, sea.depth)
-    return WaterMotion(total(moved, carried), acceleration, elevation)
+    moved = waves.motion(sea.waves, components, sea.depth, position, t)
+    current, depth = sea.current, sea.depth
+    z = waves.within(position[2], depth)
+    share = ocean_current.profile(current.root, z, depth)
+    velocity = total(moved.velocity, ocean_current.velocity(current, variation, share))
+    u, v, w = velocity
+    # Above still water everything moves as on it.
+    rise = w if position[2] >= 0.0 else 0.0
+    shear = ocean_current.velocity(current, variation, ocean_current.slope(current.root, z, depth))
+    convective = plus_scaled(waves.along(moved.gradient, (u, v, rise)), rise, shear)
+    return WaterMotion(velocity, total(moved.acceleration, convective), moved.elevation)

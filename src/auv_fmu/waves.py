@@ -96,11 +96,22 @@ class Waves(NamedTuple):
     seed: int = 1  #: of their frequencies, phases and directions
 
 
-class WaterMotion(NamedTuple):
-    """How water moves at a place."""
+class Gradient(NamedTuple):
+    """Of the velocity of waves [1/s]: symmetric, as they do not rotate, and zz = -xx - yy."""
+
+    xx: float
+    xy: float
+    yy: float
+    xz: float
+    yz: float
+
+
+class WaveMotion(NamedTuple):
+    """How waves move the water at a place."""
 
     velocity: Vector3  #: [m/s], earth frame
-    acceleration: Vector3  #: [m/s2], earth frame, at a fixed place
+    acceleration: Vector3  #: [m/s2], earth frame, at the fixed place
+    gradient: Gradient  #: of the velocity
     elevation: float  #: of the surface above that of still water [m]
 
 
@@ -293,9 +304,7 @@ def within(z: float, depth: float) -> float:
     return depth if 0.0 < depth < z else z
 
 
-def motion(
-    waves: Waves, rows: Components, depth: float, position: Vector3, t: float
-) -> WaterMotion:
+def motion(waves: Waves, rows: Components, depth: float, position: Vector3, t: float) -> WaveMotion:
     """How waves move the water.
 
     Args:
@@ -306,11 +315,12 @@ def motion(
 
     """
     if waves.spectrum == NONE:
-        return WaterMotion(_STILL, _STILL, 0.0)
+        return WaveMotion(_STILL, _STILL, Gradient(0.0, 0.0, 0.0, 0.0, 0.0), 0.0)
     x, y, z = position
     z = within(z, depth)
     a = amplitude(waves)
     u, v, w, du, dv, dw, elevation = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    xx, xy, yy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0
     for row in rows:
         omega, k, north, east, phase = row
         if omega == 0.0:
@@ -326,5 +336,24 @@ def motion(
         du += north * rate
         dv += east * rate
         dw += a * omega * omega * up * c
+        ahead, down = -a * omega * k * level * s, -a * omega * k * up * c
+        xx += north * north * ahead
+        xy += north * east * ahead
+        yy += east * east * ahead
+        xz += north * down
+        yz += east * down
         elevation += a * c
-    return WaterMotion((u, v, w), (du, dv, dw), elevation)
+    return WaveMotion((u, v, w), (du, dv, dw), Gradient(xx, xy, yy, xz, yz), elevation)
+
+
+def along(gradient: Gradient, velocity: Vector3) -> Vector3:
+    """(velocity . grad) of the waves' velocity: its change along a way, per time [m/s2].
+
+    Args:
+        gradient: of the waves.
+        velocity: of what goes this way [m/s], earth frame.
+
+    """
+    xx, xy, yy, xz, yz = gradient
+    u, v, w = velocity
+    return xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v - (xx + yy) * w

@@ -49,7 +49,7 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
 def fleet(n: int) -> tuple[Loop, ...]:
     """The loops of vehicles auv1, auv2, ..."""
     return tuple(
-        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values()))
+        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values() if component))
         for i in range(1, n + 1)
     )
 

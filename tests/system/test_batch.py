@@ -137,6 +137,7 @@ sea = "Sea"
 "disturbance.nu" = false
 "sea.eta" = "plant.eta"
 "plant.water" = "sea.water"
+"plant.dwater" = "sea.dwater"
 [parameters]
 plant.ell = 0.8
 plant.eta0.z = 2.0

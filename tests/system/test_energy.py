@@ -157,7 +157,7 @@ def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
 def test_remus_100_at_rest_and_level_in_still_water_stays_so(psi, position):
     vehicle = remus100.Parameters(eta0=(*position, 0.0, 0.0, psi))
     state = remus100.begin(vehicle, NONE_3)
-    later = remus100.steps(vehicle, state, NONE_3, NONE_3, 0.02, 100)
+    later = remus100.steps(vehicle, state, NONE_3, NONE_3, NONE_3, 0.02, 100)
     assert (later.position, later.euler, later.nu) == (state.position, state.euler, NONE_6)
 
 

@@ -89,13 +89,37 @@ def test_commands_are_measured_where_the_allocation_takes_them():
     assert found["allocation.tau.u"].max() == 0.0
 
 
+def test_the_planner_knows_the_steady_turn_with_full_rudder(tmp_path):
+    """Its d66 and d22, and its limits: of an FMU that turns for a minute, and of its corners."""
+    tight = {"plant.eta0.z": 5.0, "plant.nu0.u": 1.5, "plant.noise.std": 0.0}
+    scenario = tmp_path / "turn.toml"
+    scenario.write_text(
+        'only = ["plant"]\n[components]\nplant = "Remus100"\n[wires]\n'
+        '"plant.tau" = false\n"plant.tau_w" = false\n"disturbance.nu" = false\n'
+    )
+    values = {**tight, "plant.command.delta_r": np.radians(15.0), "plant.command.n": 95.4}
+    turn = simulate(str(scenario), values, kind="native", stop_time=120.0)
+    u, v, r, N = (
+        turn[name][-1]
+        for name in ("plant.nu_r.u", "plant.nu_r.v", "plant.nu.r", "plant.tau_applied.r")
+    )
+    assert np.hypot(u, v) == pytest.approx(1.5, abs=0.01)
+    said = {str(name): value for name, value in read_scenario("remus").parameters.items()}
+    assert said["planner.d66"] == pytest.approx(N / r, rel=0.02)
+    assert said["planner.d22"] == pytest.approx(-said["planner.m11"] * u * r / v, rel=0.03)
+    assert said["planner.m22"] == said["planner.m33"] == said["planner.m11"]
+    slowest = np.cos(np.radians(22.5))
+    limits = np.multiply(slowest**2, (2.25, 1.61))
+    assert said["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
+
+
 def test_the_planner_refuses_corners_beyond_the_rudder():
-    """A survey with lanes 40 m apart, as the page says."""
+    """A survey with lanes 40 m apart, as the page says; to starboard with a positive moment."""
     corners = ((0, 0, 2), (150, 0, 10), (150, 40, 10), (0, 40, 10), (0, 80, 5), (150, 80, 5))
     path = {
         f"planner.waypoint[{k}].{axis}": float(value)
         for k, point in enumerate(corners, start=1)
         for axis, value in zip("xyz", point, strict=True)
     }
-    with pytest.raises(InputError, match=r"a moment in yaw of -1\.69 N\.m, 0\.09 beyond"):
+    with pytest.raises(InputError, match=r"a moment in yaw of 1\.47 N\.m, 0\.098 beyond"):
         simulate("remus", path, kind="native", stop_time=1.0)

@@ -21,12 +21,12 @@ from support.runs import run
 
 
 def test_controllers_follow_the_survey_below_waves_as_its_remark_says(tmp_path: Path):
-    """In the first 25 s and in the last 40 s."""
+    """In the first 25 s and in the last 40 s; with these seeds nobody saturates."""
     options = ["--kind", "native", "--no-figures", "--out", str(tmp_path)]
     assert main(["run", "sea", *options]) == 0
     for folder, distances, peak in (
-        (tmp_path, (0.85, 0.28), 66.0),
-        (tmp_path / "sea-pd", (1.05, 0.30), 35.0),
+        (tmp_path, (0.85, 0.30), 66.0),
+        (tmp_path / "sea-pd", (1.05, 0.33), 35.0),
     ):
         result = read(folder)
         away = np.linalg.norm(tracking_error(result), axis=1)

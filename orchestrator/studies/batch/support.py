@@ -67,7 +67,6 @@ _WIRES_WITH: Mapping[str, Mapping[str, str | bool]] = {
         "plant.command": "allocation.command",
         "plant.tau": False,
         "plant.tau_w": False,
-        "plant.dwater": False,
         "disturbance.nu": False,
     },
 }

@@ -241,9 +241,10 @@ def _bounds(
                         return Estimate(inf, inf, inf)
                     level = max(level, added / (1.0 - kept))
     most = max(hold.pull[1] for hold in holds)
-    z = shape.most(1.0, gap * T) * level + rest
+    times = [m * T for m in range(gap + 1)]
+    z = max(shape.most(1.0, t) for t in times) * level + rest
     velocity = (
-        max(shape.most(0.0, 1.0), shape.most(-most, 1.0 - most * gap * T)) * level
+        max(shape.most(-pull, 1.0 - pull * t) for t in times for pull in (0.0, most)) * level
         + most * rest
         + acceleration * longest
     )

@@ -33,7 +33,7 @@ def test_current_is_level_and_goes_where_it_is_said_to_go(direction, z):
     still = Variation(0.0, 0.0, 1.0)
     share = ocean_current.profile(current.root, z, 50.0)
     expected = (share * 0.4 * cos(direction), share * 0.4 * sin(direction), 0.0)
-    actual = ocean_current.velocity(current, still, z, 50.0)
+    actual = ocean_current.velocity(current, still, share)
     np.testing.assert_allclose(actual, expected, rtol=1e-14)
 
 

@@ -313,4 +313,4 @@ def test_particles_in_deep_water_run_in_circles():
 
 def test_a_sea_without_spectrum_is_still():
     sea = Waves(spectrum=waves.NONE)
-    assert moved(sea, 10.0, (1.0, 2.0, 3.0), 4.0) == ((0.0,) * 3, (0.0,) * 3, 0.0)
+    assert moved(sea, 10.0, (1.0, 2.0, 3.0), 4.0) == ((0.0,) * 3, (0.0,) * 3, (0.0,) * 5, 0.0)

@@ -11,7 +11,7 @@ from fmus.remus100 import behaviour
 from fmus.remus100.behaviour import Inputs
 from support.instances import ClassInstance
 
-STILL = Inputs((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+STILL = Inputs((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 @pytest.mark.parametrize(
