@@ -33,6 +33,7 @@ class Point(NamedTuple):
         parameters: what it changes, by `component.parameter`, with the scenario's own left out.
         stop_time, step: of the experiment [s].
         order: of evaluation.
+        start_time: of the experiment [s].
 
     """
 
@@ -42,6 +43,12 @@ class Point(NamedTuple):
     stop_time: float
     step: float
     order: Order = ORDERS[0]
+    start_time: float = 0.0
+
+    @property
+    def steps(self) -> float:
+        """Length of the run in steps."""
+        return (self.stop_time - self.start_time) / self.step
 
 
 class Outcome(NamedTuple):

@@ -153,6 +153,7 @@ class Space:
             self._stop_time.of(chosen) if self._stop_time else experiment.stop_time,
             chosen.get(STEP, experiment.step),
             experiment.order,
+            experiment.start_time,
         )
 
     def chosen(self, number: int) -> tuple[str, dict[str, Any]]:
