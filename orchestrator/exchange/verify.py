@@ -78,8 +78,8 @@ def verify(
 ) -> str:
     """Compare a table from any tool with our own runs of the same system.
 
-    Every row after the start and every column that is named after an output is compared. Columns of
-    inputs are not: tools write them before or after the exchange.
+    Every row after the start and every column that is named after an output is compared, but for
+    Strings. Columns of inputs are not: tools write them before or after the exchange.
 
     Args:
         path: CSV with a time column and columns named after our ports.
@@ -106,6 +106,7 @@ def verify(
         str(PortName(component.name, variable.name)): type_of(variable)
         for component in system.components.values()
         for variable in component.having("output")
+        if type_of(variable) != "String"
     }
     known = {
         str(PortName(component.name, variable))
@@ -291,7 +292,7 @@ def _certificate(
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are not outputs: {enumerated(table.others, verbose)}"
+        yield f"not compared: columns that are not numeric outputs: {enumerated(table.others, verbose)}"
     if absent := [name for name in outputs if name not in table.columns]:
         yield f"not in the table: {enumerated(absent, verbose)}"
 
