@@ -292,7 +292,8 @@ def _certificate(
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        yield f"not compared: columns that are not numeric outputs: {enumerated(table.others, verbose)}"
+        others = enumerated(table.others, verbose)
+        yield f"not compared: columns that are not numeric outputs: {others}"
     if absent := [name for name in outputs if name not in table.columns]:
         yield f"not in the table: {enumerated(absent, verbose)}"
 

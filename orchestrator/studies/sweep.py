@@ -15,7 +15,6 @@ from typing import Annotated, Any, NamedTuple
 
 from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
-from orchestrator.figures.study_figures import draw_figures, figure_files
 from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.experiment import ORDERS, Experiment
@@ -170,6 +169,9 @@ def complete_study(
         KeyboardInterrupt: a signal has come to stop it.
 
     """
+    # What is only checked draws nothing.
+    from orchestrator.figures.study_figures import draw_figures, figure_files  # noqa: PLC0415
+
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     kind = _kind_begun(folder) if means.kind == AUTO else means.kind
     means, systems, space, entries, engine = prepare_study(study, replace(means, kind=kind))
