@@ -183,6 +183,8 @@ def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
     if component.left_alone:
         yield component.remainder
+    if any(variable.type == "Clock" for variable in component.description.modelVariables):
+        yield "has Clocks: if it cannot do without them, it ends a run before the first step"
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text

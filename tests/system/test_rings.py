@@ -156,6 +156,17 @@ def test_what_grows_as_it_should_is_let_grow(folder, growth):
     assert simulate_plan(make_plan(system, Experiment(40.0, H, coupling="delay"))).failure is None
 
 
+@pytest.mark.parametrize("isolation", [None, Isolation()])
+def test_inputs_change_linearly_also_where_a_new_value_ends_their_change(folder, isolation):
+    """FMI does not say whether it does: values are set first, and then how they change."""
+    system = ring(folder, 0.5, 0.9)
+    forgetful = ring(folder, 0.5, 0.9, forgets=True)
+    experiment = Experiment(1.0, H, coupling="linear")
+    table, other = (run_table(one, experiment, isolation=isolation) for one in (system, forgetful))
+    assert table.failure is None
+    assert other.rows.tobytes() == table.rows.tobytes()
+
+
 class _Broken:
     """A hook that ends a run after some steps."""
 
