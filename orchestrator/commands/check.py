@@ -81,12 +81,19 @@ def _is_own(path: Path) -> bool:
 
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Check the file of a study, but not what it runs; there is nothing else to know."""
-    # For this alone it takes pydantic, a quarter of a second.
+    """Check a study as `sweep` does before its first run; returns what to know of it."""
+    # For this alone it takes half a second.
+    from orchestrator.studies.study import SOBOL  # noqa: PLC0415
     from orchestrator.studies.study_file import read_study  # noqa: PLC0415
+    from orchestrator.studies.sweep import Means, check_installed, prepare_study  # noqa: PLC0415
 
     with findings.collecting():
-        read_study(options.file)
+        study = read_study(options.file)
+        check_installed(("scipy",) * (study.sample is not None))
+        prepare_study(study, Means())
+        sample = study.sample
+        if sample is not None and sample.method == SOBOL and sample.n & (sample.n - 1):
+            return [f"sample: {SOBOL} spreads its samples evenly only if n is a power of two"]
     return []
 
 
@@ -176,6 +183,8 @@ def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
     if component.left_alone:
         yield component.remainder
+    if any(variable.type == "Clock" for variable in component.description.modelVariables):
+        yield "has Clocks: if it cannot do without them, it ends a run before the first step"
     for (flag, value), text in _SURPRISES.items():
         if getattr(component.description.coSimulation, flag) is value:
             yield text

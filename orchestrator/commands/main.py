@@ -12,13 +12,13 @@ from collections.abc import Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from itertools import pairwise
-from typing import Any
+from typing import Any, NoReturn
 
 from auv_fmu import __version__
 from orchestrator.commands import streams
 from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, Unheard, say
 from orchestrator.machine.children import imported_apart
-from orchestrator.machine.errors import InputError, StartError, reason
+from orchestrator.machine.errors import InputError, StartError, did_you_mean, reason
 from orchestrator.machine.interrupts import orderly_end
 
 #: The commands: the module that has `add_COMMAND`, and what they are for.
@@ -111,6 +111,37 @@ def _check_no_empty(arguments: Sequence[str]) -> None:
             raise InputError(f"{argument} has no value")
 
 
+class Parser(argparse.ArgumentParser):
+    """A parser that answers a mistake with two lines: the usage in short, and what is wrong."""
+
+    def parse_known_args(self, *arguments: Any, **more: Any) -> tuple[Any, list[str]]:
+        """Parse arguments, all of which must be known: else the whole program would complain."""
+        options, unknown = super().parse_known_args(*arguments, **more)
+        if unknown:
+            names = (word.partition("=")[0] for word in unknown if word.startswith("-"))
+            hints = (did_you_mean(name, self._option_string_actions) for name in names)
+            hint = next(filter(None, hints), "")
+            self.error(f"unrecognized arguments: {' '.join(unknown)}{hint}")
+        return options, unknown
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            names = [*map(str, action.choices)]
+            hint = did_you_mean(str(value), names) or f"; choose from {', '.join(names)}"
+            raise argparse.ArgumentError(action, f"invalid choice: {value!r}{hint}")
+
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong, and end the process."""
+        words = []
+        for action in self._get_positional_actions():
+            many = "" if action.nargs in (None, argparse.OPTIONAL) else " ..."
+            is_needed = action.nargs not in (argparse.OPTIONAL, argparse.ZERO_OR_MORE)
+            word = f"{action.metavar or action.dest}{many}"
+            words.append(word if is_needed else f"[{word}]")
+        usage = " ".join([f"usage: {self.prog} [OPTIONS]", *words])
+        self.exit(BAD_INPUT, f"{usage} (--help lists the options)\n{self.prog}: error: {message}\n")
+
+
 def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """The parser of the command line.
 
@@ -119,7 +150,7 @@ def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
             command needs takes up to a second.
 
     """
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="auv-fmu",
         description="Co-simulate an autonomous underwater vehicle with limited torque and "
         "without velocity sensors, from FMI components.",

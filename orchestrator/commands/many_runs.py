@@ -15,6 +15,7 @@ from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, complete_study, study_folder
+from orchestrator.vehicle.cautions import CAUTIONS
 
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
@@ -81,6 +82,8 @@ def _sweep(options: argparse.Namespace) -> int:
         say(f"interrupted; {folder} keeps the finished runs: the same command continues from there")
         return INTERRUPTED
     show(f"{study.name}: {result.runs:,} runs, of which {result.failed:,} failed")
+    for kind, n in result.cautions.items():
+        say(f"warning: {n:,} of {result.runs:,} runs: {kind}: {CAUTIONS[kind]}")
     show(f"written to {folder}{os.sep}")
     return OK
 

@@ -85,8 +85,8 @@ def verify(
 ) -> str:
     """Compare a table from any tool with our own runs of the same system.
 
-    Every row after t = 0 and every column that is named after an output is compared, except texts.
-    Columns of inputs are not: tools write them before or after the exchange.
+    Every row after the start and every column that is named after an output is compared, except
+    Strings. Columns of inputs are not: tools write them before or after the exchange.
 
     Args:
         path: CSV with a time column and columns named after our ports.
@@ -122,21 +122,22 @@ def verify(
     }
     # A tool that runs one FMU names ports only.
     names = [f"{name}." for name in system.components]
-    table = read_table(path, outputs, known, names[0] if len(names) == 1 else "")
-    if not len(table.time) or not table.time[-1] > 0.0:
-        raise InputError(f"{path}: has no row after t = 0")
+    start = system.start_time or 0.0
+    table = read_table(path, outputs, known, names[0] if len(names) == 1 else "", start)
+    if not len(table.time) or not table.time[-1] > start:
+        raise InputError(f"{path}: has no row after t = {start:g}")
     if not table.columns:
         raise InputError(
             f"{path}: no column is named after an output; outputs are named like {min(outputs)}"
             f"{_of_one(system, outputs, table.others)}"
         )
     step = DEFAULT_STEP if system.step is None else system.step
-    experiment = Experiment(float(table.time[-1]), step, start_time=system.start_time or 0.0)
+    experiment = Experiment(float(table.time[-1]), step, start_time=start)
     complaints = []
     for way in algorithms:
         complaint = _complaint(table, system, experiment, events, way, tolerance)
         if complaint is None:
-            return "\n".join(_certificate(table, system, outputs, way, tolerance, verbose))
+            return "\n".join(_certificate(table, start, system, outputs, way, tolerance, verbose))
         complaints.append(f"{way.words} {complaint}")
     raise InputError(f"{path}: {'; '.join(complaints)}")
 
@@ -210,7 +211,9 @@ def _complaint(
         simulate_to_end(make_plan(system, experiment), [ours], way.exchange, hooks)
     except InputError as error:
         return f"our own run fails: {error}"
-    return _first_difference(table.time, table.columns, ours.values, tolerance)
+    # What is shown before the first step depends on how a tool exchanges initial values.
+    after = table.time > experiment.start_time
+    return _first_difference(table.time, table.columns, ours.values, tolerance, after)
 
 
 class _Samples:
@@ -256,14 +259,14 @@ def _first_difference(
     columns: Mapping[str, np.ndarray],
     ours: np.ndarray,
     tolerance: float,
+    compared: np.ndarray,
 ) -> str | None:
     first: tuple[float, str, float, float] | None = None
     for (name, column), expected in zip(columns.items(), ours.T, strict=True):
         accepted = tolerance * max(1.0, float(np.abs(expected).max()))
-        # What is shown before the first step depends on how a tool exchanges initial values.
         with np.errstate(over="ignore"):
             # A value that is not a number differs.
-            wrong = np.flatnonzero(~(np.abs(column - expected) <= accepted) & (time > 0.0))
+            wrong = np.flatnonzero(~(np.abs(column - expected) <= accepted) & compared)
         if len(wrong) and (first is None or time[wrong[0]] < first[0]):
             k = wrong[0]
             first = float(time[k]), name, float(column[k]), float(expected[k])
@@ -275,6 +278,7 @@ def _first_difference(
 
 def _certificate(
     table: ForeignTable,
+    start: float,
     system: System,
     outputs: Mapping[str, str],
     way: Algorithm,
@@ -282,7 +286,7 @@ def _certificate(
     verbose: bool,
 ) -> Iterator[str]:
     """What was compared and found to agree, and what was not compared."""
-    times = table.time[table.time > 0.0]
+    times = table.time[table.time > start]
     yield (
         f"{len(table.columns)} of {len(outputs)} outputs agree to {tolerance:g} in {len(times)} "
         f"rows from t = {times[0]:g} to {times[-1]:g} s, {way.words}"
@@ -291,12 +295,12 @@ def _certificate(
         rows = "row that has" if table.repeated == 1 else "rows that have"
         yield f"skipped: {table.repeated} {rows} the time of the row before"
     if len(times) < len(table.time):
-        yield "not compared: the row at t = 0, which tools fill in different ways"
+        yield f"not compared: the row at t = {start:g}, which tools fill in different ways"
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        what = "columns that are not outputs, or hold texts"
-        yield f"not compared: {what}: {enumerated(table.others, verbose)}"
+        others = enumerated(table.others, verbose)
+        yield f"not compared: columns that are not numeric outputs: {others}"
     if absent := [name for name in outputs if name not in table.columns]:
         yield f"not in the table: {enumerated(absent, verbose)}"
 
@@ -313,7 +317,7 @@ class ForeignTable:
     """What a table holds.
 
     Attributes:
-        time: of its rows [s], growing from zero or later.
+        time: of its rows [s], growing from the start of the run or later.
         columns: of the ports that were asked for, those that it has, by our names.
         others: names of its other columns, as they stand there.
         repeated: how many rows are passed over, for the one before them is of the same time.
@@ -327,7 +331,11 @@ class ForeignTable:
 
 
 def read_table(
-    path: Path, ports: Mapping[str, str], known: Collection[str], before: str = ""
+    path: Path,
+    ports: Mapping[str, str],
+    known: Collection[str],
+    before: str = "",
+    start: float = 0.0,
 ) -> ForeignTable:
     """Read a table: every value of the time and of the ports in it, or none.
 
@@ -336,6 +344,7 @@ def read_table(
         ports: types of the ports that are looked for, by `component.port`.
         known: names of all ports; names of systems may stand before them.
         before: what a column's name may lack.
+        start: before which there must be no row [s].
 
     Raises:
         InputError: a row is not as long as the first, a time falls, a value is no number,
@@ -344,7 +353,7 @@ def read_table(
     """
     what = "not a table that can be compared"
     with records(path, what, places_of_time) as (names, rows):
-        return _table(names, rows, ports, known, before)
+        return _table(names, rows, ports, known, before, start)
 
 
 def _table(
@@ -353,6 +362,7 @@ def _table(
     ports: Mapping[str, str],
     known: Collection[str],
     before: str,
+    start: float,
 ) -> ForeignTable:
     clocks = places_of_time(names)
     if not clocks:
@@ -373,8 +383,8 @@ def _table(
             raise ValueError(f"line {expected} is empty")
         where = f"line {line}"
         time.append(time_of(row, clocks, where))
-        if time[-1] < 0.0:
-            raise ValueError(f"{where}: time {time[-1]:g} s is before the start at 0 s")
+        if time[-1] < start:
+            raise ValueError(f"{where}: time {time[-1]:g} s is before the start at {start:g} s")
         if len(time) > 1 and time[-1] < time[-2]:
             raise ValueError(
                 f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; times must not decrease"
@@ -383,7 +393,7 @@ def _table(
             columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))
     others = [name for i, name in enumerate(names) if i not in (*clocks, *places.values())]
     times = np.array(time)
-    new = np.diff(times, prepend=-np.inf) > ROUNDING * times
+    new = np.diff(times, prepend=-np.inf) > ROUNDING * np.abs(times)
     return ForeignTable(
         times[new],
         {port: np.array(column)[new] for port, column in columns.items()},

@@ -9,7 +9,7 @@ import numpy as np
 
 from auv_fmu.attitude import rotation_from_euler
 from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
-from orchestrator.figures.page_series import numbers
+from orchestrator.figures.page_series import numbers, times
 from orchestrator.figures.style import (
     COLOURS,
     REFERENCE,
@@ -47,7 +47,7 @@ def scene_of_one(run: Drawn) -> dict[str, Any]:
     length = max(_SHARE * float((upper - lower).max()), _LENGTH * real_parameter(table, loop.ell))
     rows = _rows(time, _FRAMES)
     frames: dict[str, Any] = {
-        "time": numbers(time[rows]),
+        "time": times(time[rows]),
         "position": _points(y[rows]),
         "rotation": _rotations(table, loop, rows),
     }
@@ -138,7 +138,7 @@ def scene_of_several(run: Drawn) -> dict[str, Any]:
     layout["legend"]["tracegroupgap"] = 0
     return {
         "frames": {
-            "time": numbers(time[rows]),
+            "time": times(time[rows]),
             "position": [point for y in paths for point in _points(y[rows])],
             "rotation": [R for loop in run.loops for R in _rotations(table, loop, rows)],
             "reference": [point for y_d in followed for point in _points(y_d[rows])],

@@ -30,8 +30,8 @@ _PANEL, _GAP, _MARGIN = 150, 26, 40
 #: Room above and below lines, as a share of their range.
 _MARGINS = 0.08
 
-#: Digits of numbers in the page: more than a screen resolves.
-_DIGITS = 6
+#: Digits of numbers in the page: more than a screen resolves; of times, also late in a long run.
+_DIGITS, _DIGITS_OF_TIMES = 6, 12
 
 
 class _Lines(NamedTuple):
@@ -181,6 +181,7 @@ def _velocities(table: Table, loop: Loop) -> Iterator[_Lines]:
 def _layout(panels: Sequence[_Lines], has_legends: bool = True) -> dict[str, Any]:
     """Panels above each other, with one axis of time and a cursor."""
     height = _MARGIN + len(panels) * (_PANEL + _GAP)
+    start = float(panels[0].time[0]) if panels else 0.0
     layout: dict[str, Any] = {
         "height": height,
         "margin": {"l": 50, "r": 12, "t": 4, "b": _MARGIN},
@@ -189,7 +190,7 @@ def _layout(panels: Sequence[_Lines], has_legends: bool = True) -> dict[str, Any
         "hoversubplots": "axis",
         "xaxis": {"title": {"text": "time [s]"}, "anchor": _axis("y", len(panels))},
         "shapes": [
-            {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": 0, "x1": 0}
+            {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "x0": start, "x1": start}
             | {"line": {"color": REFERENCE, "width": 1}}
         ],
         "annotations": [],
@@ -229,7 +230,7 @@ def _traces(
         rows = extremes(column, divisions)
         traces.append(
             {
-                "x": numbers(panel.time[rows]), "y": numbers(column[rows]), "name": name,
+                "x": times(panel.time[rows]), "y": numbers(column[rows]), "name": name,
                 "yaxis": _axis("y", i), **legend,
                 "showlegend": has_legend and len(panel.names) > 1, "mode": "lines",
                 "line": {"color": colour, "width": 1.3},
@@ -250,7 +251,7 @@ def _axis(name: str, i: int) -> str:
 
 def _limit(limit: float, time: np.ndarray, i: int) -> dict[str, Any]:
     return {
-        "x": numbers(time[[0, -1]]), "y": [limit, limit], "yaxis": _axis("y", i),
+        "x": times(time[[0, -1]]), "y": [limit, limit], "yaxis": _axis("y", i),
         "mode": "lines", "line": {"color": "black", "width": 1}, "hoverinfo": "skip",
         "showlegend": False,
     }  # fmt: skip
@@ -280,6 +281,11 @@ def extremes(values: np.ndarray, divisions: int) -> np.ndarray:
     return rows
 
 
-def numbers(values: np.ndarray) -> list[float | None]:
+def numbers(values: np.ndarray, digits: int = _DIGITS) -> list[float | None]:
     """Numbers for JSON, which has no infinity; more digits than a screen resolves."""
-    return [float(f"{v:.{_DIGITS}g}") if np.isfinite(v) else None for v in values.tolist()]
+    return [float(f"{v:.{digits}g}") if np.isfinite(v) else None for v in values.tolist()]
+
+
+def times(values: np.ndarray) -> list[float | None]:
+    """Times for JSON."""
+    return numbers(values, _DIGITS_OF_TIMES)

@@ -20,7 +20,7 @@ from orchestrator.vehicle.reducers import SMALLEST_DISTANCE, SMALLEST_DISTANCE_L
 Columns: TypeAlias = Mapping[str, np.ndarray]
 
 #: Columns that are texts.
-SCENARIO, FAILURE = "scenario", "failure"
+SCENARIO, FAILURE, CAUTION = "scenario", "failure", "caution"
 
 #: Up to so many different values have a bin each.
 _GRID = 40
@@ -43,12 +43,14 @@ class Chart(NamedTuple):
     may: Sequence[str]
 
 
-#: What figures show, by the names that study files have for it under `kind`.
+#: What figures show, by the names that study files have for it under `kind`; one shows by itself
+#: all that varies.
+INFLUENCE = "influence"
 CHARTS: Mapping[str, Chart] = {
     "bands": Chart(("x", "show"), ("by", "where", "limits")),
     "maps": Chart(("x", "y", "show"), ("by", "where", "limits")),
     "front": Chart(("x", "y"), ("by", "where")),
-    "influence": Chart(("x", "show"), ("by", "where")),
+    INFLUENCE: Chart(("show",), ("x", "by", "where")),
 }
 
 

@@ -10,6 +10,7 @@ import builtins
 import re
 import types
 import typing
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
 
@@ -63,6 +64,8 @@ class TomlTable(BaseModel):
         except ValidationError as error:
             for text in _problems(cls, content, error.errors(include_url=False)):
                 findings.problem(f"{where}: {text}")
+        for name in _stated_twice(content):
+            findings.problem(f"{where}: {name} is stated twice")
         findings.refuse()
 
 
@@ -204,6 +207,27 @@ def _problems(
     for (inner, path, _), keys in missing.items():
         written = (f"{key} = {_extra(_fields(inner)[key], 'example')}" for key in keys)
         yield f"{_where(path)}lacks {' and '.join(keys)}; write {', '.join(written)}"
+
+
+def _stated_twice(content: Mapping[str, Any]) -> Iterator[str]:
+    """The names that a table in it has both quoted and dotted, after the way to that table."""
+    for key, value in content.items():
+        for number, table in enumerate(value if isinstance(value, list) else [value]):
+            if isinstance(table, Mapping):
+                path = (key, number) if isinstance(value, list) else (key,)
+                names = [*_names(table)]
+                times = Counter(name for name, _ in names)
+                # A table may be continued, but not a value.
+                twice = {name: None for name, is_value in names if is_value and times[name] > 1}
+                yield from (_where(path) + name for name in twice)
+
+
+def _names(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, bool]]:
+    """All dotted names in a table, and whether they are of values."""
+    for key, value in table.items():
+        yield f"{before}{key}", not isinstance(value, Mapping)
+        if isinstance(value, Mapping):
+            yield from _names(value, f"{before}{key}.")
 
 
 def _problem(table: type[TomlTable], key: str, value: Any) -> str:

@@ -1,11 +1,8 @@
-"""How components are coupled: at the start, in every step, and when a delay lets values grow."""
+"""How components are coupled: at the start, and in every step."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-
-import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
+from collections.abc import Mapping, Sequence
 
 from orchestrator.machine.errors import InputError, StartError, shortened
 from orchestrator.master.experiment import (
@@ -20,8 +17,6 @@ from orchestrator.master.experiment import (
     Order,
 )
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
-from orchestrator.master.hooks.hook import NEVER, Run
-from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.plan import Plan, delays, stages
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
@@ -32,78 +27,6 @@ from orchestrator.system.structure import System
 
 #: Values go along all connections so often, until they rest.
 _MOST_ROUNDS = 1000
-
-#: A value grows without bound if it doubles at least so often in each of so many intervals, one
-#: after the other, and so often in all of them together. What grows with a power of time does not.
-_INTERVALS, _DOUBLINGS, _IN_ALL = 8, 1.0, 24.0
-
-#: Lengths of these intervals, in steps.
-_LENGTHS = tuple(2**i for i in range(9))
-
-
-#: Steps between two looks at what has been observed: a run ends at the same one on each machine.
-_LOOK = 512
-
-
-class Growth:
-    """An observer, and a hook, that ends a run in which values of delayed rings grow without bound.
-
-    Attributes:
-        ports: that are watched.
-        found: what has been found, in words, or nothing.
-
-    """
-
-    def __init__(self, ports: Collection[PortName]) -> None:
-        """Watch some ports."""
-        self.found, self.ports = "", list(map(str, ports))
-        self._columns: list[int] = []
-        self._rows = 0
-        self._last = {length: np.empty((0, len(self.ports))) for length in _LENGTHS}
-
-    def begin(self, header: Header) -> None:
-        """Find the ports."""
-        places = {name: i for i, name in enumerate(header.columns, start=1)}
-        self._columns = [places[name] for name in self.ports]
-
-    def take(self, rows: np.ndarray) -> None:
-        """Look at some rows."""
-        sizes = np.log2(np.abs(rows[:, self._columns]))
-        # From zero, everything is infinitely far.
-        sizes[np.isinf(sizes)] = np.nan
-        for length in _LENGTHS:
-            new = sizes[-self._rows % length :: length]
-            known = np.concatenate([self._last[length], new])
-            self._last[length] = known[-_INTERVALS - 1 :]
-            if len(new) and len(known) > _INTERVALS:
-                doublings = sliding_window_view(np.diff(known, axis=0), _INTERVALS, axis=0)
-                grows = doublings.min(axis=-1) >= _DOUBLINGS
-                grows &= doublings.sum(axis=-1) >= _IN_ALL
-                if not self.found and (places := np.flatnonzero(grows.any(axis=0)).tolist()):
-                    self.found = (
-                        f"{self.ports[places[0]]} grows without bound, in a ring of direct "
-                        "feedthroughs that is delayed by a step; --coupling solve, if its FMUs "
-                        "allow it, or another --order may help"
-                    )
-        self._rows += len(rows)
-
-    def end(self, ending: Ending) -> None:
-        """Nothing is kept."""
-
-    def act(self, run: Run) -> int:
-        """End the run if a value grows.
-
-        Raises:
-            ComponentFailed: one does.
-
-        """
-        last = run.experiment.rows - 1
-        # A run that is resumed begins between two looks.
-        if run.made % _LOOK == 0 or run.made == last:
-            run.blocks.hand_over()
-            if self.found:
-                raise ComponentFailed(self.found)
-        return min(run.made - run.made % _LOOK + _LOOK, last) if run.made < last else NEVER
 
 
 class _Single:

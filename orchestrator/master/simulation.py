@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
+from math import isfinite
 from time import monotonic
 
 import numpy as np
 
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
-from orchestrator.master.coupling import Coupling, Growth
+from orchestrator.master.coupling import Coupling
 from orchestrator.master.early_end import make_steps
 from orchestrator.master.experiment import OURS, Exchange
 from orchestrator.master.fmi.instance import ComponentFailed, Ended, Instance, Log
@@ -81,9 +82,6 @@ def simulate_plan(
                 _units(system, row.columns),
             )
         scheduled, gatherings = coupling.schedule()
-        growth = Growth(coupling.delayed_ports())
-        if growth.ports:
-            observers, hooks = [*observers, growth], [*hooks, growth]
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
             interrupts.hand_over = blocks.hand_over
@@ -97,8 +95,12 @@ def simulate_plan(
             remark = None
             try:
                 failure = _advance(run, stepping, Hooks(run), order, surroundings)
-                if failure and growth.found not in failure:
-                    failure += f"; {growth.found}"
+                if failure and (overflown := _overflown(row, coupling.delayed_ports())):
+                    failure += (
+                        f"; {overflown} is in a ring of direct feedthroughs that is delayed by a "
+                        "step, and may grow without bound; --coupling solve, if its FMUs allow "
+                        "it, or another --order may help"
+                    )
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -216,6 +218,11 @@ def _advance(
         failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {wrong}"
     blocks.hand_over()
     return failure
+
+
+def _overflown(row: Row, ports: Iterable[PortName]) -> PortName | None:
+    """The first of some ports whose value is not finite."""
+    return next((port for port in ports if not isfinite(row.values[row.columns[port]])), None)
 
 
 @contextmanager

@@ -127,7 +127,8 @@ def run_into(
         unfinished = _Unfinished(path, folder, done, command, clock, say)
         try:
             for prepared, below, columns, checkpoints in zip_longest(runs, folders, tables, kept):
-                unfinished.caution(prepared, cautions(prepared.system, prepared.experiment))
+                before = cautions(prepared.system, prepared.experiment, prepared.loops)
+                unfinished.caution(prepared, (caution.text for caution in before))
                 target = unfinished.begin(below)
                 run = _Running(target, prepared, files, columns, checkpoints)
                 unfinished.make(run, interrupts)
@@ -258,7 +259,8 @@ class _Unfinished:
         said = [f"did not happen: {event}" for event in missed]
         compared = first.prepared
         said += cautions_beside(run.seen, compared.scenario.name, first.seen, compared.loops)
-        self.caution(prepared, said + cautions_after(run.seen, prepared.loops))
+        said += [caution.text for caution in cautions_after(run.seen, prepared.loops)]
+        self.caution(prepared, said)
 
     def draw(self, draw: Callable[..., list[str]], interrupts: Interrupts) -> None:
         """Draw all figures or, where one of them cannot be written, none."""

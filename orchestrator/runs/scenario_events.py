@@ -274,7 +274,7 @@ ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "freeze": lambda names, system: Freeze(_inputs(names, system)),
     "drop": lambda names, system: Freeze(_inputs(names, system)),
     "lose": lambda names, system: Alter(
-        "override", tuple((target, 0.0) for target in _inputs(names, system))
+        "override", _altered(dict.fromkeys(_things(names), 0), system, _value)
     ),
     "release": lambda names, system: Release(_inputs(names, system)),
     "reset": _reset,

@@ -33,9 +33,11 @@ from orchestrator.studies.batch.kernel import (
     part_of,
 )
 from orchestrator.studies.batch.support import setting_of, unsupported
-from orchestrator.studies.engine import Outcome, Point
+from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
+from orchestrator.system.values import Value
+from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
@@ -133,10 +135,13 @@ class BatchEngine:
         except InputError as error:
             return [Outcome(point.number, {}, str(error)) for _ in stop_times]
         return [
-            Outcome(point.number, {}, failure)
+            Outcome(point.number, {}, failure, _cautions(job, found, made))
             if end["steps"] > made
             else Outcome(
-                point.number, _indices(job, end, found) | _of_rows(job, stop_time, end, rows)
+                point.number,
+                _indices(job, end, found) | _of_rows(job, stop_time, end, rows),
+                None,
+                _cautions(job, found, made),
             )
             for stop_time, end, found in zip(stop_times, ends, accumulators, strict=True)
         ]
@@ -359,6 +364,23 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
             values.update(zip(names, members, strict=True))
     # What was never reached is not a number.
     return {name: value for name, value in values.items() if not isnan(value)}
+
+
+def _cautions(job: _Job, found: np.void, made: int) -> str | None:
+    """What to be wary of in a run of some steps."""
+    system, loop = job.system, job.loop.names
+
+    def value(name: str) -> Value | None:
+        parameter = port_name(name)
+        return system.value(parameter) if system.has(parameter) else None
+
+    seen = Seen(float(found["rho_hat"]), float(found["vertical"])) if made else Seen()
+    return kinds_of(
+        [
+            *cautions(system, job.experiment, [loop]),
+            *cautions_seen(seen, loop, value, job.experiment.step),
+        ]
+    )
 
 
 @np.errstate(all="ignore")

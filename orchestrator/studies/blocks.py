@@ -201,7 +201,7 @@ class Making:
         steps = 0.0
         for point in points:
             block.append(point)
-            steps += point.stop_time / point.step
+            steps += point.steps
             if steps * self._pace >= self._seconds or len(block) == _MOST_RUNS:
                 yield block
                 block, steps = [], 0.0
@@ -239,7 +239,7 @@ class Making:
                 seconds, outcomes = answer
                 n = len(outcomes)
                 rests.extend(block[i : i + n] for i in range(n, len(block), n))
-                self._pace = seconds / sum(point.stop_time / point.step for point in block[:n])
+                self._pace = seconds / sum(point.steps for point in block[:n])
 
     def _room(self) -> int:
         return max(1, self._crew.ahead * self._crew.threads)

@@ -7,7 +7,7 @@ numbers.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -20,6 +20,7 @@ from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
 from orchestrator.master.plan import code_of, make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
+from orchestrator.vehicle.cautions import Caution, Watch, cautions
 from orchestrator.vehicle.indices import Indices
 from orchestrator.vehicle.signals import loops_of
 
@@ -33,6 +34,7 @@ class Point(NamedTuple):
         parameters: what it changes, by `component.parameter`, with the scenario's own left out.
         stop_time, step: of the experiment [s].
         order: of evaluation.
+        start_time: of the experiment [s].
 
     """
 
@@ -42,6 +44,12 @@ class Point(NamedTuple):
     stop_time: float
     step: float
     order: Order = ORDERS[0]
+    start_time: float = 0.0
+
+    @property
+    def steps(self) -> float:
+        """Length of the run in steps."""
+        return (self.stop_time - self.start_time) / self.step
 
 
 class Outcome(NamedTuple):
@@ -51,12 +59,20 @@ class Outcome(NamedTuple):
         number: of the run.
         indices: by their columns, :func:`.index_columns`; none of a run that has failed.
         failure: why the run ended early, or None.
+        cautions: what to be wary of, of :data:`.cautions.CAUTIONS`, with commas between them; None:
+            nothing.
 
     """
 
     number: int
     indices: Mapping[str, float]
     failure: str | None = None
+    cautions: str | None = None
+
+
+def kinds_of(cautions: Iterable[Caution]) -> str | None:
+    """The kinds of some cautions, each once, as an outcome has them."""
+    return ", ".join(dict.fromkeys(caution.kind for caution in cautions)) or None
 
 
 class Engine(Protocol):
@@ -129,14 +145,16 @@ class FmuEngine:
         experiment = replace(
             prepared.experiment, stop_time=point.stop_time, step=point.step, order=point.order
         )
-        indices = Indices(loops_of(system))
+        loops = loops_of(system)
+        indices, watch = Indices(loops), Watch(loops)
         plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
-        ending = replace(prepared, plan=plan, stepping=stepping).run([indices])
+        ending = replace(prepared, plan=plan, stepping=stepping).run([indices, watch])
         if ending.interrupts:
             raise KeyboardInterrupt
+        wary = kinds_of([*cautions(system, experiment, loops), *watch.found()])
         if ending.failure is not None:
-            return Outcome(point.number, {}, ending.failure)
-        return Outcome(point.number, indices.values())
+            return Outcome(point.number, {}, ending.failure, wary)
+        return Outcome(point.number, indices.values(), None, wary)
 
     def __getstate__(self) -> dict[str, Any]:
         """With the FMUs, each once, by their digests.

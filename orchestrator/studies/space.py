@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
 from itertools import chain
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.machine.errors import InputError, reason, shortened
+from orchestrator.machine.errors import Findings, InputError, reason, shortened
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
@@ -29,7 +30,7 @@ from orchestrator.studies.study import (
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value, is_finite, type_of, typed, unit_of
+from orchestrator.system.values import Value, is_finite, literal, type_of, typed, unit_of
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
 
@@ -64,15 +65,19 @@ class Space:
             InputError: a name does not exist, or a value has the wrong type.
 
         """
+        findings = Findings()
         known = _Known([system for _, system in systems.values()])
         self._stop_time, self._scenarios = study.stop_time, tuple(study.scenario)
         self.has_scenarios = len(self._scenarios) > 1
-        self.columns = {name: known.value_type(name) for name in study.varied}
-        self.units = {name: known.unit(name) for name in study.varied}
-        self._grid = {
-            name: tuple(known.typed(name, value) for value in values)
-            for name, values in study.vary.items()
-        }
+        self.columns: dict[str, type[Value]] = {}
+        for name in study.varied:
+            with findings.collecting():
+                self.columns[name] = known.value_type(name)
+        self.units = {name: known.unit(name) for name in self.columns}
+        self._grid: dict[str, tuple[Value, ...]] = {}
+        for name, values in study.vary.items():
+            with findings.collecting():
+                self._grid[name] = _unlike(name, [known.typed(name, value) for value in values])
         self._ranges = study.sample.ranges if study.sample else {}
         self.logarithmic = {
             name: range_of.spacing == LOG_SPACING for name, range_of in self._ranges.items()
@@ -83,29 +88,38 @@ class Space:
             for name in norm_members(key)
         }
         for name, ends in self._limits.items():
-            if self.columns[name] not in (float, int):
-                raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
-            if self.columns[name] is int and name not in self._ranges:
-                raise InputError(f"{name}: an integer cannot be part of a norm")
-            for end in ends:
-                known.typed(name, end)
+            with findings.collecting():
+                if self.columns.get(name, float) not in (float, int):
+                    raise InputError(f"{name}: only numbers can be sampled; put it under [vary]")
+                if self.columns.get(name) is int and name not in self._ranges:
+                    raise InputError(f"{name}: an integer cannot be part of a norm")
+                for end in ends:
+                    known.typed(name, end)
         samples = study.sample.n if study.sample else 1
-        self._n = prod(map(len, self._grid.values())) * samples * len(self._scenarios)
+        self._n = prod(map(len, study.vary.values())) * samples * len(self._scenarios)
         if self._n > MOST_RUNS:
-            raise InputError(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
+            findings.problem(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
+        given: dict[str, Any] = {}
+        with findings.collecting():
+            given = known.expanded(study.parameters)
+        self._constants: dict[str, Value] = {}
+        for name, value in given.items():
+            with findings.collecting():
+                if name in self.columns:
+                    raise InputError(f"{study.name}: {name} is stated twice")
+                self._constants[name] = known.typed(name, value)
+        findings.refuse()
         self._points = draw_shares(study.sample) if study.sample else np.empty((1, 0))
-        given = known.expanded(study.parameters)
-        if twice := [name for name in given if name in self.columns]:
-            raise InputError(f"{study.name}: {twice[0]} is stated twice")
-        self._constants = {name: known.typed(name, value) for name, value in given.items()}
         names = {name for name in (*given, *study.varied) if name != STEP}
         self._has = {
             scenario: {name for name in names if system.has(port_name(name))}
             for scenario, (_, system) in systems.items()
         }
-        self.prepared = {
-            name: self._prepared(name, study, *system) for name, system in systems.items()
-        }
+        self.prepared: dict[str, Prepared] = {}
+        for name, system in systems.items():
+            with findings.collecting():
+                self.prepared[name] = self._prepared(name, study, *system)
+        findings.refuse()
         columns = (index_columns(loops_of(system)) for _, system in systems.values())
         self.indices = tuple(dict.fromkeys(chain.from_iterable(columns)))
 
@@ -153,6 +167,7 @@ class Space:
             self._stop_time.of(chosen) if self._stop_time else experiment.stop_time,
             chosen.get(STEP, experiment.step),
             experiment.order,
+            experiment.start_time,
         )
 
     def chosen(self, number: int) -> tuple[str, dict[str, Any]]:
@@ -204,20 +219,35 @@ class _Known:
         return float(value)
 
     def expanded(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Values by ports only: a group is taken from the first system that has it."""
+        """Values by ports only, as the first system has them that has a port."""
+        stated = {port_name(name): value for name, value in values.items()}
         found: dict[str, Any] = {}
-        for name, value in values.items():
-            port = port_name(name) if name != STEP else None
-            of = [system.expanded({port: value}) for system in self._systems if port is not None]
-            members = next((one for one in of if one.keys() != {port}), {name: value})
-            found |= {str(member): its for member, its in members.items()}
-        return found
+        unknown = dict.fromkeys(map(str, stated))
+        for system in reversed(self._systems):
+            of_it = system.expanded(stated)
+            found |= {str(port): value for port, value in of_it.items() if system.has(port)}
+            absent = {str(port) for port in of_it if not system.has(port)}
+            unknown = {name: None for name in unknown if name in absent}
+        return {**{name: values[name] for name in unknown}, **found}
 
     def _variable(self, name: str) -> ModelVariable:
         target = port_name(name)
         system = next((one for one in self._systems if one.has(target)), self._systems[-1])
         target = system.named(target)
         return system.component(target.component).variable(target.port)
+
+
+def _unlike(name: str, values: Sequence[Value]) -> tuple[Value, ...]:
+    """Values of a grid, each of which makes other runs.
+
+    Raises:
+        InputError: one is there twice.
+
+    """
+    if len(set(values)) < len(values):
+        [(value, _)] = Counter(values).most_common(1)
+        raise InputError(f"vary: {name}: {literal(value)} is stated twice")
+    return tuple(values)
 
 
 def between(limits: Range, share: float, whole: bool) -> float | int:

@@ -17,11 +17,11 @@ from hashlib import sha256
 from importlib import import_module
 from itertools import chain, islice, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.figures.study_values import FAILURE, SCENARIO
+from orchestrator.figures.study_values import CAUTION, FAILURE, SCENARIO
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.ledger import Ledger, move_aside
 from orchestrator.master.plan import differences
@@ -47,6 +47,15 @@ _ENDS, _PAGES = ("", "-wal", "-shm", "-journal"), 16_384
 #: Only this process has the file open, so it needs no shared memory, which network file systems do
 #: not have; a block that is written outlasts the process at once, and a power cut a moment later.
 _SETTINGS = ("locking_mode = EXCLUSIVE", "journal_mode = WAL", "synchronous = NORMAL")
+
+
+class _Row(NamedTuple):
+    """An outcome as the database has it, without its checksum."""
+
+    number: int
+    indices: bytes
+    failure: str | None
+    cautions: str | None
 
 
 class Store:
@@ -87,7 +96,7 @@ class Store:
         for setting in _SETTINGS:
             self._database.execute(f"PRAGMA {setting}")
         # All that was done is looked at before more is done.
-        self._done = [number for number, _, _ in self._rows()]
+        self._done = [number for number, *_ in self._rows()]
 
     def close(self) -> None:
         """Let go of the database."""
@@ -111,7 +120,9 @@ class Store:
         """Keep a block of outcomes: all of them, or none."""
         rows = ((*row, self._checksum(*row)) for row in map(self._row, outcomes))
         with explain_write_errors(self._folder), self._database:
-            self._database.executemany("INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?, ?)", rows)
+            self._database.executemany(
+                "INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?, ?, ?)", rows
+            )
 
     def __len__(self) -> int:
         """How many runs are done."""
@@ -145,7 +156,7 @@ class Store:
         with self.ledger.changing() as unfinished:
             (unfinished / STUDY_RECORD).write_text(text, encoding="utf-8")
 
-    def _rows(self) -> Iterator[tuple[int, bytes, str | None]]:
+    def _rows(self) -> Iterator[_Row]:
         """All outcomes, by their numbers.
 
         Raises:
@@ -159,14 +170,18 @@ class Store:
                         f"{self._path}: damaged: run {row[0]} was changed since it was written; "
                         "move it, or let --force move the study aside and start over"
                     )
-                yield row[0], row[1], row[2]
+                yield _Row(*row)
 
-    def _row(self, outcome: Outcome) -> tuple[int, bytes, str | None]:
+    def _row(self, outcome: Outcome) -> _Row:
         values = [outcome.indices.get(name, np.nan) for name in self._indices]
-        return outcome.number, np.array(values).tobytes(), outcome.failure
+        indices = np.array(values).tobytes()
+        return _Row(outcome.number, indices, outcome.failure, outcome.cautions)
 
-    def _checksum(self, number: int, indices: bytes, failure: str | None) -> bytes:
-        return sha256(f"{self.ledger.token} {number} {failure!r} {indices!r}".encode()).digest()
+    def _checksum(
+        self, number: int, indices: bytes, failure: str | None, cautions: str | None
+    ) -> bytes:
+        text = f"{self.ledger.token} {number} {failure!r} {cautions!r} {indices!r}"
+        return sha256(text.encode()).digest()
 
     def _remove_database(self) -> None:
         if self._path.exists():
@@ -183,7 +198,8 @@ def _make_database(path: Path, token: str) -> None:
         # Indices as bytes: what is read is what was written, bit for bit.
         database.execute(
             "CREATE TABLE outcomes "
-            "(number INTEGER PRIMARY KEY, indices BLOB, failure TEXT, checksum BLOB)"
+            "(number INTEGER PRIMARY KEY, indices BLOB, failure TEXT, cautions TEXT, "
+            "checksum BLOB)"
         )
 
 
@@ -278,14 +294,13 @@ def _schema(arrow: Any, space: Space, indices: Sequence[str]) -> Any:
             *((name, types[kind]) for name, kind in space.columns.items()),
             *((name, arrow.float64()) for name in indices),
             (FAILURE, arrow.string()),
+            (CAUTION, arrow.string()),
         ]
     )
 
 
-def _batch(
-    arrow: Any, schema: Any, space: Space, rows: Sequence[tuple[int, bytes, str | None]]
-) -> Any:
-    numbers, indices, failures = zip(*rows, strict=True)
+def _batch(arrow: Any, schema: Any, space: Space, rows: Sequence[_Row]) -> Any:
+    numbers, indices, failures, cautions = zip(*rows, strict=True)
     scenarios, chosen = zip(*map(space.chosen, numbers), strict=True)
     values = np.frombuffer(b"".join(indices)).reshape(len(rows), -1)
     columns = [
@@ -294,6 +309,7 @@ def _batch(
         *([one[name] for one in chosen] for name in space.columns),
         *values.T,
         failures,
+        cautions,
     ]
     arrays = [
         # What is not there is null.

@@ -14,7 +14,13 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.figures.study_values import CHARTS, SCENARIO, FigureEntry, is_known
+from orchestrator.figures.study_values import (
+    CHARTS,
+    INFLUENCE,
+    SCENARIO,
+    FigureEntry,
+    is_known,
+)
 from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import explain_errors, find_toml, read_text
@@ -37,6 +43,7 @@ from orchestrator.studies.study import (
     norm_members,
 )
 from orchestrator.system.names import flatten, port_name
+from orchestrator.system.structure import is_spread
 from orchestrator.system.values import is_finite
 from orchestrator.vehicle.indices import index_columns
 
@@ -114,7 +121,8 @@ class FigureTable(TomlTable):
     )
     x: Names = entry(
         "Value along the horizontal axis; for `bands` also several, a column of panels each; for "
-        "`influence` the values that move the others."
+        "`influence` the values that move the others.",
+        "for `influence` all numbers that vary",
     )
     y: Name = entry("Value along the vertical axis.")
     show: Names = entry("Values to show, a row each.")
@@ -224,7 +232,7 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         str(path.parent / scenario) if path and is_path(scenario) else scenario
         for scenario in ([names] if isinstance(names, str) else names)
     )
-    entries["parameters"] = dict(flatten(content.get("parameters", {})))
+    entries["parameters"] = dict(flatten(content.get("parameters", {}), is_spread))
     entries["vary"] = {}
     for key, value in flatten(content.get("vary", {}), _is_range):
         with findings.collecting():
@@ -290,6 +298,9 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
 def _check_names(where: str, study: Study) -> None:
     """Check that names are names, that none is given twice, and that what is summed varies."""
     findings = Findings()
+    for scenario in dict.fromkeys(study.scenario):
+        if study.scenario.count(scenario) > 1:
+            findings.problem(f"{where}: scenario: {scenario} is stated twice")
     stated = [*study.parameters, *([STEP] * (study.step is not None)), *study.varied]
     for name in stated:
         if name != STEP or name in study.parameters:
@@ -330,21 +341,24 @@ def read_figures(
     labels = dict(flatten(tables.pop(LABELS, {})))
     numbers = [name for name, kind in varied.items() if kind is not str]
     if not tables and numbers:
-        tables["influence"] = {"kind": "influence", "x": numbers, "show": _usual(indices)}
+        tables[INFLUENCE] = {"kind": INFLUENCE, "show": _usual(indices)}
     by = (SCENARIO,) if is_compared else ()
     findings, entries = Findings(), []
     for name, table in tables.items():
+        x = _listed(table.get("x", ())) or (numbers if table["kind"] == INFLUENCE else [])
         with findings.collecting():
             if not _NAME.fullmatch(name):
                 raise InputError(
                     f"{where}: figures: {name!r} cannot be the name of a file: letters, digits, -"
                 )
+            if not x:
+                raise InputError(f"{where}: figures: {name}: lacks x: no number varies")
             _check_figure(f"{where}: figures: {name}", table, (*numbers, *indices), (*varied, *by))
         entries.append(
             FigureEntry(
                 name,
                 table["kind"],
-                _listed(table.get("x", ())),
+                x,
                 table.get("y", ""),
                 _listed(table.get("show", ())),
                 _listed(table.get("by", by)),

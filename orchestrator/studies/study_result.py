@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from importlib import import_module
@@ -12,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestrator.figures.study_values import FAILURE
+from orchestrator.figures.study_values import CAUTION, FAILURE
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.ledger import is_changed, locate
 
@@ -44,8 +45,8 @@ class StudyResult(Mapping[str, np.ndarray]):
     """The runs of a finished study, by column.
 
     `result["plant.eta0.z"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. A missing value of a run is nan. `result["failure"]` is None for a run without a
-    failure.
+    suggestion. A missing value of a run is nan. `result["failure"]` and `result["caution"]` are
+    None for a run without any.
 
     Attributes:
         folder: the folder of the study.
@@ -91,6 +92,12 @@ class StudyResult(Mapping[str, np.ndarray]):
     def failed(self) -> int:
         """Number of failed runs."""
         return int(self.runs - self._table[FAILURE].null_count)
+
+    @property
+    def cautions(self) -> dict[str, int]:
+        """Number of runs in which to be wary of something, by what it is."""
+        values = self.get(CAUTION, ())
+        return dict(Counter(kind for text in values if text for kind in text.split(", ")))
 
     def __iter__(self) -> Iterator[str]:
         """The names of the columns."""

@@ -11,12 +11,12 @@ from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
-from orchestrator.figures.study_figures import draw_figures, figure_files
-from orchestrator.machine.errors import InputError
+from orchestrator.figures.study_values import FigureEntry
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS, LoopName
 from orchestrator.master.observers.observer import progress_bar
@@ -169,17 +169,12 @@ def complete_study(
         KeyboardInterrupt: a signal has come to stop it.
 
     """
+    # What is only checked draws nothing.
+    from orchestrator.figures.study_figures import draw_figures, figure_files  # noqa: PLC0415
+
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
-    kind: str = _kind_begun(folder) if means.kind == AUTO else means.kind
-    systems = {name: load_scenario(name, kind) for name in study.scenario}
-    if any(scenario.digest for scenario, _ in systems.values()):
-        kind = settings_of(current_fmus(kind))["kind"]
-    means = replace(means, kind=_kind(kind))
-    space = Space(study, systems)
-    entries = read_figures(
-        study.name, study.figures, space.columns, space.has_scenarios, space.indices
-    )
-    engine = _engine(means.engine or study.engine, space.prepared, means)
+    kind = _kind_begun(folder) if means.kind == AUTO else means.kind
+    means, systems, space, entries, engine = prepare_study(study, replace(means, kind=kind))
     record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
     with open_store(folder, record, space.indices, means.force) as kept:
         kept.ledger.check(figure_files(entries))
@@ -189,7 +184,9 @@ def complete_study(
             name = study.name if progress else None
             _complete(kept, engine, space, means, name)
         result = StudyResult(folder)
-        kept.write_record({**read_study_record(folder), "failed": result.failed})
+        kept.write_record(
+            {**read_study_record(folder), "failed": result.failed, "cautions": result.cautions}
+        )
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
@@ -207,6 +204,50 @@ def complete_study(
         for note in notes:
             say(note)
     return result
+
+
+class Ready(NamedTuple):
+    """A study whose runs can be made.
+
+    Attributes:
+        means: how, with the kind of FMUs that there is.
+        systems: that are run, by the names of their scenarios.
+        space: its runs.
+        figures: that are drawn of them.
+        engine: that makes them.
+
+    """
+
+    means: Means
+    systems: Mapping[str, tuple[Scenario, System]]
+    space: Space
+    figures: Sequence[FigureEntry]
+    engine: Engine
+
+
+def prepare_study(study: Study, means: Means) -> Ready:
+    """Find out whether the runs of a study can be made, and prepare them.
+
+    Raises:
+        Refused: they cannot be made, or what is drawn of them; with all problems.
+
+    """
+    findings, systems = Findings(), dict[str, tuple[Scenario, System]]()
+    for name in study.scenario:
+        with findings.collecting():
+            systems[name] = load_scenario(name, means.kind)
+    findings.refuse()
+    if any(scenario.digest for scenario, _ in systems.values()):
+        means = replace(means, kind=_kind(settings_of(current_fmus(means.kind))["kind"]))
+    space = Space(study, systems)
+    with findings.collecting():
+        entries = read_figures(
+            study.name, study.figures, space.columns, space.has_scenarios, space.indices
+        )
+    with findings.collecting():
+        engine = _engine(means.engine or study.engine, space.prepared, means)
+    findings.refuse()
+    return Ready(means, systems, space, entries, engine)
 
 
 def _kind_begun(folder: Path) -> KindName:
@@ -286,7 +327,8 @@ def faster(space: Space, engine: Engine, means: Means) -> str:
 def _unknown_to_batch(experiment: Experiment) -> str:
     """What the batch engine would not do of an experiment, in words."""
     order = experiment.order if experiment.order in ORDERS else ORDERS[0]
-    made = vars(Experiment(experiment.stop_time, experiment.step, order))
+    length = experiment.stop_time - experiment.start_time
+    made = vars(Experiment(length, experiment.step, order)) | {"stop_time": experiment.stop_time}
     different = [name for name, value in vars(experiment).items() if value != made[name]]
     return ", ".join(f"{name} = {getattr(experiment, name)!r}" for name in different)
 

@@ -5,26 +5,29 @@ Among the former: which velocities reach a controller that is to do without.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from math import inf
+from typing import NamedTuple
 
 import numpy as np
 
 from auv_fmu.observer import EXACT, FORMS, exact_gain
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
+from auv_fmu.vehicle import Vehicle
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import literal, type_of, unit_of
+from orchestrator.system.values import Value, literal, type_of, unit_of
 from orchestrator.vehicle.signals import (
     STANDARD,
     AllocatedLoop,
     Loop,
     loops_of,
-    real_parameter,
     value_of,
-    vehicle,
 )
 
 #: References that are farther apart are not the same [m].
@@ -37,8 +40,44 @@ _REVERSES, _GROWS = 1.0, 2.0
 _VELOCITY_UNITS = {"m/s", "rad/s"}
 
 
+#: What there is to be wary of, as the table of a study names it, and what it means there.
+UNSTABLE, CHATTERING, VERTICAL = "unstable observer", "chattering", "vertical passed"
+CAUTIONS = {
+    UNSTABLE: "k_d is too large for the internal steps of the controller; lower k_d or h_max",
+    CHATTERING: "the robust term changes its sign in every step; raise eps_t or reduce the step",
+    VERTICAL: "the pitch passes 90 degrees, and what follows depends on rounding; set "
+    "plant.roll = true",
+}
+
+
+class Caution(NamedTuple):
+    """What to be wary of in a run.
+
+    Attributes:
+        kind: one of :data:`CAUTIONS`.
+        text: a line for the user of the run.
+
+    """
+
+    kind: str
+    text: str
+
+
+class Seen(NamedTuple):
+    """What the rows of a run have shown of a loop.
+
+    Attributes:
+        rho_hat: largest theta_hat[1], the part of the bound that is there at any speed [N].
+        vertical: when the pitch had first passed 90 degrees [s].
+
+    """
+
+    rho_hat: float = -inf
+    vertical: float = inf
+
+
 def watched_columns(loop: Loop) -> tuple[str, str]:
-    """The columns whose extremes :func:`cautions_after` looks at: theta_hat[1], and the pitch."""
+    """The columns that :class:`Watch` looks at: theta_hat[1], and the pitch."""
     return loop.theta_hat[0], loop.attitude[1]
 
 
@@ -50,10 +89,10 @@ def gain_of_a_step(system: System, h: float, controller: str = STANDARD.controll
     return exact_gain(k_d, h) if is_exact else k_d
 
 
-def cautions(system: System, experiment: Experiment) -> list[str]:
-    """What can be said before a run, in lines for the user."""
+def cautions(system: System, experiment: Experiment, loops: Sequence[Loop]) -> list[Caution]:
+    """What can be said before a run."""
     found = []
-    for controller in dict.fromkeys(loop.controller for loop in loops_of(system)):
+    for controller in dict.fromkeys(loop.controller for loop in loops):
         names = [port_name(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
         if not all(map(system.has, names)):
             continue
@@ -61,11 +100,12 @@ def cautions(system: System, experiment: Experiment) -> list[str]:
         h = min(experiment.step, h_max)
         h_p = h * observer_rate(lambda_, gain_of_a_step(system, h, controller))
         if h_p > _GROWS:
-            found.append(
+            text = (
                 f"{controller}.k_d = {k_d:g} 1/s is unstable with internal steps of {h:g} s: the "
                 f"observer's fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower "
                 "k_d or h_max"
             )
+            found.append(Caution(UNSTABLE, text))
     return found
 
 
@@ -109,48 +149,94 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     return None if value is None else float(value)
 
 
-def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
-    """What a run has shown, in lines for the user."""
-    return [
-        line
-        for loop in loops
-        for line in (*_of_the_robust_term(table, loop), *_of_the_vertical(table, loop))
-    ]
+class Watch:
+    """An observer that keeps what cautions follow from."""
+
+    def __init__(self, loops: Sequence[Loop] = (STANDARD,)) -> None:
+        """Watch some loops."""
+        self._loops = loops
+
+    def begin(self, header: Header) -> None:
+        """Find the columns."""
+        self._header, self._n = header, 0
+        self._places = [
+            [header.place.get(name) for name in watched_columns(loop)] for loop in self._loops
+        ]
+        self._seen = [Seen() for _ in self._loops]
+        self._first = np.empty(0)
+
+    def take(self, rows: np.ndarray) -> None:
+        """Look at some rows."""
+        if not self._n:
+            self._first = rows[0].copy()
+        self._n += len(rows)
+        for i, (estimate, pitch) in enumerate(self._places):
+            rho_hat, vertical = self._seen[i]
+            if estimate is not None:
+                rho_hat = max(rho_hat, float(rows[:, estimate].max()))
+            if pitch is not None and vertical == inf:
+                beyond = np.cos(rows[:, pitch]) * np.cos(self._first[pitch]) <= 0.0
+                vertical = float(rows[beyond.argmax(), 0]) if beyond.any() else inf
+            self._seen[i] = Seen(rho_hat, vertical)
+
+    def end(self, ending: Ending) -> None:
+        """Nothing more is seen."""
+
+    def found(self) -> list[Caution]:
+        """What the rows have shown."""
+        table = Table.of(self._header, np.empty((0, 1 + len(self._header.columns))))
+        step = self._header.experiment.step
+        return [
+            caution
+            for loop, seen in zip(self._loops, self._seen, strict=True)
+            for caution in cautions_seen(seen, loop, partial(value_of, table), step)
+            if self._n > 1
+        ]
 
 
-def _of_the_robust_term(table: Table, loop: Loop) -> list[str]:
-    """Whether it chatters; theta_hat[1] is the part of rho_hat that is there at any speed."""
-    estimate, eps, h_max = loop.theta_hat[0], f"{loop.controller}.eps_t", f"{loop.controller}.h_max"
-    needed = (eps, h_max, loop.ell, *loop.vehicle_parameters)
-    if len(table) < 2 or table.missing((estimate,), needed):
-        return []
-    rho_hat, eps_t = float(table[estimate].max()), real_parameter(table, eps)
-    plant = vehicle(lambda name: real_parameter(table, name), loop)
-    lambda_m2 = bounds(plant, real_parameter(table, loop.ell)).lambda_m2
-    h = min(table.header.experiment.step, real_parameter(table, h_max))
-    h_p = h * robust_rate(rho_hat, eps_t, lambda_m2)
-    if h_p <= _REVERSES:
-        return []
-    return [
-        f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {eps} = "
-        f"{eps_t:g} W its step gain h p is {h_p:.3g}, and above {_REVERSES:g} its sign "
-        "changes in every step; raise eps_t or reduce --step"
-    ]
+def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[Caution]:
+    """What a run has shown whose rows are all there."""
+    watch = Watch(loops)
+    watch.begin(table.header)
+    if len(table):
+        watch.take(table.rows)
+    return watch.found()
 
 
-def _of_the_vertical(table: Table, loop: Loop) -> list[str]:
-    """Whether a vehicle of five degrees of freedom has passed it."""
-    roll, pitch = f"{loop.vehicle}.roll", loop.attitude[1]
-    if not len(table) or table.missing((pitch,), (roll,)):
-        return []
-    beyond = np.cos(table[pitch]) * np.cos(table[pitch][0]) <= 0.0
-    if value_of(table, roll) is not False or not beyond.any():
-        return []
-    return [
-        f"the pitch passes 90 degrees by t = {table.time[beyond.argmax()]:g} s, where (1) has a "
-        f"pole: with {roll} = false what follows depends on rounding, so quote no single run; "
-        f"compare runs whose {loop.vehicle}.eta0 differs by 1e-6 m, or set {roll} = true"
-    ]
+def cautions_seen(
+    seen: Seen, loop: Loop, value: Callable[[str], Value | None], step: float
+) -> Iterator[Caution]:
+    """What a run has shown.
+
+    Args:
+        seen: of its rows.
+        loop: that is meant.
+        value: of a parameter by its name `component.name`; None: there is none.
+        step: of the run [s].
+
+    """
+    roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
+    needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
+    known = map(value, needed) if seen.rho_hat > 0.0 else ()
+    numbers = [float(one) for one in known if isinstance(one, int | float)]
+    if len(numbers) == len(needed) and min(numbers[:2]) > 0.0:
+        eps_t, ell, h_max, *plant = numbers
+        lambda_m2 = bounds(Vehicle._make(plant), ell).lambda_m2
+        h_p = min(step, h_max) * robust_rate(seen.rho_hat, eps_t, lambda_m2)
+        if h_p > _REVERSES:
+            text = (
+                f"the robust term chatters: with theta_hat[1] up to {seen.rho_hat:.3g} N and {eps} "
+                f"= {eps_t:g} W its step gain h p is {h_p:.3g}, and above {_REVERSES:g} its sign "
+                "changes in every step; raise eps_t or reduce --step"
+            )
+            yield Caution(CHATTERING, text)
+    if seen.vertical < inf and value(roll) is False:
+        text = (
+            f"the pitch passes 90 degrees by t = {seen.vertical:g} s, where (1) has a pole: with "
+            f"{roll} = false what follows depends on rounding, so quote no single run; compare "
+            f"runs whose {loop.vehicle}.eta0 differs by 1e-6 m, or set {roll} = true"
+        )
+        yield Caution(VERTICAL, text)
 
 
 def cautions_beside(

@@ -53,7 +53,7 @@ class Index(NamedTuple):
         needs: what a run must have.
         reducer: takes rows in, for what it is a function of.
         accumulated: where the batch engine has the same; empty: it makes it of the rows.
-        result: that function, also of the number of terms and of the time at the end [s].
+        result: that function, also of the number of terms and of the length of the run [s].
         symbol: in formulas, with its members as indices, before the label.
         is_metric: whether metrics.json holds it, or a study only.
 
@@ -66,7 +66,7 @@ class Index(NamedTuple):
     needs: Callable[[Loop], Needs]
     reducer: Callable[[], Fold | LargestOfTheEnd]
     accumulated: str = ""
-    result: Callable[[np.ndarray, int, float], Any] = lambda found, n, end: found
+    result: Callable[[np.ndarray, int, float], Any] = lambda found, n, length: found
     symbol: str = ""
     is_metric: bool = False
 
@@ -75,9 +75,9 @@ class Index(NamedTuple):
         """The names of its numbers in the table of a study."""
         return tuple(member_name(self.name, m) if m != "" else self.name for m in self.units)
 
-    def members_of(self, found: np.ndarray, n: int, end: float) -> list[float]:
+    def members_of(self, found: np.ndarray, n: int, length: float) -> list[float]:
         """The values of its members, from what its terms come to."""
-        values: list[float] = np.atleast_1d(self.result(found, n, end)).tolist()
+        values: list[float] = np.atleast_1d(self.result(found, n, length)).tolist()
         return values
 
     @property
@@ -91,7 +91,7 @@ class Index(NamedTuple):
         return ", ".join(filter(None, dict.fromkeys(self.units.values())))
 
 
-def _root_mean(squares: np.ndarray, n: int, end: float) -> np.ndarray:
+def _root_mean(squares: np.ndarray, n: int, length: float) -> np.ndarray:
     # One after the other, as the equations add.
     x, y, z = squares
     mean: np.ndarray = np.sqrt((x + y + z) / n)
@@ -121,7 +121,7 @@ INDICES: tuple[Index, ...] = (
         _actuation,
         _ENERGY,
         "square",
-        lambda found, n, end: np.sqrt(found),
+        lambda found, n, length: np.sqrt(found),
         is_metric=True,
     ),
     Index(
@@ -132,7 +132,7 @@ INDICES: tuple[Index, ...] = (
         _actuation,
         _ENERGY,
         "square",
-        lambda found, n, end: np.sqrt(found / end),
+        lambda found, n, length: np.sqrt(found / length),
         is_metric=True,
     ),
     Index(
@@ -153,7 +153,7 @@ INDICES: tuple[Index, ...] = (
         lambda loop: (loop.commanded, loop.limits),
         partial(Fold, LoopRows.outside, total),
         "outside",
-        lambda found, n, end: found / n,
+        lambda found, n, length: found / n,
         is_metric=True,
     ),
     Index(
@@ -180,9 +180,9 @@ INDICES: tuple[Index, ...] = (
         "time_to_reach",
         "time to reach",
         {"": "s"},
-        f"first time at which |e| is at most {REACHED:g} m",
+        f"time from the start of the run until |e| is at most {REACHED:g} m",
         Loop.for_tracking,
-        partial(Fold, lambda rows: rows.time[rows.distance <= REACHED], first),
+        partial(Fold, lambda rows: rows.elapsed[rows.distance <= REACHED], first),
         "reached",
     ),
     Index(
@@ -283,7 +283,7 @@ class Indices:
 
     def begin(self, header: Header) -> None:
         """Find out which indices there will be."""
-        self._header, self._end, self._n = header, 0.0, 0
+        self._header, self._end, self._n = header, header.experiment.start_time, 0
         self._failure: str | None = None
         self._last = np.empty((0, 1 + len(header.columns)))
         none = Table.of(header, self._last)
@@ -320,8 +320,9 @@ class Indices:
     @np.errstate(all="ignore")
     def found(self, loop: Loop = STANDARD) -> dict[str, list[float]]:
         """The members of the indices of a loop, by their names."""
+        length = self._end - self._header.experiment.start_time
         return {
-            index.name: index.members_of(reducer.found(self._end), reducer.n, self._end)
+            index.name: index.members_of(reducer.found(self._end), reducer.n, length)
             for index in self._measured[loop]
             if (reducer := self._reducers[loop][index.reducer]).n
         }

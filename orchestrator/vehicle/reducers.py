@@ -33,7 +33,8 @@ class LoopRows:
     Attributes:
         loop: whose signals count.
         number: of the first of them in the run, from 0; row 0 ends no step.
-        half: when half of the run is over [s].
+        start: of the run [s].
+        half: when half of it is over [s].
 
     """
 
@@ -48,7 +49,9 @@ class LoopRows:
 
         """
         self.loop, self.number = loop, number
-        self.half = 0.5 * table.header.experiment.stop_time
+        experiment = table.header.experiment
+        self.start = experiment.start_time
+        self.half = self.start + 0.5 * (experiment.stop_time - self.start)
         self._table, self._new = table, new
         self._groups: dict[tuple[str, ...], np.ndarray] = {}
 
@@ -56,6 +59,11 @@ class LoopRows:
     def time(self) -> np.ndarray:
         """Times of the rows [s]."""
         return self._table.time[self._new :]
+
+    @property
+    def elapsed(self) -> np.ndarray:
+        """Times since the start of the run [s]."""
+        return self.time - self.start
 
     @property
     def late(self) -> np.ndarray:

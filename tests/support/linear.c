@@ -55,7 +55,12 @@ Status fmi2Reset(Component c)
 Status fmi2SetReal(Component c, const unsigned *r, size_t n, const double *values)
 {
     size_t i;
-    for (i = 0; i < n; i++) ((Instance *)c)->values[r[i]] = values[i];
+    for (i = 0; i < n; i++) {
+        ((Instance *)c)->values[r[i]] = values[i];
+#ifdef FORGETS
+        if (r[i] < Y) ((Instance *)c)->slopes[r[i] - U] = 0.0;
+#endif
+    }
     return OK;
 }
 

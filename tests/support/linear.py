@@ -112,7 +112,11 @@ QUARTER_TRUCK = Model(
 
 
 def linear(
-    folder: Path, says: str = "dependencies", cached: bool = False, can: bool = True
+    folder: Path,
+    says: str = "dependencies",
+    cached: bool = False,
+    can: bool = True,
+    forgets: bool = False,
 ) -> Path:
     """The FMU.
 
@@ -122,9 +126,10 @@ def linear(
             `all`: both of both; `nothing`: no attribute; `no outputs`: not even the outputs.
         cached: whether its outputs are computed in steps only.
         can: give its state and derivatives, and let inputs change in a step.
+        forgets: whether an input that is set no longer changes.
 
     """
-    fmu = folder / f"linear-{says.replace(' ', '-')}-{cached:d}{can:d}.fmu"
+    fmu = folder / f"linear-{says.replace(' ', '-')}-{cached:d}{can:d}{forgets:d}.fmu"
     if fmu.exists():
         return fmu
     causes = dict.fromkeys(INPUTS, "input") | dict.fromkeys(OUTPUTS, "output")
@@ -140,7 +145,7 @@ def linear(
         (unknown(3 + i, dependencies) for i, dependencies in enumerate(said.get(says, ()))),
         f'canHandleVariableCommunicationStepSize="true" {able if can else ""}',
     )
-    return write(fmu, text, _SOURCE, *["-DCACHED"] * cached)
+    return write(fmu, text, _SOURCE, *["-DCACHED"] * cached, *["-DFORGETS"] * forgets)
 
 
 def system_of(

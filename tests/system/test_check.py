@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 from zipfile import ZipFile
 
 import pytest
@@ -24,6 +26,7 @@ from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.others import build
+from support.texts import mentions
 
 SCENARIO = """
 title = "a mistake a line"
@@ -97,6 +100,67 @@ def test_all_mistakes_of_a_study_are_said(tmp_path, capsys):
     }
     file.write_text('scenario = "fig5"\n[vary]\nplant.ell = [0.3, 0.4]\n')
     assert main(["check", str(file)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("content", "culprits"),
+    [
+        ({"scenario": ["fig55", "none.ssp"]}, ["fig55", "none.ssp"]),
+        (
+            {"vary": {"plant.m11": ["heavy"], "nobody.x": [1], "plant.m22": [20, 20.0]},
+             "parameters": {"plant.m99": 3, "plant.d11": "x"}},
+            ["plant.m11 heavy", "nobody", "plant.m22 20 twice", "m99", "plant.d11 x"],
+        ),
+        ({"vary": {"plant.m11": [20]}, "sample": {"n": 4, "range": {"plant.ell": [-1, 1],
+          "controller.saturation": [1, 2]}}}, ["plant.ell -1", "controller.saturation vary"]),
+        ({"vary": {"plant.m11": [20]}, "stop_time": -1.0}, ["-1 s"]),
+        ({"vary": {"step": [0.02, 0.0]}}, ["step 0 s"]),
+        (
+            {"scenario": "fault-sensor", "engine": "batch", "vary": {"plant.m11": [20]},
+             "figures": {"a": {"kind": "influence", "show": "my_index"}}},
+            ["events batch", "my_index"],
+        ),
+        ({"scenario": ["fig4", "fig4"], "vary": {"plant.m11": [20]}}, ["fig4 twice"]),
+        ({"vary": {"controller.saturation": ["tanh"]},
+          "figures": {"a": {"kind": "influence", "show": "late_error"}}}, ["lacks x"]),
+    ],
+)  # fmt: skip
+def test_check_of_a_study_finds_what_sweep_finds(content, culprits, workplace, capsys):
+    """All of it, where `sweep` says the first, and does nothing."""
+    pytest.importorskip("numba", reason="needs the extra `studies`")
+    file = workplace / "mine.toml"
+    file.write_text(toml_text({"scenario": "fig5", **content}))
+    assert main(["check", "mine.toml"]) == 2
+    said = [line.removeprefix("problem: ") for line in capsys.readouterr().out.splitlines()]
+    assert len(said) == len(culprits)
+    for words in culprits:
+        assert any(mentions(line, words) for line in said), said
+    assert main(["sweep", "mine.toml"]) == 2
+    first = capsys.readouterr().err.removeprefix("auv-fmu: ").partition(" (and ")[0].strip()
+    assert first == said[0]
+    assert {path.name for path in workplace.iterdir()} == {"mine.toml"}
+
+
+def toml_text(content: dict[str, Any]) -> str:
+    """A table as TOML has it: strings, numbers and lists are written as in JSON."""
+    tables = {key: value for key, value in content.items() if isinstance(value, dict)}
+    lines = [f"{key} = {json.dumps(content[key])}" for key in content.keys() - tables]
+    return "\n".join([*lines, *(f"{key} = {inline(value)}" for key, value in tables.items())])
+
+
+def inline(value: Any) -> str:
+    if not isinstance(value, dict):
+        return json.dumps(value)
+    return "{ " + ", ".join(f'"{key}" = {inline(one)}' for key, one in value.items()) + " }"
+
+
+def test_a_sample_that_is_not_even_is_an_info(workplace, capsys):
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
+    for n, is_said in ((1000, True), (1024, False)):
+        content = {"scenario": "fig5", "sample": {"n": n, "range": {"plant.ell": [0.3, 0.4]}}}
+        Path("mine.toml").write_text(toml_text(content))
+        assert main(["check", "mine.toml"]) == 0
+        assert ("info: " in capsys.readouterr().out) == is_said
 
 
 def test_all_mistakes_of_an_archive_are_said(dist, workplace, capsys):

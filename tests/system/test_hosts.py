@@ -161,6 +161,7 @@ def test_host_that_applies_no_parameters_refuses_them(dist: Path, host: str):
     system = closed_loop(dist).with_parameters({PortName("plant", "noise.std"): 0.5})
     [verdict] = compare(system, [host], 3, 0.02)
     assert "plant.noise.std = 0.5" in str(verdict.failure)
+    assert "Error" not in str(verdict.failure)
 
 
 @pytest.mark.parametrize(

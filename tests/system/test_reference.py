@@ -104,7 +104,7 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     path.write_text("\n".join(lines))
     said = verify(path, system, 1e-9)
     assert tells(said, (2, 70, 1e-9, 20, 0.1, 2)) and "jacobi" in said
-    assert "not outputs: controller.saturation" in said
+    assert "outputs: controller.saturation" in said
     assert mentions(said, "68, plant.eta.y,")
 
 

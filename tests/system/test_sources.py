@@ -105,6 +105,23 @@ def test_sources_give_the_numbers_of_the_library(tmp_path: Path, way: str):
     assert {path.name for path in tmp_path.iterdir()} == {"s.fmu", relay(tmp_path).name}
 
 
+#: As 20-sim writes them: functions have a prefix unless it is defined, and a header lies deeper.
+PREFIXED = """#ifndef FMI2_FUNCTION_PREFIX
+#define FMI2_FUNCTION_PREFIX relay_
+#endif
+#define PASTE(a, b) a##b
+#define JOIN(a, b) PASTE(a, b)
+#define fmi2DoStep JOIN(FMI2_FUNCTION_PREFIX, fmi2DoStep)
+#include "deep.h"
+"""
+
+
+def test_functions_have_no_prefix_and_headers_may_lie_deeper(tmp_path: Path):
+    deeper = {**TOGETHER, "relay.c": PREFIXED + SOURCE, "template/own/deep.h": "int unused;"}
+    with pytest.warns(UserWarning, match=r"s\.fmu .*compiled"):
+        assert rows(with_sources(tmp_path, deeper)) == rows(relay(tmp_path))
+
+
 def test_an_isolated_fmu_is_compiled_as_well(tmp_path: Path):
     fmu = with_sources(tmp_path, *WAYS["all"])
     with pytest.warns(UserWarning, match="compiled now"):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -122,6 +123,33 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
         "auv-fmu: results/mine holds another study, which differs in vary, points",
     ]
     assert files(folder)["runs.parquet"] == before["runs.parquet"]
+
+
+def test_cautions_of_runs_are_in_the_table_and_counted_at_the_end(workplace, capsys):
+    """In both engines; the kinds are those of the warnings that a single run prints."""
+    words = {"unstable": "unstable observer", "chatters": "chattering", "90 deg": "vertical passed"}
+    values = {"controller.k_d": [50.0, 120.0], "controller.eps_t": [0.001, 1.0],
+              "plant.roll": [False, True]}  # fmt: skip
+    expected = []
+    for chosen in product(*values.values()):
+        sets = [f"--set={name}={value}" for name, value in zip(values, chosen, strict=True)]
+        assert main(["run", "fig5", "--stop-time", "10", "--no-figures", *sets]) == 0
+        lines = capsys.readouterr().err.splitlines()
+        said = "\n".join(line for line in lines if "warning: fig5: " in line)
+        expected.append(", ".join(kind for word, kind in words.items() if word in said) or None)
+    assert len({*expected}) > 3
+    study = {"scenario": "fig5", "stop_time": 10.0, "vary": values}
+    tables = [sweep(study, engine=engine, out=engine, workers=1) for engine in (FMU, BATCH)]
+    for result in tables:
+        assert list(result["caution"]) == expected
+    Path("mine.toml").write_text(
+        'scenario = "fig5"\nstop_time = 1.0\n[vary]\ncontroller.k_d = [50.0, 120.0]\n'
+    )
+    assert main(["sweep", "mine.toml", "--workers", "1"]) == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert tells(line, (1, 2)) and mentions(line, "warning: unstable observer k_d h_max")
+    record = json.loads((workplace / "results" / "mine" / "study.json").read_text())
+    assert record["cautions"] == {"unstable observer": 1}
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -211,5 +211,8 @@ if __name__ == "__main__":
     folder = Path(sys.argv[2])
     (folder / _EXPORT).mkdir()
     system, experiment = pickle.loads((folder / GIVEN).read_bytes())
-    ran = run(system, experiment, folder / _EXPORT)
+    try:
+        ran = run(system, experiment, folder / _EXPORT)
+    except InputError as error:
+        sys.exit(str(error))
     write_rows(folder / ROWS, ran.rows.tolist(), ran.seconds, ran.reading)

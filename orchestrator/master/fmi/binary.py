@@ -38,10 +38,12 @@ _ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
 #: The kind of segments that are mapped into memory.
 _LOADED = 1
 
-#: As the standard of C has it: no product is contracted with a sum, nothing is reordered.
+#: As the standard of C has it: no product is contracted with a sum, nothing is reordered. No
+#: function has a prefix, whether the sources go by FMI's headers or, as 20-sim's, by their own.
 _FLAGS = (
     "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w",
     "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+    "-DFMI2_FUNCTION_PREFIX=",
 )  # fmt: skip
 
 #: The headers of FMI, for FMUs that come without them.
@@ -293,6 +295,8 @@ def _sources_of(component: Component, folder: Path) -> Sources | None:
 
     """
     place = folder / "sources"
+    # A list may leave out where headers are.
+    beside = sorted({f"-idirafter{header.parent}" for header in place.rglob("*.h")})
     identifier = component.description.coSimulation.modelIdentifier
     try:
         described: list[Any] = read_build_description(folder, validate=False)
@@ -306,7 +310,7 @@ def _sources_of(component: Component, folder: Path) -> Sources | None:
     ]
     if not sets:
         files = sorted(place.glob("*.c"))
-        return Sources(files, [f"-I{place}"]) if files else None
+        return Sources(files, [f"-I{place}", *beside]) if files else None
     files = list(dict.fromkeys(place / name for one in sets for name in one.sourceFiles))
     for file in files:
         if not (file.is_file() and file.resolve().is_relative_to(place.resolve())):
@@ -317,7 +321,7 @@ def _sources_of(component: Component, folder: Path) -> Sources | None:
             if not definition.optional:
                 value = "" if definition.value is None else f"={definition.value}"
                 options.append(f"-D{definition.name}{value}")
-    return Sources(files, list(dict.fromkeys(options)))
+    return Sources(files, list(dict.fromkeys([*options, *beside])))
 
 
 def _check_compiler(component: Component) -> None:

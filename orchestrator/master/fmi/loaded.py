@@ -63,6 +63,8 @@ class LoadedInstance:
         self._kept = fmi2FMUstate()
         self._library = library
         self._listener = listener
+        #: References, orders and values of the derivatives of inputs.
+        self._slopes: tuple[Sequence[int], Sequence[int], Sequence[float]] = ((), (), ())
         self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
         self._worst = 0
         # The functions of the library serve all instances; only what differs is theirs.
@@ -173,7 +175,15 @@ class LoadedInstance:
     def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
         """Let some inputs change linearly in the steps from now on."""
         if inputs:
-            self._call("setRealInputDerivatives", inputs, [1] * len(inputs), slopes)
+            if self._change not in self.set_inputs:
+                # After the values: an FMU may take each for a new one that does not change.
+                self.set_inputs.append(self._change)
+            self._slopes = inputs, [1] * len(inputs), slopes
+            self._change()
+
+    def _change(self) -> int:
+        self._call("setRealInputDerivatives", *self._slopes)
+        return int(fmi2OK)
 
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""

@@ -221,16 +221,17 @@ class Blocks:
 
 
 class Every:
-    """Chooses one of the times that come for each interval."""
+    """Chooses the first of the times in each interval since the start of a run."""
 
-    def __init__(self, interval: float) -> None:
-        """Start before the first time; the interval is in seconds."""
-        self._interval, self._count = interval, -1.0
+    def __init__(self, interval: float, start: float = 0.0) -> None:
+        """Take the interval and the start [s]."""
+        self._interval, self._start, self._count = interval, start, -1.0
 
     def chosen(self, times: np.ndarray) -> np.ndarray:
         """Which of some further times are chosen, as truth values."""
-        # The number of whole intervals until a time: where it has grown, that time is chosen.
-        counts = np.floor(times / self._interval * (1.0 + ROUNDING))
+        # A time is rounded to the digits that it has, however short the run.
+        elapsed = times - self._start + np.spacing(np.abs(times))
+        counts = np.floor(elapsed / self._interval * (1.0 + ROUNDING))
         grown: np.ndarray = np.diff(counts, prepend=self._count) > 0.0
         self._count = float(counts[-1])
         return grown
@@ -241,7 +242,7 @@ def every(interval: float | None, header: Header) -> Every | None:
     # An interval that is no longer than the step keeps all.
     if interval is None or interval <= header.experiment.step:
         return None
-    return Every(interval)
+    return Every(interval, header.experiment.start_time)
 
 
 def check_interval(interval: float) -> None:
@@ -340,8 +341,9 @@ class Progress:
 
     def begin(self, header: Header) -> None:
         """Start the clock."""
+        self._start = header.experiment.start_time
         self._bar: Any = progress_bar(
-            total=header.experiment.stop_time,
+            total=header.experiment.stop_time - header.experiment.start_time,
             desc=self._name,
             unit="s",
             delay=_BAR_DELAY,
@@ -351,7 +353,7 @@ class Progress:
 
     def take(self, rows: np.ndarray) -> None:
         """Move on to the time of the last row."""
-        self._bar.update(rows[-1, 0] - self._bar.n)
+        self._bar.update(rows[-1, 0] - self._start - self._bar.n)
 
     def end(self, ending: Ending) -> None:
         """Leave the bar where it is."""

@@ -8,7 +8,7 @@ the same order.
 
 from __future__ import annotations
 
-from math import cos, isnan, log, nan, pi, sin, sqrt
+from math import cos, inf, isnan, log, nan, pi, sin, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -206,6 +206,7 @@ def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
     _, v, w, _, _, _ = seen.nu
     return RowSignals(
         moment.t,
+        cos(theta),
         difference(y, moment.scene.reference.y_d),
         seen.dy,
         sqrt(v * v + w * w),
@@ -247,6 +248,9 @@ ACCUMULATOR = np.dtype(
         ("end", float, 4),
         ("speed", float),
         ("drift", float),
+        ("rho_hat", float),  # largest theta_hat[1] [N]
+        ("upright", float),  # cosine of the pitch at the start
+        ("vertical", float),  # when the pitch had passed 90 degrees [s]
     ]
 )
 
@@ -255,6 +259,7 @@ class RowSignals(NamedTuple):
     """What of a row of the table the indices follow from."""
 
     t: float  #: [s]
+    cos_pitch: float
     e: Vector3  #: y - y_d with the true control point [m]
     dy: Vector3  #: velocity of the control point [m/s]
     drift: float  #: |(v, w)| [m/s]
@@ -276,7 +281,8 @@ class StepSignals(NamedTuple):
 def new_accumulators(n: int) -> np.ndarray:
     """Accumulators of nothing yet."""
     accumulators = np.zeros(n, ACCUMULATOR)
-    accumulators["reached"] = accumulators["half"] = nan
+    accumulators["reached"] = accumulators["half"] = accumulators["upright"] = nan
+    accumulators["rho_hat"], accumulators["vertical"] = -inf, inf
     return accumulators
 
 
@@ -287,6 +293,11 @@ def take_row(accumulator: Any, row: RowSignals, end: Any) -> None:
         accumulator.reached = row.t
     accumulator.speed = max(accumulator.speed, norm(row.dy))
     accumulator.drift = max(accumulator.drift, row.drift)
+    accumulator.rho_hat = max(accumulator.rho_hat, row.theta_hat[0])
+    if isnan(accumulator.upright):
+        accumulator.upright = row.cos_pitch
+    if row.cos_pitch * accumulator.upright <= 0.0:
+        accumulator.vertical = min(accumulator.vertical, row.t)
     for i in range(4):
         accumulator.end[i] = row.theta_hat[i]
     if row.t >= end.late:

@@ -29,3 +29,38 @@ def test_a_command_has_a_description_and_an_example_that_parses(name):
 def test_every_option_says_what_it_is(name):
     for action in commands_of(parser([name]))[name]._actions:
         assert action.help, action.option_strings or action.dest
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_misspelt_option_of_any_command_is_answered_with_its_usage_and_a_suggestion(name, capsys):
+    """Of whatever the parser of a command has; each without its third letter."""
+    command = commands_of(parser([name]))[name]
+    _, _, *words = shlex.split(command.epilog.removeprefix("Example: "))
+    for action in command._actions:
+        option = max(action.option_strings, key=len, default="")
+        wrong = option[:4] + option[5:]
+        if len(option) < 6 or any(
+            known.startswith(wrong) for known in command._option_string_actions
+        ):
+            continue
+        with pytest.raises(SystemExit, match="2"):
+            parser([name]).parse_args([name, *words, wrong])
+        usage, line = capsys.readouterr().err.splitlines()
+        assert usage.startswith(f"usage: auv-fmu {name} ")
+        assert wrong in line and option in line.partition("did you mean")[2]
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_misspelt_command_is_answered_with_a_suggestion(name, capsys):
+    with pytest.raises(SystemExit, match="2"):
+        parser([]).parse_args([f"{name}{name[-1]}"])
+    usage, line = capsys.readouterr().err.splitlines()
+    assert usage.startswith("usage: auv-fmu ") and len(usage) < 80
+    assert line.endswith("?") and name in line.partition("did you mean")[2]
+
+
+def test_a_misspelt_choice_is_answered_with_a_suggestion_or_with_all(capsys):
+    for value, answer in (("parqet", "did you mean parquet?"), ("xlsx", "csv, parquet")):
+        with pytest.raises(SystemExit, match="2"):
+            parser(["run"]).parse_args(["run", "fig4", "--format", value])
+        assert answer in capsys.readouterr().err

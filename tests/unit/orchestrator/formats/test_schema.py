@@ -6,6 +6,8 @@ from copy import deepcopy
 from typing import Annotated, Any, ClassVar
 
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 from pydantic import ConfigDict, Field, model_validator
 
 from orchestrator.formats.schema import Names, OneOf, TomlTable, entries, entry, needed
@@ -93,3 +95,44 @@ def test_entries_stand_as_in_the_file():
     assert mentions(found["times"].type, "1 1,000") and mentions(found["pace"].type, "slow fast")
     # An entry that may be left out may not be nothing: TOML has no word for it.
     assert not any("None" in one.type for one in found.values())
+
+
+class Loose(TomlTable):
+    values: dict[str, Any] = entry("Any.", "none")
+    parts: list[dict[str, Any]] = entry("Any, in parts.", "none")
+
+
+#: Names in one to three parts, which a file may quote or not.
+NAMES = st.lists(st.sampled_from("ab"), min_size=1, max_size=3).map(tuple)
+
+
+def nested(names: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
+    """A table with values by names, of which some first parts are quoted as one."""
+    table: dict[str, Any] = {}
+    for name, quoted in names:
+        *path, last = (".".join(name[:quoted]), *name[quoted:]) if quoted else name
+        inner = table
+        for part in path:
+            inner = inner.setdefault(part, {})
+            if not isinstance(inner, dict):
+                return {}
+        if last in inner:
+            return {}
+        inner[last] = 1
+    return table
+
+
+@given(st.lists(st.tuples(NAMES, st.integers(0, 3)), max_size=5))
+def test_a_name_that_is_stated_twice_is_named_however_it_is_quoted(names):
+    table = nested(names)
+    stated = [".".join(name) for name, _ in names if table]
+    # What TOML itself refuses, or no system has, is not meant.
+    assume(not any(name.startswith(f"{other}.") for name in stated for other in stated))
+    twice = {name for name in stated if stated.count(name) > 1}
+    for content, where in (({"values": table}, "values"), ({"parts": [{}, table]}, "part 2")):
+        problems: tuple[str, ...] = ()
+        try:
+            Loose.check("a.toml", content)
+        except Refused as error:
+            problems = error.problems
+        assert {*problems} == {f"a.toml: {where}: {name} is stated twice" for name in twice}

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError, Refused
 from orchestrator.master.hooks.events import Alter, Freeze, Set
@@ -76,6 +78,31 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
     assert through(mapped, override={name: 2.0}) == Alter("override", ((target, 2.0),))
     with pytest.raises(InputError, match="added"):
         through(mapped, bias={name: 2.0})
+
+
+@given(
+    source=st.sampled_from(["plant.eta.phi", "plant.fault", "controller.tau.u"]),
+    transformation=st.one_of(
+        st.none(),
+        st.builds(Linear, st.floats(-1e3, 1e3), st.floats(-1e3, 1e3)),
+        st.dictionaries(st.integers(-2, 2), st.floats(-9, 9), max_size=5).map(
+            lambda table: Mapped(tuple(table.items()))
+        ),
+    ),
+)
+def test_to_lose_a_signal_is_to_override_it_with_zero(system, source, transformation):
+    target = port_name("controller.eta.phi")
+    wires = (Connection(port_name(source), target, transformation),)
+    wired = replace(system, connections=wires)
+    lost = action(wired, lose=source)
+    assert lost == action(wired, override={source: 0})
+    [(reached, arriving)] = lost.values
+    expected = {None: 0.0}.get(transformation)
+    if isinstance(transformation, Linear):
+        expected = transformation.offset
+    elif isinstance(transformation, Mapped):
+        expected = dict(transformation.pairs).get(0, 0)
+    assert (reached, float(arriving)) == (target, expected)
 
 
 @pytest.mark.parametrize(

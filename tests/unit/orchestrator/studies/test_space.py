@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load_scenario
@@ -56,6 +58,34 @@ def test_list_for_a_group_is_a_value_for_each_member():
     assert dict(runs[1].parameters) == shared | gains
     with pytest.raises(InputError, match=r"controller\.K1: takes 3 values, not 2"):
         space(parameters={"controller.K1": [1, 2]}, vary={"plant.ell": [0.3, 0.4]})
+
+
+FORMATION = load_scenario("formation-v")
+
+
+@given(
+    star=st.one_of(
+        st.floats(0.0, 1.0),
+        st.fixed_dictionaries({"first": st.floats(0.0, 1.0), "step": st.floats(0.0, 1.0)}),
+        st.fixed_dictionaries({"each": st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3)}),
+    ),
+    own=st.dictionaries(st.sampled_from(["auv1", "auv2", "auv3"]), st.floats(2.0, 3.0)),
+    is_first=st.booleans(),
+)
+def test_parameters_of_a_study_are_those_of_a_scenario(star, own, is_first):
+    """A name with a star, and values that differ from vehicle to vehicle; others win."""
+    named = {f"{vehicle}.plant.noise.std": value for vehicle, value in own.items()}
+    stars = {"auv*.plant.noise.std": star}
+    parameters = {**stars, **named} if is_first else {**named, **stars}
+    content = {"scenario": "x", "parameters": parameters, "vary": {"auv1.plant.ell": [0.3]}}
+    runs = Space(study_of("mine", content), {"x": FORMATION})
+    expected = {"auv1.plant.ell": 0.3}
+    for k in range(3):
+        value = star
+        if isinstance(star, dict):
+            value = star["each"][k] if "each" in star else star["first"] + k * star["step"]
+        expected[f"auv{k + 1}.plant.noise.std"] = value
+    assert dict(runs[0].parameters) == {**expected, **named}
 
 
 def test_values_of_components_in_systems_vary():
@@ -185,6 +215,10 @@ def test_points_are_told_apart_by_the_digest():
             {"parameters": {"controller.K1": [1, 2, 3]}, "vary": {"controller.K1[2]": [1.0]}},
             r"controller\.K1\[2\] is stated twice",
         ),
+        ({"vary": {"plant.ell": [0.3, 0.4, 0.3]}}, "plant.ell: 0.3 is stated twice"),
+        ({"vary": {"plant.noise.seed": [1, 2, 1]}}, "plant.noise.seed: 1 is stated twice"),
+        ({"vary": {"plant.ell": {"from": 1, "to": 1, "n": 2}}}, "plant.ell: 1.0 is stated twice"),
+        ({"vary": {"step": [0.02, 0.02]}}, "step: 0.02 is stated twice"),
         ({"vary": {"plant.ell": ["long"]}}, "plant.ell = long"),
         ({"vary": {"plant.ell": [-1.0]}}, "plant.ell = -1.0"),
         ({"vary": {"plant.noise.seed": [1.5]}}, "plant.noise.seed = 1.5"),

@@ -67,18 +67,20 @@ def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
 def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     odd = dict.fromkeys(index_columns(), 0.1 + 0.2) | {"late_error": -0.0, "largest_speed": np.inf}
     del odd["time_to_reach"]
-    outcomes = [outcome(3), Outcome(1, {}, "stopped at t = 1 s: it would"), outcome(2)]
+    stopped = Outcome(1, {}, "stopped at t = 1 s: it would", "chattering")
+    outcomes = [outcome(3), stopped, outcome(2)]
     with open_store(tmp_path, RECORD, index_columns()) as unfinished:
         unfinished.add(outcomes)
         unfinished.add([Outcome(0, odd)])
         unfinished.publish(Toys(4))
     assert contents(tmp_path).keys() == {"runs.parquet", "study.json"}
     table = parquet.read_table(tmp_path / "runs.parquet")
-    names = ["run", "scenario", "toy.x", "toy.name", *index_columns(), "failure"]
+    names = ["run", "scenario", "toy.x", "toy.name", *index_columns(), "failure", "caution"]
     assert table.column_names == names
     rows = table.to_pylist()
     assert [row["run"] for row in rows] == [0, 1, 2, 3]
     assert [row["failure"] for row in rows] == [None, "stopped at t = 1 s: it would", None, None]
+    assert [row["caution"] for row in rows] == [None, "chattering", None, None]
     for number, row in enumerate(rows):
         assert (row["scenario"], {k: row[k] for k in Toys(4).columns}) == Toys(4).chosen(number)
     assert rows[2] | outcome(2).indices == rows[2]
@@ -90,10 +92,12 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
 
 def test_result_gives_columns_and_suggests_names(tmp_path):
     with open_store(tmp_path, RECORD | {"runs": 2}, index_columns()) as unfinished:
-        unfinished.add([outcome(1), Outcome(0, {}, "it would not")])
+        wary = outcome(1)._replace(cautions="unstable observer, chattering")
+        unfinished.add([wary, Outcome(0, {}, "it would not", "chattering")])
         unfinished.publish(Toys(2))
     result = StudyResult(tmp_path)
     assert (result.runs, result.failed) == (2, 1)
+    assert result.cautions == {"chattering": 2, "unstable observer": 1}
     assert np.isnan(result["late_error"][0])
     assert result["late_error"][1] == outcome(1).indices["late_error"]
     assert list(result["failure"]) == ["it would not", None]

@@ -1,0 +1,361 @@
+"""A run that begins at another time is the same run, but for its times: in every command.
+
+Times are multiples of 1/64 s, which doubles hold exactly, so all else is equal bit for bit.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from orchestrator import load, simulate
+from orchestrator.commands.main import main
+from orchestrator.figures.drawing import compose
+from orchestrator.figures.plot import plot
+from orchestrator.figures.run_figures import FIGURES
+from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.fmi.isolated import Isolation
+from orchestrator.master.observers.observer import Ending, Header, Selection
+from orchestrator.master.observers.table import Table
+from orchestrator.runs.record import read_result
+from orchestrator.runs.wiring import closed_loop
+from orchestrator.studies.study_result import StudyResult
+from orchestrator.system.structure import System
+from orchestrator.system.values import Value
+from support import linear, relay, typed
+from support.runs import run_table
+from support.texts import mentions
+from support.tiers import slow
+
+STARTS = -1.0, 30.0
+STEP, LENGTH, INTERVAL = 1 / 64, 4.0, 0.25
+
+#: An output and an input that nothing feeds of each system, and a parameter.
+SIGNALS = {
+    "vehicle": ("plant.nu.u", "plant.water.x", "plant.m11"),
+    "relays": ("b.y", "a.u", "a.c"),
+    "typed": ("b.w[1]", "a.v[1]", "a.counts_from"),
+    "linear": ("first.y0", "first.u1", "first.x0"),
+}
+
+#: Columns that are times themselves.
+TIMES = {"a.t", "b.t"}
+
+
+@pytest.fixture(scope="module")
+def systems(native: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, System]:
+    """Autonomous systems: of the vehicle's, the disturbance that swings is turned off."""
+    folder = tmp_path_factory.mktemp("fmus")
+    of_relays = {"a": relay.relay(folder), "b": relay.relay(folder)}
+    types = {f"b.u_{kind}": f"a.y_{kind}" for kind in typed.SCALARS}
+    values: dict[str, Value] = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
+    values |= {f"{name}.{end}_at": 1e300 for name in "ab" for end in ("end", "early")}
+    masses = linear.TWO_MASSES
+    fmus = {name: linear.linear(folder) for name in masses.parts}
+    return {
+        "vehicle": closed_loop(native).with_parameters({"disturbance.A_d": 0.0}),
+        "relays": relay.system_of(of_relays, {"b.u": "a.y"}, {"a.c": 1.0, "b.a": 2.0}),
+        "typed": typed.system_of(typed.build(folder), "ab", types, values),
+        "linear": linear.system_of(fmus, masses.parts, masses.wires),
+    }
+
+
+def same(table: Table, other: Table, start: float) -> bool:
+    """Whether one run is another that begins at 0."""
+    times = [0, *(table.header.place[name] for name in TIMES & {*table.columns})]
+    rows = table.rows.copy()
+    rows[:, times] -= start
+    strings = [name for name, of in table.header.standing.items() if of.c_type is None]
+    return (
+        rows.tobytes() == other.rows.tobytes()
+        and all(list(table[name]) == list(other[name]) for name in strings)
+        and table.ending.failure == other.ending.failure
+        and [one._replace(time=one.time - start) for one in table.ending.events]
+        == [*other.ending.events]
+    )
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@pytest.mark.parametrize("start", STARTS)
+@pytest.mark.parametrize("loop", ["python", "compiled", *slow("isolated")])
+def test_every_loop_makes_the_same_rows(systems, name, start, loop):
+    def made(start: float) -> Table:
+        experiment = Experiment(start + LENGTH, STEP, start_time=start)
+        if loop == "isolated":
+            return run_table(systems[name], experiment, isolation=Isolation())
+        return run_table(systems[name], experiment, loop)
+
+    assert same(made(start), made(0.0), start)
+
+
+@given(
+    start=st.integers(-200, 2000).map(lambda k: k / 8),
+    step=st.sampled_from([1 / 64, 1 / 16, 3 / 32]),
+    length=st.integers(1, 60).map(lambda k: k / 16),
+    interval=st.integers(1, 40).map(lambda k: k / 16),
+    at=st.integers(0, 60).map(lambda k: k / 16),
+    lasts=st.integers(1, 30).map(lambda k: k / 16),
+    times=st.lists(st.integers(-10, 60), min_size=1, max_size=4).map(sorted),
+    decimated=st.booleans(),
+)
+def test_all_that_goes_by_the_time_moves_with_the_start(
+    systems, tmp_path_factory, start, step, length, interval, at, lasts, times, decimated
+):
+    """Events, a table of inputs, intervals of rows, longer steps of a component."""
+    table = tmp_path_factory.mktemp("inputs") / "inputs.csv"
+
+    def made(start: float) -> Table:
+        lines = [f"{start + time / 16!r},{k}" for k, time in enumerate(times)]
+        table.write_text("\n".join(["time,a.u", *lines, ""]))
+        system = replace(systems["relays"], start_time=start)
+        result = simulate(
+            system,
+            stop_time=start + length,
+            step=step,
+            events=[
+                {"at": start + at, "override": {"a.y": 5.0}, "for": lasts},
+                {"when": "b.y > 1.5", "bias": {"a.y": -2.0}, "for": lasts, "repeat": True},
+            ],
+            inputs=table,
+            steps={"b": 2 * step} if decimated else {},
+        )
+        selected = Table()
+        selection = Selection(selected, interval)
+        selection.begin(result.header)
+        selection.take(result.rows)
+        selection.end(result.ending)
+        return selected
+
+    assert same(made(start), made(0.0), start)
+
+
+@given(
+    start=st.floats(-1e6, 2e9),
+    step=st.floats(1e-3, 10.0),
+    every=st.integers(1, 50),
+    rows=st.integers(1, 300),
+)
+def test_one_row_is_kept_for_each_interval_from_any_start(start, step, every, rows):
+    experiment = Experiment(start + rows * step, step, start_time=start)
+    times = np.array([experiment.time(k) for k in range(rows)])
+    kept = Table()
+    selection = Selection(kept, every * step)
+    selection.begin(Header((), experiment))
+    selection.take(times[:, np.newaxis])
+    selection.end(Ending())
+    assert kept.time.tolist() == times[sorted({*range(0, rows, every), rows - 1})].tolist()
+
+
+def test_a_run_that_an_fmu_ends_within_a_step_ends_at_the_same_place(systems):
+    def made(start: float) -> Table:
+        system = systems["typed"].with_parameters({"a.end_at": start + 2.25})
+        return run_table(system, Experiment(start + LENGTH, 0.5, start_time=start))
+
+    first = made(0.0)
+    assert first.time[-1] == 2.25
+    for start in STARTS:
+        assert same(made(start), first, start)
+
+
+# Commands
+
+
+@pytest.fixture(scope="module")
+def folders(systems, tmp_path_factory) -> Callable[[str, float], Path]:
+    """A folder for each system and start: `x.ssp`, events, inputs, and a result in `run`."""
+    made: dict[tuple[str, float], Path] = {}
+
+    def folder(name: str, start: float) -> Path:
+        if (name, start) in made:
+            return made[name, start]
+        place = made[name, start] = tmp_path_factory.mktemp(name)
+        output, given, _ = SIGNALS[name]
+        stop = start + (4.0 if name != "vehicle" else 16.0)
+        system = replace(systems[name], name="x", start_time=start, stop_time=stop, step=STEP)
+        write_ssp(system, place)
+        (place / "events.toml").write_text(
+            f'[[events]]\nat = {start + 1.0}\nfreeze = "{SHAKEN[name]}"\nfor = 0.5\n'
+            f'[[events]]\nat = {start + 2.0}\noverride."{SHAKEN[name]}" = 0.25\nfor = 0.25\n'
+        )
+        (place / "inputs.csv").write_text(
+            f"time,{given}\n{start - 1.0},0\n{start + 3.0},0.125\n{start + 9.0},0.0625\n"
+        )
+        options = ["--events", str(place / "events.toml"), "--inputs", str(place / "inputs.csv")]
+        options += ["--interval", str(INTERVAL), "--no-figures", "--out", str(place / "run")]
+        assert main(["run", str(place / "x.ssp"), *options]) == 0
+        return place
+
+    return folder
+
+
+#: A signal of each system that feeds something, which events act on.
+SHAKEN = {
+    "vehicle": "plant.y.x", "relays": "a.y", "typed": "a.y_Float64", "linear": "first.y0",
+}  # fmt: skip
+
+
+def cells(path: Path, start: float) -> list[list[str]]:
+    """A table as text, with the times of a run that begins at 0."""
+    with path.open(newline="") as lines:
+        names, *rows = csv.reader(lines)
+    times = {names.index(name) for name in ("time", *TIMES) if name in names}
+    return [names] + [
+        [str(float(cell) - start) if i in times else cell for i, cell in enumerate(row)]
+        for row in rows
+    ]
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@pytest.mark.parametrize("start", STARTS)
+def test_files_of_a_run_are_the_same_but_for_their_times(folders, name, start):
+    one, other = folders(name, start) / "run", folders(name, 0.0) / "run"
+    for file in ["result.csv", *["certificates.csv"] * (name == "vehicle")]:
+        rows = cells(one / file, start)
+        assert rows == cells(other / file, 0.0)
+        assert float(rows[1][0]) == 0.0 and float(rows[2][0]) == INTERVAL
+    metrics, expected = (json.loads((path / "metrics.json").read_text()) for path in (one, other))
+    assert metrics.pop("stop_time") - start == expected.pop("stop_time")
+    assert metrics == expected
+    record, first = (json.loads((path / "run.json").read_text()) for path in (one, other))
+    assert [{**event, "time": event["time"] - start} for event in record["events"]] == first[
+        "events"
+    ]
+    assert len(first["events"]) == 4
+    assert record["experiment"]["start_time"] == start
+
+
+@pytest.mark.parametrize("name", SIGNALS)
+@pytest.mark.parametrize("start", STARTS)
+def test_commands_take_the_system_and_the_result(folders, name, start, capsys, tmp_path):
+    """`check`, `verify`, `export`, `plot`, and `run` on in another format from a checkpoint."""
+    output, *_ = SIGNALS[name]
+    said = []
+    for one in (start, 0.0):
+        folder = folders(name, one)
+        ssp, result = str(folder / "x.ssp"), str(folder / "plain")
+        capsys.readouterr()
+        assert main(["check", ssp]) == 0
+        assert main(["run", ssp, "--no-figures", "--out", result]) == 0
+        table = f"{result}/result.csv"
+        assert main(["verify", table, "--scenario", ssp]) == 0
+        shift = re.sub(r"t = \S+ to \S+ s|t = \S+,", "", capsys.readouterr().out)
+        said.append(shift.replace(str(folder), ""))
+        whole = Path(table).read_text()
+        if name in ("vehicle", "linear"):
+            # The others cannot save their states.
+            options = ["--no-figures", "--checkpoint-every", "1", "--out", result]
+            assert main(["run", ssp, *options]) == 0
+            assert Path(table).read_text() == whole
+        assert main(["plot", result, output, "--out", str(tmp_path / f"{one:g}.svg")]) == 0
+        assert main(["export", ssp, "--out", str(tmp_path / f"{one:g}")]) == 0
+        assert load(tmp_path / f"{one:g}" / "x.ssp").start_time == one
+    assert said[0] == said[1]
+
+
+def test_a_table_that_begins_before_the_run_does_not_belong_to_it(folders, refused):
+    folder = folders("vehicle", 30.0)
+    table = folders("vehicle", 0.0) / "run" / "result.csv"
+    line = refused("verify", str(table), "--scenario", str(folder / "x.ssp"))
+    assert mentions(line, "before 30 s")
+
+
+@pytest.mark.parametrize("name", ["relays", *slow("vehicle")])
+@pytest.mark.parametrize("start", STARTS)
+def test_a_study_has_the_same_numbers(folders, name, start, tmp_path):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
+    pytest.importorskip("numba", reason="needs the extra `studies`")
+    tables = []
+    for one in (start, 0.0):
+        *_, parameter = SIGNALS[name]
+        study = tmp_path / f"{one:g}.toml"
+        study.write_text(
+            f'scenario = "{folders(name, one) / "x.ssp"}"\n'
+            f'stop_time = {{ base = {one}, per = {{ "{parameter}" = 0.125 }} }}\n'
+            f'[vary]\n"{parameter}" = [4.0, 8.0, 16.0]\n'
+        )
+        assert main(["check", str(study)]) == 0
+        out = tmp_path / f"{one:g}"
+        assert main(["sweep", str(study), "--workers", "1", "--out", str(out)]) == 0
+        tables.append(StudyResult(out))
+    first, second = tables
+    assert list(first) == list(second) and first.failed == second.failed == 0
+    for column in first:
+        assert str(first[column].tolist()) == str(second[column].tolist())
+    assert name == "relays" or np.isfinite(first["rms_effort.u"]).all()
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_figures_show_the_same_at_other_times(folders, start):
+    """Lines are those of the run that begins at 0, moved; so is the axis of time."""
+
+    def drawn(start: float) -> list[Any]:
+        run = read_result(folders("vehicle", start) / "run")
+        rows = [compose("", rows, [run])[0] for rows in FIGURES["tracking"].values()]
+        return [axes for figure in [*rows, plot([run])] if figure for axes in figure.axes]
+
+    def by_place(axes: Any) -> list[Any]:
+        """The lines, of which those of events are drawn in any order."""
+        return sorted(axes.lines, key=lambda line: (len(line.get_xdata()), line.get_xdata()[0]))
+
+    panels, expected = drawn(start), drawn(0.0)
+    assert len(panels) == len(expected) > 10
+    for one, other in zip(panels, expected, strict=True):
+        over_time = one.get_xlim()[0] == start and one.get_xlim()[1] == start + 16.0
+        moved = start if over_time else 0.0
+        assert np.subtract(one.get_xlim(), moved) == pytest.approx(other.get_xlim())
+        assert one.get_ylim() == pytest.approx(other.get_ylim())
+        for line, before in zip(*(map(by_place, (one, other))), strict=True):
+            x, y = (np.asarray(values, float) for values in line.get_data())
+            if over_time and list(x) != [0, 1]:  # which go from side to side
+                np.testing.assert_allclose(x - moved, before.get_xdata(), atol=1e-9)
+            np.testing.assert_allclose(y, before.get_ydata(), rtol=1e-9, atol=1e-9)
+    assert sum(axes.get_xlim()[0] == start for axes in panels) > 5
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_pages_and_films_show_the_same_at_other_times(folders, start, tmp_path):
+    pytest.importorskip("plotly", reason="needs the extra `view`")
+
+    def page(start: float) -> dict[str, Any]:
+        out = tmp_path / f"{start:g}.html"
+        assert main(["view", str(folders("vehicle", start) / "run"), "--out", str(out)]) == 0
+        [data] = re.findall(r'<script id="data"[^>]*>(.*)</script>', out.read_text())
+        return dict(json.loads(data))
+
+    one, other = page(start), page(0.0)
+    times = np.array(one["frames"].pop("time")) - start
+    assert times == pytest.approx(np.array(other["frames"].pop("time")), abs=1e-3)
+    assert one["frames"] == other["frames"]
+    for trace, before in zip(one["series"]["traces"], other["series"]["traces"], strict=True):
+        assert trace["y"] == before["y"]
+        assert np.array(trace["x"]) - start == pytest.approx(np.array(before["x"]), abs=1e-3)
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_a_film_begins_with_the_run(folders, start, tmp_path):
+    from PIL import Image  # noqa: PLC0415
+
+    frames = []
+    for one in (start, 0.0):
+        out = tmp_path / f"{one:g}.gif"
+        ssp = str(folders("vehicle", one) / "x.ssp")
+        assert main(["animate", ssp, "--fps", "1", "--out", str(out)]) == 0
+        with Image.open(out) as film:
+            frames.append(film.n_frames)
+    assert frames[0] == frames[1] == 10
+
+
+@pytest.mark.parametrize("start", STARTS)
+def test_a_live_page_begins_at_0_only(folders, start, refused, tmp_path):
+    assert refused("live", str(folders("vehicle", start) / "x.ssp"))
