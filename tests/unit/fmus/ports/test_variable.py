@@ -142,12 +142,12 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         (
             "input",
             Annotated[Vector, METRES],
-            "is a Vector without its size; write Annotated[Vector, 3, Variable(...)]",
+            "is a Vector without its size; write Annotated[Vector, 3, ...]",
         ),
         (
             "input",
             Annotated[Matrix, 2, METRES],
-            "is a Matrix without its size; write Annotated[Matrix, 2, 3, Variable(...)]",
+            "is a Matrix without its size; write Annotated[Matrix, 2, 3, ...]",
         ),
         ("input", Annotated[Vector, 0, METRES], "is a Vector without its size"),
         (
@@ -181,7 +181,7 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         (
             "output",
             Annotated[float, Variable(feedthrough="u")],
-            "has the feedthrough u; write a tuple of names",
+            "has the feedthrough 'u'; write a tuple of different names",
         ),
         (
             "output",

@@ -481,7 +481,6 @@ def test_json_gives_members_vectors_and_matrices_back():
         (int, -(2**31) - 1, "an integer exceeds 32 bits"),
         (Colour, 2, "2 is not of type Colour"),
         (Colour, 1.0, "1.0 is not of type Colour"),
-        (Colour, True, "True is not of type Colour"),
         (Colour, "RED", "'RED' is not of type Colour"),
         (Annotated[Vector, 2], [1.0], "[1.0] instead of 2 values"),
         (Annotated[Matrix, 1, 2], [[1.0, inf]], "a value is not finite"),
