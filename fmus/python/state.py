@@ -70,7 +70,7 @@ def measuring(hint: type) -> Callable[[Any], float]:
 def _member(value: int, kind: type[IntEnum]) -> IntEnum:
     member = kind._value2member_map_.get(value)
     if member is None:
-        raise Refusal(f"{value:d} is not of type {kind.__name__}")
+        raise Refusal(f"{_shown(int(value))} is not of type {kind.__name__}")
     return member  # type: ignore[return-value]
 
 
