@@ -8,12 +8,21 @@ because the C kind runs its translation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from inspect import signature
 from types import FunctionType, GenericAlias, ModuleType
 from typing import Any, NamedTuple, Protocol, get_args
 
-from fmus.ports.groups import Nothing, check_type, count_values, form, hints_of, scalars_of, word
+from fmus.ports.groups import (
+    Nothing,
+    check_type,
+    count_values,
+    fields_of,
+    form,
+    hints_of,
+    scalars_of,
+    word,
+)
 from fmus.ports.port import Misdeclared
 
 
@@ -182,6 +191,9 @@ class Behaviour(NamedTuple):
 #: Types of the arguments of hooks that are the same for all components.
 _ARGUMENTS: Mapping[str, Any] = {"t": float, "h": float, "n": int}
 
+#: Arguments whose types are the component's own, except the outputs.
+_GROUPS = ("parameters", "inputs", "state", "derived")
+
 #: Types of what hooks return that are the same for all components.
 _RETURNS: Mapping[str, Any] = {"check": type(None), "credible": bool, "seed": int}
 
@@ -205,12 +217,10 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     noisy = _noisy(where, hints, outputs)
     types = _types_of_groups(hints, outputs)
-    is_stateless = form(hints["begin"]["return"]) == form(outputs) and "state" not in types
-    if is_stateless:
-        returned = form(outputs)
-    else:
-        types.setdefault("state", (*get_args(hints["begin"]["return"]), Nothing)[0])
-        derived = [types["derived"]] if "derive" in hooks else []
+    is_stateless = "state" not in types
+    derived = [types["derived"]] if "derive" in hooks else []
+    returned = outputs
+    if not is_stateless:
         returned = form(GenericAlias(tuple, (types["state"], *derived, outputs)))
     for name, found in hints.items():
         if name in ("begin", "advance"):
@@ -219,15 +229,15 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         elif name != "measured":
             wanted = _RETURNS[name] if name in _RETURNS else types.get(_SAME[name])
             _check_same(where, name, "return", found["return"], wanted)
-        for argument in found.keys() - {"return", *noisy}:
-            if (name, argument) != ("measured", "n"):
-                _check_same(where, name, argument, found[argument], types[argument])
+        for argument, hint in found.items():
+            if argument not in ("return", *noisy) and (name, argument) != ("measured", "n"):
+                _check_same(where, name, argument, hint, types[argument])
     for hint in types.values():
         check_type(hint)
     return Behaviour(
         {name: hooks.get(name) for name in HOOKS},
         Nothing if is_stateless else types["state"],
-        types["derived"] if "derive" in hooks else None,
+        derived[0] if derived else None,
         types.get("inputs", Nothing),
         outputs,
         types.get("parameters", Nothing),
@@ -265,11 +275,11 @@ def _hooks(module: ModuleType) -> dict[str, FunctionType]:
 
 def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) -> list[str]:
     """The group of outputs that `measured` takes and returns, if all arguments are known."""
-    groups = hints_of(outputs)
+    groups = fields_of(outputs)
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
     for name, found in hints.items():
         known = [*HOOKS[name], *(noisy if name == "measured" else ())]
-        for argument in found.keys() - {*known, "return"}:
+        for argument in (argument for argument in found if argument not in (*known, "return")):
             why = f"{argument}, which is not one of {', '.join(known)}"
             raise Misdeclared(f"{where}.{name} takes {why}", name, argument)
         if "derived" in found and "derive" not in hints:
@@ -290,17 +300,23 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
 
 
 def _types_of_groups(hints: Mapping[str, Mapping[str, Any]], outputs: type) -> dict[str, Any]:
-    """The type that each argument has in all hooks: what `begin`, or else `advance`, says."""
-    found = {**hints["advance"], **hints["begin"]}
-    types = {argument: hint for hook in hints.values() for argument, hint in hook.items()}
-    types = {name: hint for name, hint in {**types, **found}.items() if name in _GROUPS}
-    if "derive" in hints:
-        types["derived"] = hints["derive"]["return"]
+    """The type that each argument has in all hooks: what most of them say."""
+    found: dict[str, list[Any]] = {}
+    for name, hint in _said_of_groups(hints):
+        found.setdefault(name, []).append(form(hint))
+    types = {name: max(forms, key=forms.count) for name, forms in found.items()}
     return {**types, **_ARGUMENTS, "outputs": outputs}
 
 
-#: Arguments whose types are the component's own.
-_GROUPS = ("parameters", "inputs", "state")
+def _said_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """The types of the component's own groups, as each hook takes or returns them."""
+    for name, found in hints.items():
+        yield from ((argument, found[argument]) for argument in _GROUPS if argument in found)
+        if name in ("derive", "restarted"):
+            yield _SAME[name], found["return"]
+        elif name in ("begin", "advance"):
+            parts = get_args(found["return"])
+            yield from zip(("state", "derived") if len(parts) > 2 else ("state",), parts[:-1])
 
 
 def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:

@@ -371,6 +371,25 @@ calls = st.one_of(
 
 @given(before=st.lists(calls, max_size=4), after=st.lists(calls, max_size=25))
 @example(before=[("set_all", "Integer", {"k": MOST})], after=[("step", 0.02), ("look",)])
+@example(
+    before=[],
+    after=[
+        ("set_all", "Real", {"v[1]": 1.0, "v[2]": 2.0, "v[3]": 3.0}),
+        ("step", 0.02),
+        ("save",),
+        ("set_all", "Real", {"gain": 2.5}),
+        ("step", 0.02),
+        ("look",),
+        ("restore", 0, True),
+        ("set_all", "Real", {"gain": 2.5}),
+        ("step", 0.02),
+        ("look",),
+        ("set_all", "Real", {"u": 1e300}),
+        ("step", 0.02),
+        ("set_all", "Real", {"u": 0.0, "gain": 0.5}),
+        ("step", 0.02),
+    ],
+)
 def test_both_kinds_answer_alike_whatever_is_called(libraries, before, after):
     with ExitStack() as stack:
         runs = [Run(stack.enter_context(instance(library))) for library in libraries]
@@ -423,10 +442,10 @@ def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
     [
         (("state", 0), 1.0, "1.0 is not of type int"),
         (("state", 0), MOST + 1, "an integer exceeds 32 bits"),
-        (("state", 0), True, "True is not of type int"),
+        (("state", 0), "1", "'1' is not of type int"),
         (("state", 2), 1, "1 is not of type bool"),
         (("state", 3), 1, "1 is not of type Mode"),
-        (("state", 3), True, "True is not of type Mode"),
+        (("state", 3), 2.0, "2.0 is not of type Mode"),
         (("state", 4), [0.0] * 3, "[0.0, 0.0, 0.0] instead of 4 values"),
         (("state", 4, 3), nan, "a value is not finite"),
         (("state", 5), [[1.0, 2.0], [3.0]], "[3.0] instead of 2 values"),
