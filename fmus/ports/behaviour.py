@@ -292,6 +292,7 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
     found = hints["measured"]
     for name in (*noisy, "return"):
         _check_same(where, "measured", name, found[name], groups[noisy[0]])
+    check_type(found.get("n", float))
     if "n" not in found or {*scalars_of(found["n"])} != {float}:
         drawn = word(form(found["n"])) if "n" in found else "nothing"
         why = f"takes {drawn} as n; write a float, or a tuple or Vector of them"

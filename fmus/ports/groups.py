@@ -125,12 +125,13 @@ def word(hint: Any) -> str:
     return str(getattr(hint, "__name__", hint)) if isinstance(hint, type) else str(hint)
 
 
-def check_type(hint: Any, *place: str) -> None:
+def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
     """Refuse a type that no group can have, or a part of it.
 
     Args:
         hint: the type.
         place: the names of the class and of the field that have it.
+        around: classes that it is a part of.
 
     Raises:
         Misdeclared: it is none of the language of equations.
@@ -151,12 +152,14 @@ def check_type(hint: Any, *place: str) -> None:
                 raise Misdeclared(f"{kind.__name__} {why}", kind.__name__, name)
         if not kind.__members__:
             raise Misdeclared(f"{kind.__name__} has no members", kind.__name__)
+    elif kind in around:
+        raise Misdeclared(f"{where}is a {kind.__name__} within a {kind.__name__}", *place)
     elif is_record(kind) or hasattr(kind, "__total__"):
         for name, part in fields_of(kind).items():
-            check_type(part, kind.__name__, name)
+            check_type(part, kind.__name__, name, around=(*around, kind))
     elif get_origin(kind) is tuple and Ellipsis not in get_args(kind):
         for part in parts_of(kind) or ():
-            check_type(part, *place)
+            check_type(part, *place, around=around)
     elif kind not in (float, int, bool):
         kinds = "float, int, bool, an IntEnum, a tuple of them, Vector, Matrix or a NamedTuple"
         raise Misdeclared(f"{where}has the type {word(form(hint))}; use {kinds}", *place)

@@ -113,6 +113,7 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
         ),
         ("(h: float,", "(h: float, derived: State,", "takes derived, but there is no derive"),
         ("    x: float\n", "    x: str\n", "State.x has the type str; use float, int"),
+        ("    x: float\n", "    x: State\n", "State.x is a State within a State"),
         ("    x: float\n", "    x: Real\n", "State.x has a type that is not known: name 'Real'"),
     ],
 )
