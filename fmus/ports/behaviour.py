@@ -232,8 +232,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         for argument, hint in found.items():
             if argument not in ("return", *noisy) and (name, argument) != ("measured", "n"):
                 _check_same(where, name, argument, hint, types[argument])
-    for hint in types.values():
-        check_type(hint)
+    for argument, hint in types.items():
+        takes = [name for name, found in hints.items() if argument in found]
+        check_type(hint, *takes[:1], argument)
     return Behaviour(
         {name: hooks.get(name) for name in HOOKS},
         Nothing if is_stateless else types["state"],
@@ -292,7 +293,7 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
     found = hints["measured"]
     for name in (*noisy, "return"):
         _check_same(where, "measured", name, found[name], groups[noisy[0]])
-    check_type(found.get("n", float))
+    check_type(found.get("n", float), "measured", "n")
     if "n" not in found or {*scalars_of(found["n"])} != {float}:
         drawn = word(form(found["n"])) if "n" in found else "nothing"
         why = f"takes {drawn} as n; write a float, or a tuple or Vector of them"
