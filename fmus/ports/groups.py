@@ -122,7 +122,7 @@ def word(hint: Any) -> str:
         return f"Annotated[{word(inner)}, {', '.join(map(str, sizes))}]"
     if get_origin(hint) is tuple:
         return f"tuple[{', '.join(map(word, get_args(hint)))}]"
-    return str(getattr(hint, "__name__", hint)) if isinstance(hint, type) else str(hint)
+    return hint.__name__ if is_class(hint, object) else str(hint)
 
 
 def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:

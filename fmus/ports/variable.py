@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record
+from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
 from fmus.ports.port import POSITIVE, Misdeclared, Port, Refusal
 
 __all__ = ("POSITIVE", "Refusal", "Variable", "declared")
@@ -160,7 +160,7 @@ def _word(hint: Any) -> str:
     """A type as it is written."""
     if hint in (Vector, Matrix):
         return f"{hint.__name__}, {'3' if hint is Vector else '2, 3'}"
-    return hint.__name__ if isinstance(hint, type) and not get_args(hint) else str(hint)
+    return word(hint)
 
 
 def _parts(
