@@ -1,8 +1,9 @@
 """List all that is wrong with a component of the user's own: `python -m fmus.check SCRIPT`.
 
 A line for each mistake: what is outside the language of equations, what is wrong with its
-declaration, and what has no counterpart in C, each with its file and line. It runs in a separate
-process, because it imports the component.
+declaration, and what has no counterpart in C, each with its file and line. If there is none, the
+FMUs of both kinds are written, the native one without libraries, and the compiler reads its C. It
+runs in a separate process, because it imports the component.
 """
 
 from __future__ import annotations
@@ -11,26 +12,31 @@ import argparse
 import re
 import sys
 from collections.abc import Iterator
+from contextlib import redirect_stdout
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from fmus.discovery import lies_in
+from fmus.compilers import Compiler, check_sources
+from fmus.discovery import Source, lies_in, write_archive
+from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from fmus.native.functions import function_in_c
 from fmus.native.language import foreign
+from fmus.native.packaging import MAIN, fmu_entries
 from fmus.native.program import Program, Untranslatable
-from fmus.native.tables import tables
-from fmus.native.translator import translated
+from fmus.python.packaging import PythonKind
 from fmus.script import is_component, script_in, shown, source_of_script, told
 
 #: Where a line says that it is about.
 _PLACE = re.compile(r"^(.+?:\d+): ")
 
 
-def mistakes(path: Path) -> list[str]:
+def mistakes(path: Path, folder: Path) -> list[str]:
     """All that is wrong with a component, by file and line.
 
     Args:
         path: of its script, or of its folder.
+        folder: that its FMUs are written into, if nothing is wrong.
 
     Raises:
         ValueError: it is no component.
@@ -44,7 +50,7 @@ def mistakes(path: Path) -> list[str]:
         )
     found: dict[str, str] = {}
     try:
-        for text in _mistakes(script):
+        for text in _mistakes(script, folder):
             # One line of the script has one mistake: others follow from it.
             place = _PLACE.match(text)
             found.setdefault(place[1] if place else text, text)
@@ -60,7 +66,7 @@ def _order(text: str) -> tuple[str, int]:
     return file, int(line)
 
 
-def _mistakes(script: Path) -> Iterator[str]:
+def _mistakes(script: Path, folder: Path) -> Iterator[str]:
     source = source_of_script(script)
     files = [script] if script.is_file() else sorted(script.glob("*.py"))
     try:
@@ -83,10 +89,27 @@ def _mistakes(script: Path) -> Iterator[str]:
         except (Untranslatable, TypeError) as error:
             yield told(error, script)
     try:
-        translated(definition)
-        tables(definition)
-    except (Untranslatable, TypeError) as error:
+        write(source, folder)
+    except Exception as error:
         yield told(error, script)
+
+
+def write(source: Source, folder: Path) -> None:
+    """Write the FMUs of a component for all versions of FMI, native ones without libraries.
+
+    Raises:
+        Exception: what a build would raise.
+
+    """
+    for fmi in FMI_VERSIONS:
+        entries = fmu_entries(source, fmi, (), Compiler("none", (), {}), print)
+        head = "sources/"
+        texts = {
+            name.removeprefix(head): text for name, text in entries.items() if name.startswith(head)
+        }
+        check_sources(source.name, texts, MAIN[fmi])
+        write_archive(folder / f"{NATIVE}-{fmi}.fmu", entries)
+    PythonKind("plain").write(source, folder / f"{PYTHON}.fmu")
 
 
 def _files_of(root: Path, files: list[Path]) -> list[Path]:
@@ -113,9 +136,13 @@ def main() -> int:
     """Command line of the module."""
     parser = argparse.ArgumentParser(prog="python -m fmus.check", description=__doc__)
     parser.add_argument("script", type=Path)
+    parser.add_argument("--out", type=Path, help="folder to write FMUs into; default: none")
+    options = parser.parse_args()
     try:
-        for text in mistakes(parser.parse_args().script):
-            print(text)
+        # What the component prints is no finding.
+        with TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
+            found = mistakes(options.script, options.out or Path(folder))
+        print("".join(f"{text}\n" for text in found), end="")
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2

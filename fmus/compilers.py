@@ -185,6 +185,29 @@ def library(
     return libraries[0] if len(libraries) == 1 else universal(libraries)
 
 
+def check_sources(name: str, sources: Mapping[str, bytes], main: str) -> None:
+    """Let this machine's compiler, if it has one, read sources without making a library.
+
+    Args:
+        name: of the library.
+        sources: by the names of their files.
+        main: the one that is compiled and includes the others.
+
+    Raises:
+        OSError: it finds a mistake.
+
+    """
+    command = machines_compiler()
+    if command is None:
+        return
+    with TemporaryDirectory(prefix="auv_fmu_check_") as folder:
+        for file, content in sources.items():
+            Path(folder, file).write_bytes(content)
+        process = run_compiler([command, *FLAGS, "-fsyntax-only", main], Path(folder))
+    if process.returncode != 0:
+        raise OSError(f"{command} does not take {name}: {_complaint(process)}")
+
+
 def _complaint(process: subprocess.CompletedProcess[str]) -> str:
     """The first thing that a compiler complains of."""
     lines = process.stderr.strip().splitlines() or [f"exit status {process.returncode}"]

@@ -84,9 +84,17 @@ class Source(NamedTuple):
 
     @property
     def page(self) -> str:
-        """What its author says of it, in Markdown: the docstring, if one module says it all."""
+        """What its author says of it, in Markdown: the docstring, if one module says it all.
+
+        Raises:
+            ValueError: there is no page.
+
+        """
         if len(self.modules) > 1:
-            return (self.folder / "page.md").read_text(encoding="utf-8").strip()
+            page = self.folder / "page.md"
+            if not page.is_file():
+                raise ValueError("there is no page.md in it: describe the component there")
+            return page.read_text(encoding="utf-8").strip()
         said = cleandoc(import_module(*self.modules).__doc__ or "")
         return f"# {self.name}\n\n{said}".strip()
 

@@ -12,8 +12,16 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator
+from importlib.machinery import (
+    EXTENSION_SUFFIXES,
+    SOURCE_SUFFIXES,
+    ExtensionFileLoader,
+    FileFinder,
+    SourceFileLoader,
+)
 from keyword import iskeyword
 from pathlib import Path
+from types import CodeType
 
 from fmus.discovery import Source, lies_in, name_of
 from fmus.ports.port import Misdeclared
@@ -82,7 +90,9 @@ def source_of_script(path: Path) -> Source:
     """
     place = path.resolve()
     stem, root = place.stem, place.parent
-    if not (stem.isascii() and stem.isidentifier() and stem[0].isalpha()) or iskeyword(stem):
+    if iskeyword(stem):
+        raise ValueError(f"{path}: {stem} is a word of Python; choose another name")
+    if not (stem.isascii() and stem.isidentifier() and stem[0].isalpha()):
         raise ValueError(
             f"{path}: {stem} is not a name for a component; use letters, digits and underscores, "
             "a letter first"
@@ -91,12 +101,37 @@ def source_of_script(path: Path) -> Source:
     is_other = known is not None and not _is_of(known, place)
     if stem in sys.stdlib_module_names or is_other:
         raise ValueError(f"{path}: {stem} is already a module of Python; choose another name")
-    if str(root) not in sys.path:
-        sys.path.insert(0, str(root))
+    import_from(root)
     if place.is_dir():
         modules = tuple(f"{stem}.{module}" for module in _MODULES)
         return Source(name_of(stem), modules, place, root)
     return Source(name_of(stem), (stem,), root, root)
+
+
+class _Text(SourceFileLoader):
+    """Loads a module from its text: byte code beside it is neither believed nor written."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        path = self.get_filename(fullname)
+        code: CodeType = self.source_to_code(self.get_data(path), path)
+        return code
+
+
+def import_from(root: Path) -> None:
+    """Let modules of a folder be imported, from their texts, before all others."""
+
+    def finder(folder: str) -> FileFinder:
+        here = Path(folder)
+        homes = [home for home in map(Path, sys.path) if home in (here, *here.parents)]
+        if max(homes, key=lambda home: len(home.parts), default=None) != root:
+            raise ImportError(f"{folder} is not in {root}")
+        loaders = (ExtensionFileLoader, EXTENSION_SUFFIXES), (_Text, SOURCE_SUFFIXES)
+        return FileFinder(folder, *loaders)
+
+    if str(root) not in sys.path:
+        sys.path.insert(0, str(root))
+    sys.path_hooks.insert(0, finder)
+    sys.path_importer_cache.pop(str(root), None)
 
 
 def _is_of(module: object, place: Path) -> bool:
@@ -120,7 +155,7 @@ def told(error: BaseException, path: Path) -> str:
     is_ours = isinstance(error, (OSError, TypeError, ValueError)) or _is_our_own(error)
     place, said = str(path), text if is_ours else f"{type(error).__name__}: {text}"
     if isinstance(error, Misdeclared):
-        place += _line_of(error.place, path)
+        place = _place_of(error.place, path)
     elif isinstance(error, SyntaxError):
         place = f"{shown(error.filename or '', path)}:{error.lineno}"
         said = f"SyntaxError: {error.msg}"
@@ -157,17 +192,24 @@ def _frames(error: BaseException, path: Path) -> list[str]:
     ]
 
 
-def _line_of(place: tuple[str, ...], path: Path) -> str:
-    """Where a class or a function of a script is, or a field of it; empty: not in it."""
-    if not (place and path.is_file()):
-        return ""
-    for node in ast.parse(path.read_bytes()).body:
-        if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name != place[0]:
-            continue
-        fields = {
-            part.target.id: part.lineno
-            for part in node.body
-            if isinstance(part, ast.AnnAssign) and isinstance(part.target, ast.Name)
-        }
-        return f":{fields.get(place[-1], node.lineno)}"
-    return ""
+def _place_of(place: tuple[str, ...], path: Path) -> str:
+    """Where a class or a function is, with its line, or a field or argument of it."""
+    files = [path] if path.is_file() else [path / f"{module}.py" for module in _MODULES]
+    for file in files if place else ():
+        for node in ast.parse(file.read_bytes()).body:
+            if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name != place[0]:
+                continue
+            if isinstance(node, ast.FunctionDef):
+                lines = {argument.arg: argument.lineno for argument in node.args.args}
+                lines["return"] = (node.returns or node).lineno
+            else:
+                lines = dict(_fields(node))
+            return f"{file}:{lines.get(place[-1], node.lineno)}"
+    return str(path)
+
+
+def _fields(node: ast.ClassDef) -> Iterator[tuple[str, int]]:
+    """The fields of a class, or its members, and their lines."""
+    for part in node.body:
+        targets = getattr(part, "targets", [getattr(part, "target", None)])
+        yield from ((name.id, part.lineno) for name in targets if isinstance(name, ast.Name))

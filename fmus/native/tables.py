@@ -9,6 +9,7 @@ from itertools import groupby
 from typing import Any
 
 from auv_fmu import euler
+from fmus.native.layout import quoted
 from fmus.native.shapes import Shape, Structure, shape_of
 from fmus.ports.definition import Definition
 from fmus.ports.groups import hints_of, is_class, reals_first, scalars_of
@@ -78,12 +79,12 @@ def _member(shape: Shape, path: Sequence[str | int]) -> str:
 def _row(port: Port, places: Mapping[str, str], names: Mapping[str, str]) -> str:
     return ", ".join(
         (
-            f'"{port.name}"',
+            quoted(port.name),
             port.type.upper(),
             port.causality.upper(),
             port.variability.upper(),
             places[port.name],
-            _number(port, port.start or 0.0),
+            "0.0" if port.start is None else _number(port, port.start),
             "-DBL_MAX" if port.minimum is None else _number(port, port.minimum),
             "DBL_MAX" if port.maximum is None else _number(port, port.maximum),
             names[port.name] if port.choices else "NULL",
@@ -111,7 +112,7 @@ def names_of_choices(ports: Sequence[Port]) -> dict[str, str]:
 
 
 def _choices(name: str, choices: Mapping[str, Any]) -> str:
-    rows = ", ".join(f'{{"{text}", {number:d}}}' for text, number in choices.items())
+    rows = ", ".join(f"{{{quoted(text)}, {number:d}}}" for text, number in choices.items())
     return f"static const choice {name}[] = {{{rows}}};\n"
 
 
@@ -144,7 +145,7 @@ def _state(hint: object) -> Iterator[str]:
     for scalar, n in runs:
         if is_class(scalar, IntEnum):
             members = enumerations.setdefault(scalar, f"members_{len(enumerations)}")
-            known = f'"{scalar.__name__}", {members}, {len(scalar)}'
+            known = f"{quoted(scalar.__name__)}, {members}, {len(scalar)}"
             rows.append(f"{{INTEGER, {n}, {known}}}")
         else:
             rows.append(f"{{{_TYPES[scalar]}, {n}, NULL, NULL, 0}}")

@@ -8,12 +8,21 @@ because the C kind runs its translation.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from inspect import signature
-from types import FunctionType, ModuleType
-from typing import Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
+from types import FunctionType, GenericAlias, ModuleType
+from typing import Any, NamedTuple, Protocol, get_args
 
-from fmus.ports.groups import Nothing, count_values, hints_of
+from fmus.ports.groups import (
+    Nothing,
+    check_type,
+    count_values,
+    fields_of,
+    form,
+    hints_of,
+    scalars_of,
+    word,
+)
 from fmus.ports.port import Misdeclared
 
 
@@ -70,8 +79,9 @@ class Hooks(Protocol):
     def derive(parameters: Any, state: Any) -> Any:
         """Return what a step needs of the state, where outputs at the end of the last needed it.
 
-        It spares computing that twice. Called only for a state that no `begin` or `advance` gave:
-        one that was restored or restarted.
+        It spares computing that twice, so `begin` and `advance` return what this would. Called
+        before an `advance` whose state was restored or restarted, or whose parameters have changed
+        since `begin` or `advance` gave the state.
         """
 
     @staticmethod
@@ -117,7 +127,8 @@ class Hooks(Protocol):
 
         Args:
             parameters: as above.
-            n: as many independent standard normal numbers as the type of this argument has.
+            n: as many independent standard normal numbers as the type of this argument has, which
+                is of floats only.
 
         """
 
@@ -172,10 +183,22 @@ class Behaviour(NamedTuple):
     restarted: str
 
     def arguments(self, name: str) -> tuple[str, ...]:
-        """The arguments of a hook that it has, in its own order."""
+        """The arguments of a hook, in its own order; none of one that it does not have."""
         hook = self.hooks[name]
-        assert hook is not None
-        return tuple(signature(hook).parameters)
+        return tuple(signature(hook).parameters) if hook else ()
+
+
+#: Types of the arguments of hooks that are the same for all components.
+_ARGUMENTS: Mapping[str, Any] = {"t": float, "h": float, "n": int}
+
+#: Arguments whose types are the component's own, except the outputs.
+_GROUPS = ("parameters", "inputs", "state", "derived")
+
+#: Types of what hooks return that are the same for all components.
+_RETURNS: Mapping[str, Any] = {"check": type(None), "credible": bool, "seed": int}
+
+#: What other hooks return, by the argument that has the same type.
+_SAME = {"derive": "derived", "restarted": "state", "expected": "outputs"}
 
 
 def read_behaviour(module: ModuleType) -> Behaviour:
@@ -189,56 +212,121 @@ def read_behaviour(module: ModuleType) -> Behaviour:
 
     """
     where, said = module.__name__, vars(module)
-    hooks = {name: said[name] for name in HOOKS if isinstance(said.get(name), FunctionType)}
-    for name in ("begin", "advance", "Outputs"):
-        if name not in said:
-            raise Misdeclared(f"{where} has no {name}")
-    for together in _TOGETHER:
-        there = [name for name in together if name in said]
-        missing = [name for name in together if name not in said]
-        if there and missing:
-            raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
-    for name, value in said.items():
-        own = isinstance(value, FunctionType) and value.__module__ == where
-        if own and name not in HOOKS and not name.startswith("_"):
-            others = f"{', '.join(HOOKS)}; names of other functions begin with _"
-            raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
-    hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
-    types = {**hints["begin"], **hints["advance"]}
+    hooks = _hooks(module)
     outputs = said["Outputs"]
-    groups = get_type_hints(outputs)
-    noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
+    hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
+    noisy = _noisy(where, hints, outputs)
+    types = _types_of_groups(hints, outputs)
+    is_stateless = "state" not in types
+    derived = [types["derived"]] if "derive" in hooks else []
+    returned = outputs
+    if not is_stateless:
+        returned = form(GenericAlias(tuple, (types["state"], *derived, outputs)))
     for name, found in hints.items():
-        known = (*HOOKS[name], *noisy)
-        for argument in found.keys() - {*known, "return"}:
-            why = f"{argument}, which is not one of {', '.join(known)}"
-            raise Misdeclared(f"{where}.{name} takes {why}", name)
-    if "measured" in hooks and len(noisy) != 1:
-        why = f"takes {len(noisy)} groups of outputs, not one"
-        raise Misdeclared(f"{where}.measured {why}", "measured")
-    derived = hints["derive"]["return"] if "derive" in hooks else None
-    returned = [tuple, types.get("state"), *([derived] if derived else []), outputs]
-    is_stateless = "state" not in types and hints["begin"]["return"] is outputs
-    for name in ("begin", "advance"):
-        if is_stateless and hints[name]["return"] is outputs:
-            continue
-        parts = [get_origin(hints[name]["return"]), *get_args(hints[name]["return"])]
-        returned[1] = returned[1] or (*parts[1:], Nothing)[0]
-        if parts != returned:
-            words = ", ".join(map(_word, returned[1:]))
-            raise Misdeclared(f"{where}.{name} does not return tuple[{words}]", name)
+        if name in ("begin", "advance"):
+            if form(found["return"]) != returned:
+                raise Misdeclared(f"{where}.{name} does not return {word(returned)}", name)
+        elif name != "measured":
+            wanted = _RETURNS[name] if name in _RETURNS else types.get(_SAME[name])
+            _check_same(where, name, "return", found["return"], wanted)
+        for argument, hint in found.items():
+            if argument not in ("return", *noisy) and (name, argument) != ("measured", "n"):
+                _check_same(where, name, argument, hint, types[argument])
+    for argument, hint in types.items():
+        takes = [name for name, found in hints.items() if argument in found]
+        check_type(hint, *takes[:1], argument)
     return Behaviour(
         {name: hooks.get(name) for name in HOOKS},
-        Nothing if is_stateless else returned[1],
-        derived,
+        Nothing if is_stateless else types["state"],
+        derived[0] if derived else None,
         types.get("inputs", Nothing),
         outputs,
-        next((found["parameters"] for found in hints.values() if "parameters" in found), Nothing),
+        types.get("parameters", Nothing),
         is_stateless,
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),
     )
+
+
+def _hooks(module: ModuleType) -> dict[str, FunctionType]:
+    """The hooks of a behaviour, if it has those that belong together, and no others."""
+    where, said = module.__name__, vars(module)
+    for name in ("begin", "advance", "Outputs"):
+        if name not in said:
+            raise Misdeclared(f"{where} has no {name}")
+    if not isinstance(said["Outputs"], type):
+        raise Misdeclared(f"{where}.Outputs is no class")
+    for together in _TOGETHER:
+        there = [name for name in together if name in said]
+        missing = [name for name in together if name not in said]
+        if there and missing:
+            raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
+    if not isinstance(said.get("RESTARTED", ""), str):
+        raise Misdeclared(f"{where}.RESTARTED is no text")
+    for name, value in said.items():
+        if name in HOOKS and not isinstance(value, FunctionType):
+            raise Misdeclared(f"{where}.{name} is no function, but has the name of a hook", name)
+        own = isinstance(value, FunctionType) and value.__module__ == where
+        if own and name not in HOOKS and not name.startswith("_"):
+            others = f"{', '.join(HOOKS)}; names of other functions begin with _"
+            raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
+    return {name: said[name] for name in HOOKS if name in said}
+
+
+def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) -> list[str]:
+    """The group of outputs that `measured` takes and returns, if all arguments are known."""
+    groups = fields_of(outputs)
+    noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
+    for name, found in hints.items():
+        known = [*HOOKS[name], *(noisy if name == "measured" else ())]
+        for argument in (argument for argument in found if argument not in (*known, "return")):
+            why = f"{argument}, which is not one of {', '.join(known)}"
+            raise Misdeclared(f"{where}.{name} takes {why}", name, argument)
+        if "derived" in found and "derive" not in hints:
+            raise Misdeclared(f"{where}.{name} takes derived, but there is no derive", name)
+    if "measured" not in hints:
+        return []
+    if len(noisy) != 1:
+        why = f"takes {len(noisy)} groups of outputs, not one"
+        raise Misdeclared(f"{where}.measured {why}", "measured")
+    found = hints["measured"]
+    for name in (*noisy, "return"):
+        _check_same(where, "measured", name, found[name], groups[noisy[0]])
+    check_type(found.get("n", float), "measured", "n")
+    if "n" not in found or {*scalars_of(found["n"])} != {float}:
+        drawn = word(form(found["n"])) if "n" in found else "nothing"
+        why = f"takes {drawn} as n; write a float, or a tuple or Vector of them"
+        raise Misdeclared(f"{where}.measured {why}", "measured", "n")
+    return noisy
+
+
+def _types_of_groups(hints: Mapping[str, Mapping[str, Any]], outputs: type) -> dict[str, Any]:
+    """The type that each argument has in all hooks: what most of them say."""
+    found: dict[str, list[Any]] = {}
+    for name, hint in _said_of_groups(hints):
+        found.setdefault(name, []).append(form(hint))
+    types = {name: max(forms, key=forms.count) for name, forms in found.items()}
+    return {**types, **_ARGUMENTS, "outputs": outputs}
+
+
+def _said_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any]]:
+    """The types of the component's own groups, as each hook takes or returns them."""
+    for name, found in hints.items():
+        yield from ((argument, found[argument]) for argument in _GROUPS if argument in found)
+        if name in ("derive", "restarted"):
+            yield _SAME[name], found["return"]
+        elif name in ("begin", "advance"):
+            parts = get_args(found["return"])
+            yield from zip(("state", "derived") if len(parts) > 2 else ("state",), parts[:-1])
+
+
+def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:
+    """Refuse an argument, or a result, of another type than it has everywhere else."""
+    if form(hint) != form(wanted):
+        takes = "returns" if argument == "return" else f"takes {argument} as"
+        why = f"{takes} {word(form(hint))}; write {word(form(wanted))}"
+        raise Misdeclared(f"{where}.{name} {why}", name, argument)
 
 
 def _types(where: str, hook: FunctionType) -> dict[str, Any]:
@@ -253,7 +341,3 @@ def _types(where: str, hook: FunctionType) -> dict[str, Any]:
             why = f"takes {name} of no type" if name != "return" else "does not say what it returns"
             raise Misdeclared(f"{where} {why}", hook.__name__)
     return hints
-
-
-def _word(kind: Any) -> str:
-    return str(getattr(kind, "__name__", kind))

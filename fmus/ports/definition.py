@@ -8,9 +8,9 @@ from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from fmus.ports.behaviour import Behaviour, read_behaviour
-from fmus.ports.groups import Field, Nothing, ParameterSet, ports_in
-from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port
+from fmus.ports.behaviour import HOOKS, Behaviour, read_behaviour
+from fmus.ports.groups import Field, Nothing, ParameterSet, form, ports_in, word
+from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, is_line
 from fmus.ports.variable import declared
 
 
@@ -107,6 +107,9 @@ def _of_one_module(name: str, module: ModuleType) -> Definition:
     )
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
     origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
+    for place, text in {"its docstring": summary, **origin._asdict()}.items():
+        if not is_line(text.replace("\n", " ").replace("\t", " ")):
+            raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
     return Definition(name, summary, origin, ports, own, {}, said)
 
 
@@ -117,8 +120,9 @@ def _class(said: Behaviour, module: ModuleType, cls: str) -> Any:
     if used is Nothing and made is not Nothing:
         raise Misdeclared(f"{cls} is there, but no hook takes {argument}", cls)
     if used is not made:
-        word = getattr(used, "__name__", used)
-        raise Misdeclared(f"{argument} are of the type {word}; call it {cls}", "advance")
+        hook = next(name for name in ("begin", *HOOKS) if argument in said.arguments(name))
+        why = f"{argument} are of the type {word(form(used))}; call it {cls}"
+        raise Misdeclared(why, hook, argument)
     return made
 
 

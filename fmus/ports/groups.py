@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from itertools import groupby
+from types import GenericAlias
 from typing import (
     Annotated,
     Any,
@@ -23,7 +24,7 @@ from typing import (
 )
 
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.port import Port, Value
+from fmus.ports.port import Misdeclared, Port, Value, is_int32
 from fmus.ports.quantities import group_name
 
 T = TypeVar("T")
@@ -99,6 +100,86 @@ def scalars_of(hint: Any) -> Iterator[Any]:
 def is_whole(hint: Any) -> bool:
     """Whether a type is one of integers, or an enumeration of them."""
     return hint is int or is_class(hint, IntEnum)
+
+
+def form(hint: Any) -> Any:
+    """A type that equals all others whose values are alike: with its sizes, without other notes."""
+    if get_origin(hint) is Annotated:
+        inner, *notes = get_args(hint)
+        sizes = tuple(note for note in notes if type(note) is int)
+        return Annotated[(inner, *sizes)] if inner in (Vector, Matrix) and sizes else form(inner)
+    if get_origin(hint) is tuple:
+        return GenericAlias(tuple, tuple(map(form, get_args(hint))))
+    return type(None) if hint is None else hint
+
+
+def word(hint: Any) -> str:
+    """A type as it is written."""
+    if hint is type(None):
+        return "None"
+    if get_origin(hint) is Annotated:
+        inner, *sizes = get_args(hint)
+        return f"Annotated[{word(inner)}, {', '.join(map(str, sizes))}]"
+    if get_origin(hint) is tuple:
+        return f"tuple[{', '.join(map(word, get_args(hint)))}]"
+    return hint.__name__ if is_class(hint, object) else str(hint)
+
+
+def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
+    """Refuse a type that no group can have, or a part of it.
+
+    Args:
+        hint: the type.
+        place: the names of the class and of the field that have it.
+        around: classes that it is a part of.
+
+    Raises:
+        Misdeclared: it is none of the language of equations.
+
+    """
+    kind, where = class_of(hint), f"{'.'.join(place)} " if place else ""
+    if kind in (Vector, Matrix):
+        notes = get_args(hint)[1:]
+        sizes = [note for note in notes if type(note) is int]
+        if len(sizes) != (1 if kind is Vector else 2) or min(sizes) < 1:
+            said = f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
+            why = f"is a {kind.__name__} without its size; write Annotated[{said}]"
+            raise Misdeclared(f"{where}{why}", *place)
+    elif is_class(kind, IntEnum):
+        for name, member in kind.__members__.items():
+            if not (name.isidentifier() and is_int32(member)):
+                why = f"has the member {name!r:.40} = {member:d}; write a name and 32 bits"
+                raise Misdeclared(f"{kind.__name__} {why}", kind.__name__, name)
+        if not kind.__members__:
+            raise Misdeclared(f"{kind.__name__} has no members", kind.__name__)
+    elif kind in around:
+        raise Misdeclared(f"{where}is a {kind.__name__} within a {kind.__name__}", *place)
+    elif is_record(kind) or hasattr(kind, "__total__"):
+        for name, part in fields_of(kind).items():
+            check_type(part, kind.__name__, name, around=(*around, kind))
+    elif get_origin(kind) is tuple and Ellipsis not in get_args(kind):
+        for part in parts_of(kind) or ():
+            check_type(part, *place, around=around)
+    elif kind not in (float, int, bool):
+        kinds = "float, int, bool, an IntEnum, a tuple of them, Vector, Matrix or a NamedTuple"
+        raise Misdeclared(f"{where}has the type {word(form(hint))}; use {kinds}", *place)
+
+
+def fields_of(made: Any) -> dict[str, Any]:
+    """The fields of a class and their types.
+
+    Raises:
+        Misdeclared: a type is not known.
+
+    """
+    try:
+        return hints_of(made)
+    except NameError as error:
+        missing = str(error).split("'")[1]
+        named = [f for f, hint in made.__annotations__.items() if missing in str(hint)]
+        place = (made.__name__, *named[:1])
+        why = f"has a type that is not known: {error}"
+        raise Misdeclared(f"{'.'.join(place)} {why}", *place) from None
 
 
 def reals_first(ports: Sequence[Port]) -> list[Port]:
@@ -233,7 +314,7 @@ def whole(value: int) -> int:
         OverflowError: it has more.
 
     """
-    if not -(2**31) <= value < 2**31:
+    if not is_int32(value):
         raise OverflowError("an integer exceeds 32 bits")
     return int(value)
 

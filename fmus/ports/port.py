@@ -6,8 +6,9 @@ documentation and the tests all read these declarations, directly or through the
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Union
 
@@ -20,6 +21,12 @@ Value = Union[float, int, bool, str]
 _TYPES = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
 
 _LARGEST = sys.float_info.max
+
+#: A structured name of FMI, such as `tau.u` or `K[1,2]`.
+_NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
+
+#: What a line of text in XML cannot have.
+_UNWRITABLE = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 #: Smallest value of a parameter that must be positive. FMI knows only inclusive bounds.
 POSITIVE = 1e-9
@@ -76,6 +83,31 @@ class Port:
     feedthrough: tuple[str, ...] = ()
     initially: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Refuse what no description of an FMU can say."""
+        for why in self._flaws():
+            raise Misdeclared(f"{self.name} {why}")
+
+    def _flaws(self) -> Iterator[str]:
+        if not _NAME.fullmatch(self.name):
+            yield "is not a name of FMI; use the letters a to z, digits and _"
+        if not is_line(self.description):
+            yield f"has the description {self.description!r:.40}; write one line of text"
+        if self.unit is not None and not (is_line(self.unit) and " " not in self.unit):
+            yield f"has the unit {self.unit!r:.40}; write it without spaces, such as kg.m2/s3"
+        for word, bound in (("minimum", self.minimum), ("maximum", self.maximum)):
+            if bound is None:
+                continue
+            if self.type not in ("Real", "Integer"):
+                yield f"has a {word}, which is for a float or an int"
+            elif not _is_bound(bound, self.type):
+                yield f"has the {word} {bound!r:.40}, which is not a finite {self.type}"
+        for text, number in self.choices.items():
+            if not (is_line(text) and is_int32(number)):
+                yield f"has the choice {text!r:.40} = {number:d}; write a line and 32 bits"
+        if None not in (self.minimum, self.maximum) and not self.minimum <= self.maximum:  # type: ignore[operator]
+            yield f"has the minimum {self.minimum!r:.40} above the maximum {self.maximum!r:.40}"
+
     def checked(self, value: Value) -> Value:
         """The value, if this port can take it.
 
@@ -106,7 +138,7 @@ class Port:
                 raise Refusal(f"{self.name} = {value!r}: use one of {', '.join(self.choices)}")
         elif not -_LARGEST <= value <= _LARGEST:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
-        elif self.type == "Integer" and not -(2**31) <= value < 2**31:
+        elif self.type == "Integer" and not is_int32(value):
             raise Refusal(f"{self.name} = {value!r:.20}: must fit into 32 bits")
         elif self.choices and value not in self.choices.values():
             numbers = ", ".join(f"{number:d}" for number in self.choices.values())
@@ -115,6 +147,23 @@ class Port:
     def meaning(self, value: Value) -> object:
         """What the equations take for a value of this port."""
         return self.choices[str(value)] if self.type == "String" else value
+
+
+def is_line(text: object) -> bool:
+    """Whether something is a line of text that XML can hold."""
+    return isinstance(text, str) and _UNWRITABLE.search(text) is None
+
+
+def is_int32(value: float) -> bool:
+    """Whether a whole number fits into 32 bits."""
+    return -(2**31) <= value < 2**31
+
+
+def _is_bound(bound: object, fmi_type: str) -> bool:
+    if fmi_type == "Integer":
+        return type(bound) is int and is_int32(bound)
+    is_number = isinstance(bound, (float, int)) and not isinstance(bound, bool)
+    return is_number and -_LARGEST <= bound <= _LARGEST  # type: ignore[operator]
 
 
 def inputs(group: str, members: Members, description: str) -> tuple[Port, ...]:

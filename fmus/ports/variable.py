@@ -12,13 +12,13 @@ gives the ports `u`, `y.x` and `y.z`.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import IntEnum
-from typing import Annotated, Any, NamedTuple, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.groups import Field, ParameterSet, is_class
+from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
 from fmus.ports.port import POSITIVE, Misdeclared, Port, Refusal
 
 __all__ = ("POSITIVE", "Refusal", "Variable", "declared")
@@ -92,16 +92,17 @@ def _declared(
         raise _wrong((name,), f"is no NamedTuple; write class {name}(NamedTuple)")
     starts = dict(made._field_defaults) if given is None else given._asdict()
     fields: dict[str, Field] = {}
-    for field, hint in _hints(made).items():
+    for field, hint in fields_of(made).items():
         place, start = (name, field), starts.get(field)
         inner, notes = _annotated(hint)
-        if isinstance(inner, type) and hasattr(inner, "_field_defaults"):
+        if is_record(inner):
             if start is not None and not isinstance(start, inner):
                 raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
             below = _declared(inner, causality, direct, f"{prefix}{field}.", start)
             fields[field] = ParameterSet(inner, **below)
             continue
         said = _said(notes, causality, place, inner)
+        check_type(hint, *place)
         parts = list(_parts(inner, notes, said, start, place))
         if causality == "parameter" and any(part.start is None for part in parts):
             raise _wrong(place, "has no default value, which a parameter starts with")
@@ -129,19 +130,22 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
             raise _wrong(place, f"is no {of}, and {name} is for {of}s")
     if causality == "output" and (said.minimum, said.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
-    if isinstance(said.feedthrough, str):
-        raise _wrong(place, f"has the feedthrough {said.feedthrough}; write a tuple of names")
+    for name in ("feedthrough", "members"):
+        names = getattr(said, name)
+        if names is not None and not _are_names(names):
+            raise _wrong(place, f"has the {name} {names!r:.40}; write a tuple of different names")
+    if not isinstance(said.description, str):
+        raise _wrong(place, f"has the description {said.description!r:.40}; write a text")
     return said
 
 
-def _hints(made: Any) -> dict[str, Any]:
-    try:
-        return get_type_hints(made, include_extras=True)
-    except NameError as error:
-        missing = str(error).split("'")[1]
-        named = [f for f, hint in made.__annotations__.items() if missing in str(hint)]
-        why = f"has a type that is not known: {error}"
-        raise _wrong((made.__name__, *named[:1]), why) from None
+def _are_names(names: object) -> bool:
+    """Whether something is a tuple of names, each once."""
+    return (
+        isinstance(names, tuple)
+        and all(isinstance(name, str) and name.isidentifier() and name.isascii() for name in names)
+        and len({*names}) == len(names)
+    )
 
 
 def _annotated(hint: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -156,7 +160,7 @@ def _word(hint: Any) -> str:
     """A type as it is written."""
     if hint in (Vector, Matrix):
         return f"{hint.__name__}, {'3' if hint is Vector else '2, 3'}"
-    return hint.__name__ if isinstance(hint, type) and not get_args(hint) else str(hint)
+    return word(hint)
 
 
 def _parts(
@@ -180,21 +184,16 @@ def _shape(
 ) -> tuple[tuple[int, ...], Any]:
     """How many numbers a type has along each dimension, and of which type."""
     if hint in (Vector, Matrix):
-        sizes = tuple(note for note in notes if type(note) is int)
-        if len(sizes) != (1 if hint is Vector else 2) or min(sizes) < 1:
-            example = f"Annotated[{_word(hint)}, Variable(...)]"
-            raise _wrong(place, f"is a {hint.__name__} without its size; write {example}")
-        return sizes, float
+        return tuple(note for note in notes if type(note) is int), float
     if get_origin(hint) is tuple:
         elements = [*dict.fromkeys(get_args(hint))]
         if len(elements) != 1 or get_args(hint) == ((),):
             raise _wrong(place, "has elements of several types; write a NamedTuple")
-        below, number = _shape(elements[0], (), place)
+        below, number = _shape(*_annotated(elements[0]), place)
         return (len(get_args(hint)), *below), number
-    if hint in _TYPES or is_class(hint, IntEnum):
-        return (), hint
-    kinds = "float, int, bool, an IntEnum, a tuple of them, Vector, Matrix or a NamedTuple"
-    raise _wrong(place, f"has the type {_word(hint)}; use {kinds}")
+    if is_record(hint):
+        raise _wrong(place, "is a tuple of NamedTuples; write a NamedTuple of them")
+    return (), hint
 
 
 def _places(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
@@ -224,22 +223,28 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
     variability = "tunable" if said.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
-    minimum, maximum = bounds or (said.minimum, said.maximum)
-    port = Port(
-        name,
-        causality,
-        variability,
-        kind,
-        ": ".join(filter(None, (said.description, part.label))),
-        (said.unit or None) if kind == "Real" else None,
-        start,
-        minimum,
-        maximum,
-        choices,
-        tuple(said.feedthrough or ()),
-    )
+    minimum, maximum = said.minimum, said.maximum
+    if bounds is not None:
+        if (minimum, maximum) != (None, None):
+            raise _wrong(place, "has a minimum or maximum, but its range is its members")
+        minimum, maximum = bounds
     try:
+        port = Port(
+            name,
+            causality,
+            variability,
+            kind,
+            ": ".join(filter(None, (said.description, part.label))),
+            (said.unit or None) if kind == "Real" else None,
+            start,
+            minimum,
+            maximum,
+            choices,
+            tuple(said.feedthrough or ()),
+        )
         port.checked(start)
+    except Misdeclared as error:
+        raise _wrong(place, str(error).removeprefix(f"{name} ")) from None
     except Refusal as refusal:
         raise _wrong(place, f"starts with {refusal}") from None
     return replace(port, start=None) if causality == "output" else port
@@ -251,7 +256,7 @@ def _meant(part: _Part, causality: str, place: tuple[str, ...]) -> tuple[str, An
     if number in _TYPES:
         kind, zero = _TYPES[number]
         start = zero if start is None else start
-        is_whole = kind == "Real" and type(start) is int
+        is_whole = kind == "Real" and type(start) is int and abs(start) <= sys.float_info.max
         return kind, float(start) if is_whole else start, {}, None
     members = list(number)
     start = members[0] if start is None else start

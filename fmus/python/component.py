@@ -136,6 +136,9 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._state: State | None = None
+        #: What was derived of the state with the parameters as they are; None: it is to be derived.
+        self._derived: Any = None
+        self._next: Any = None  #: what goes with a state that may yet be refused
         self._start_time = 0.0
         self._longest_step = 0.0
 
@@ -194,6 +197,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
     def _adopt(self, values: dict[str, Value], meaning: tuple[Parameters, float]) -> None:
         self._store.parameters = values
         self.parameters, self._longest_step = meaning
+        self._derived = None
 
     # Steps
 
@@ -241,7 +245,7 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
                 self._store.ports[reference].sound(value)
         if self._samples and not isfinite(sum(self.sample(values))):
             raise Refusal("a sampled output is not finite")
-        self._state, self._store.outputs = state, values
+        self._state, self._derived, self._store.outputs = state, self._next, values
 
     def _internal_steps(self, current_time: float, step_size: float) -> int:
         if not isfinite(current_time) or not isfinite(step_size):

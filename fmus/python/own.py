@@ -7,12 +7,12 @@ that lie beside the script are in it.
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 from pythonfmu.builder import get_model_class
 
 from fmus.python.packaging import best_loader, fmu_entries, seal
+from fmus.script import import_from
 
 #: The script of the FMU, with a slave that may raise.
 _SCRIPT = """\
@@ -36,7 +36,7 @@ def build_script(script: Path, destination: Path, loader: str | None = None) -> 
 
     """
     own = script.resolve().parent
-    sys.path.insert(0, str(own))
+    import_from(own)
     component = get_model_class(script).__name__
     text = _SCRIPT.format(module=script.stem, component=component)
     path = destination / f"{component}.fmu"

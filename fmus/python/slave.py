@@ -4,19 +4,22 @@ Its methods are written out and compiled, because they run once a step: `advance
 that derives something of its state and may restart becomes
 
     def advance(self, state, inputs, t, h, n):
+        derived = self._derived
         if not credible(self.parameters, state, inputs):
             self.say(RESTARTED.format(t=t), warning, RESTARTED)
             state = restarted(self.parameters, state, inputs)
-        derived = self._derived if state is self._latest else derive(self.parameters, state)
-        self._latest, self._derived, outputs = advance(self.parameters, state, derived, inputs, h)
-        return self._latest, outputs
+            derived = None
+        if derived is None:
+            derived = derive(self.parameters, state)
+        state, self._next, outputs = advance(self.parameters, state, derived, inputs, h)
+        return state, outputs
 
 and the method of a simpler one is shorter by what it lacks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from math import isfinite
 from random import Random
@@ -27,8 +30,9 @@ from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import define
-from fmus.ports.groups import SCOPE, Nothing, gathered, hints_of, reals_first, scattered, slices
-from fmus.ports.port import Refusal
+from fmus.ports.groups import SCOPE, Nothing, gathered, hints_of, reals_first, scattered
+from fmus.ports.port import Port, Refusal
+from fmus.ports.quantities import group_name
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
 
 
@@ -66,8 +70,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
     """
     definition = define(name, *modules)
     said = definition.behaviour
-    outputs = reals_first([port for port in definition.ports if port.causality == "output"])
-    places = slices([port for port in outputs if port.type == "Real"])
+    outputs = [port for port in definition.ports if port.causality == "output"]
     members: dict[str, Any] = {
         "__module__": modules[0].__package__ or modules[0].__name__,
         "__doc__": definition.summary,
@@ -76,7 +79,6 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
         "ports": definition.ports,
         "parameter_set": definition.parameters,
         "group_of": definition.group_of,
-        "_latest": None,
     }
     scope: dict[str, Any] = {
         **SCOPE,
@@ -86,7 +88,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
     }
-    for method in (*_steps(said), *_checks(said), *_noise(said, places.get(said.noisy), scope)):
+    for method in (*_steps(said), *_checks(said), *_noise(said, outputs, scope)):
         exec(method, scope, members)
     base: Any = Noisy if said.noisy else Component
     types = (said.state, said.inputs, said.outputs, said.parameters)
@@ -107,20 +109,23 @@ def _steps(said: Behaviour) -> Iterator[str]:
     if said.noisy:
         # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
         begin += [f"    self._random = Random({_call(said, 'seed')} % 2**32)"]
+    derives = said.hooks["derive"] is not None
+    if derives:
+        advance += ["    derived = self._derived"]
     if said.hooks["credible"]:
         advance += [
             f"    if not {_call(said, 'credible')}:",
             "        self.say(RESTARTED.format(t=t), warning, RESTARTED)",
             f"        state = {_call(said, 'restarted')}",
+            *(["        derived = None"] if derives else []),
         ]
-    if said.hooks["derive"]:
-        derive = _call(said, "derive")
-        advance += [f"    derived = self._derived if state is self._latest else {derive}"]
+    if derives:
+        advance += ["    if derived is None:", f"        derived = {_call(said, 'derive')}"]
     for lines, hook in ((begin, "begin"), (advance, "advance")):
-        if said.hooks["derive"]:
+        if derives:
             lines += [
-                f"    self._latest, self._derived, outputs = {_call(said, hook)}",
-                "    return self._latest, outputs",
+                f"    state, self._next, outputs = {_call(said, hook)}",
+                "    return state, outputs",
             ]
         else:
             state = "nothing, " if said.is_stateless else ""
@@ -137,18 +142,21 @@ def _checks(said: Behaviour) -> Iterator[str]:
             yield f"def {hook}(self, {arguments}):\n    return {call}"
 
 
-def _noise(said: Behaviour, place: slice | None, scope: dict[str, Any]) -> Iterator[str]:
+def _noise(said: Behaviour, outputs: Sequence[Port], scope: dict[str, Any]) -> Iterator[str]:
     """How an output gets its noise; the names that it needs are put into the scope."""
-    if place is not None:
-        assert said.hooks["measured"] is not None
-        hints = {**hints_of(said.hooks["measured"]), said.noisy: hints_of(said.outputs)[said.noisy]}
-        drawn = iter(["gauss(0.0, 1.0)"] * said.draws)
-        values = iter([f"values[{i}]" for i in range(place.start, place.stop)])
-        n, before = gathered(hints["n"], drawn, scope), gathered(hints[said.noisy], values, scope)
-        flat = ", ".join(text for text, _ in scattered(hints[said.noisy], "noisy"))
-        after = "noisy" if flat == "*noisy" else f"({flat},)"
-        yield (
-            "def sample(self, values):\n    gauss = self._random.gauss\n"
-            f"    noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}\n"
-            f"    values[{place.start}:{place.stop}] = noisy = {after}\n    return noisy"
-        )
+    if said.hooks["measured"] is None:
+        return
+    order = reals_first(outputs)
+    noisy = [port for port in outputs if group_name(port.name) == said.noisy]
+    values = [f"values[{order.index(port)}]" for port in noisy]
+    hint = hints_of(said.outputs)[said.noisy]
+    drawn = iter(["gauss(0.0, 1.0)"] * said.draws)
+    n = gathered(hints_of(said.hooks["measured"])["n"], drawn, scope)
+    before = gathered(hint, iter(values), scope)
+    flat = ", ".join(text for text, _ in scattered(hint, "noisy"))
+    after = "noisy" if flat == "*noisy" else f"({flat},)"
+    yield (
+        "def sample(self, values):\n    gauss = self._random.gauss\n"
+        f"    noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}\n"
+        f"    {', '.join(values)}, = noisy = {after}\n    return noisy"
+    )

@@ -17,7 +17,7 @@ from math import hypot, isclose
 from typing import Any, Callable, TypedDict, Union, get_args, get_origin
 
 from fmus.ports.groups import class_of, is_class, parts_of, whole
-from fmus.ports.port import Refusal, Value
+from fmus.ports.port import Refusal, Value, is_int32
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
 
 _SCALARS = (float, int, bool, str, type(None))
@@ -37,9 +37,10 @@ def measuring(hint: type) -> Callable[[Any], float]:
     """A function that gives the Euclidean norm of all floats of a state: NaN if one is NaN.
 
     It runs once a step, and written out it costs a third of a loop. It raises OverflowError for an
-    integer that an FMU in C has no room for.
+    integer that an FMU in C has no room for, and Refusal for one that its enumeration lacks.
     """
     names, floats, integers = (f"x{i}" for i in count()), [], []
+    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm, "whole": whole, "member": _member}
 
     def target(hint: Any) -> str:
         hints = parts_of(hint)
@@ -51,18 +52,26 @@ def measuring(hint: type) -> Callable[[Any], float]:
         elif hint is int:
             integers.append(f"whole({name}); ")
         elif is_class(hint, IntEnum):
-            pass  # one of its members
+            kind = f"kind{len(scope)}"
+            scope[kind] = hint
+            integers.append(f"member({name}, {kind}); ")
         elif hint not in _SCALARS:
             floats.append(f"norm({name})")
         return name
 
-    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm, "whole": whole}
     pattern = target(hint)
     norm = f"hypot({', '.join(floats)})" if floats else "0.0"
     text = f"def function(state):\n {pattern} = state\n {''.join(integers)}return {norm}"
     exec(text, scope)
     function: Callable[[Any], float] = scope["function"]
     return function
+
+
+def _member(value: int, kind: type[IntEnum]) -> IntEnum:
+    member = kind._value2member_map_.get(value)
+    if member is None:
+        raise Refusal(f"{_shown(int(value))} is not of type {kind.__name__}")
+    return member  # type: ignore[return-value]
 
 
 def _norm(value: Any) -> float:
@@ -96,12 +105,15 @@ def restored(hint: Any, value: Any) -> Any:
             raise Refusal("a value is not finite")
         return value
     if is_class(hint, IntEnum):
-        if type(value) not in (int, hint) or value not in [*hint]:
+        if not isinstance(value, int):
             raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
-        return hint(value)
+        return _member(value, hint)
+    if hint is int and isinstance(value, int):
+        # A bool, or a member of an enumeration, is an int.
+        value = int(value)
     if hint in _SCALARS and type(value) is not hint:
         raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
-    if hint is int and not -(2**31) <= value < 2**31:
+    if hint is int and not is_int32(value):
         raise Refusal("an integer exceeds 32 bits")
     return frozen(value)
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from xml.etree import ElementTree
 
 from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
+from orchestrator.formats.osp_and_container import OSP_STRUCTURE
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
@@ -41,8 +43,8 @@ def add_check(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         "Validate an FMU, an SSP, a scenario, a study or your own component (NAME.py or its "
-        "folder) without running it, and list every problem. Exit status: 0 without problems, "
-        "else 2.",
+        "folder) without running it, and list every problem. A component is imported, which runs "
+        "its module. Exit status: 0 without problems, else 2.",
         "check my_scenario.toml",
     )
     parser.add_argument(
@@ -75,7 +77,13 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _is_own(path: Path) -> bool:
-    """Whether a path is a script, or a folder with a component."""
+    """Whether a path is a script, or a folder with a component, which are imported.
+
+    A folder with a system or an FMU is none, whatever else is in it.
+    """
+    others = (OSP_STRUCTURE, "modelDescription.xml")
+    if any((path / name).is_file() for name in others) or any(path.glob("*.ssd")):
+        return False
     names = (f"{path.resolve().name}.py", "behaviour.py")
     return path.suffix == ".py" or any((path / name).is_file() for name in names)
 
@@ -99,11 +107,15 @@ def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
 
 def _script(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Check a component of the user's own; there is nothing else to know."""
-    process = run_module("fmus.check", options.file)
-    if process.returncode != 0:
-        raise InputError(last_line(process.stderr))
-    for text in process.stdout.splitlines():
-        findings.problem(text)
+    with TemporaryDirectory() as folder:
+        process = run_module("fmus.check", options.file, "--out", folder)
+        if process.returncode != 0:
+            raise InputError(last_line(process.stderr))
+        for text in process.stdout.splitlines():
+            findings.problem(text)
+        for fmu in sorted(Path(folder).glob("*.fmu")):
+            for text in validate_fmu(str(fmu)):
+                findings.problem(f"{options.file}: {text}")
     return []
 
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu.random_numbers import start, uniform
+from auv_fmu.random_numbers import MESSAGE_LOSSES, start, uniform
 from auv_fmu.vectors import Vector3, distance
 
 #: Most messages that are under way at the same time.
@@ -29,9 +29,6 @@ MOST_IN_A_STEP = 10_000
 
 #: What hosts may make of times by rounding, as a share of a step.
 _ROUNDING = 1e-6
-
-#: Of the numbers that decide which messages are lost.
-_STREAM = 1
 
 #: A place of the queue where no message is; the last number of one where there is one is 1.
 _NUMBERS = 9
@@ -99,7 +96,7 @@ def first_state(parameters: Parameters, y: Vector3, eta: Vector3, t: float) -> L
         t: time [s].
 
     """
-    random = start(parameters.seed, _STREAM)
+    random = start(parameters.seed, MESSAGE_LOSSES)
     queue = Matrix((0.0 for j in range(_NUMBERS)) for i in range(PLACES))
     return LinkState(t, 0, random, queue, Message(t, y, eta), 0, 0)
 

@@ -16,11 +16,8 @@ import math
 from math import cos, exp, expm1, sin, sqrt
 from typing import NamedTuple
 
-from auv_fmu.random_numbers import gaussian, start
+from auv_fmu.random_numbers import CURRENT_VARIATION, gaussian, start
 from auv_fmu.vectors import Vector3
-
-#: Stream of random numbers.
-_VARIATION = 3
 
 
 class Current(NamedTuple):
@@ -49,7 +46,7 @@ def begin(current: Current) -> Variation:
         current: parameters.
 
     """
-    state, north = gaussian(start(current.seed, _VARIATION))
+    state, north = gaussian(start(current.seed, CURRENT_VARIATION))
     state, east = gaussian(state)
     return Variation(current.sigma * north, current.sigma * east, state)
 

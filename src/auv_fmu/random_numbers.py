@@ -7,11 +7,12 @@ hold it exactly, and Python and C give the same numbers on every platform.
 
 The state of a generator is a whole number from 1 to m - 1, to be kept in the state of a component:
 
-    state = start(seed, 1)
+    state = start(seed, MESSAGE_LOSSES)
     state, u = uniform(state)
     state, n = gaussian(state)
 
-It is no generator for secrets, and it repeats after 2^31 - 2 numbers.
+It is no generator for secrets, and it repeats after 2^31 - 2 numbers. All sequences are parts of
+this one cycle: a seed and a stream only choose where one begins.
 """
 
 from __future__ import annotations
@@ -23,6 +24,14 @@ MODULUS = 2147483647.0
 
 #: a, a primitive root of m.
 MULTIPLIER = 48271.0
+
+#: Streams of all that draws numbers. Phases of waves and losses of messages share one: a sea and a
+#: link with the same seed draw the same numbers, so give them different seeds.
+WAVE_FREQUENCIES = 0
+WAVE_PHASES = 1
+WAVE_DIRECTIONS = 2
+CURRENT_VARIATION = 3
+MESSAGE_LOSSES = 1
 
 #: What splits a seed, and a state, into two halves.
 _HALF = 65536.0
@@ -62,9 +71,10 @@ def start(seed: int, stream: int) -> float:
     """The state of a generator at its start.
 
     Args:
-        seed: any 32-bit integer; another one gives another sequence.
-        stream: from 0 to 32767; another one gives another sequence of the same seed, so that one
-            seed does for several purposes.
+        seed: any 32-bit integer. Of two that differ, the sequences are one with a probability of
+            4e-9: there are more seeds than states. In stream 0, those of 6400 and 23455 are.
+        stream: from 0 to 32767; another one begins elsewhere, so that one seed does for several
+            purposes.
 
     """
     number = seed + _SHIFT

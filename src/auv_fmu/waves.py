@@ -31,7 +31,7 @@ from math import cos, exp, expm1, fmod, log, pi, sin, sqrt, tanh, tau
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu.random_numbers import start, uniform
+from auv_fmu.random_numbers import WAVE_DIRECTIONS, WAVE_FREQUENCIES, WAVE_PHASES, start, uniform
 from auv_fmu.vectors import Vector3
 
 #: Most regular waves of a sea.
@@ -69,11 +69,6 @@ _ANGLES = 360
 
 #: Step of the Weyl sequence: the golden ratio, less one.
 _GOLDEN = (sqrt(5.0) - 1.0) / 2.0
-
-#: Streams of random numbers.
-_FREQUENCIES = 0
-_PHASES = 1
-_DIRECTIONS = 2
 
 #: Steps of Newton's method, and a change of the wave number, as a share, at which it stops.
 _NEWTON = 30
@@ -188,7 +183,7 @@ def frequencies(waves: Waves) -> Annotated[Vector, 64]:
     for i in range(_CELLS):
         energy += enhancement(waves, frequency((i + 0.5) / _CELLS * below))
     found = Vector(0.0 for _ in range(MOST))
-    state = start(waves.seed, _FREQUENCIES)
+    state = start(waves.seed, WAVE_FREQUENCIES)
     lower, upper, cell = 0.0, 0.0, -1
     for i in range(waves.n):
         state, u = uniform(state)
@@ -252,8 +247,8 @@ def components(waves: Waves, depth: float, g: float) -> Components:
     if waves.spectrum == NONE:
         return rows
     ratios = frequencies(waves)
-    state = start(waves.seed, _PHASES)
-    _, offset = uniform(start(waves.seed, _DIRECTIONS))
+    state = start(waves.seed, WAVE_PHASES)
+    _, offset = uniform(start(waves.seed, WAVE_DIRECTIONS))
     for i in range(waves.n):
         omega = ratios[i] * tau / waves.Tp
         state, u = uniform(state)

@@ -11,6 +11,7 @@ from zipfile import ZipFile
 
 import pytest
 
+from orchestrator.commands import check
 from orchestrator.commands.main import main
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.writer import write_ssp
@@ -26,6 +27,7 @@ from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from support.others import build
+from support.own import write
 from support.texts import mentions
 
 SCENARIO = """
@@ -316,3 +318,30 @@ def test_an_archive_without_a_description_is_no_fmu(workplace, capsys):
     assert main(["check", "m.fmu"]) == 2
     [line] = lines(capsys)
     assert line.endswith("modelDescription.xml")
+
+
+@pytest.mark.parametrize(
+    "marker", ["SystemStructure.ssd", "Other.ssd", "OspSystemStructure.xml", "modelDescription.xml"]
+)
+def test_no_module_in_a_folder_with_a_system_or_an_fmu_is_run(workplace, capsys, marker):
+    folder = Path("theirs")
+    folder.mkdir()
+    (folder / marker).write_text("<it/>")
+    for name in ("__init__", "ports", "behaviour", "theirs"):
+        (folder / f"{name}.py").write_text("open('ran', 'w')\ndef begin(): ...\n")
+    assert main(["check", "theirs"]) == 2
+    assert lines(capsys) != []
+    assert not Path("ran").exists()
+
+
+def test_a_component_of_ones_own_is_described_and_what_fmi_says_of_that_is_told(
+    workplace, capsys, monkeypatch
+):
+    write(Path())
+    assert main(["check", "own_lag.py"]) == 0
+    assert lines(capsys) == ["own_lag.py: no problems found"]
+    monkeypatch.setattr(check, "validate_fmu", lambda path: [f"{Path(path).name} is flawed"])
+    assert main(["check", "own_lag.py"]) == 2
+    assert lines(capsys) == [
+        f"problem: own_lag.py: {name}.fmu is flawed" for name in ("native-2", "native-3", "python")
+    ]

@@ -136,6 +136,7 @@ struct instance {
     run run;
     parameter_values meant; /* the parameters that steps are taken with */
     double longest_step;
+    int underived; /* whether what a step needs of the state is to be derived of it first */
     int stale; /* whether a value has changed that state and outputs at the start time depend on */
     size_t n_said;
     uint64_t said[MOST_MESSAGES];

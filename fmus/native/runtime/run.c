@@ -36,6 +36,7 @@ static int adopt(instance *it, const parameter_values *values, message *why) {
     if (error.raised) return compose(why, "%s", error.why);
     it->meant = *values;
     it->longest_step = values->h_max * (1.0 + ROUNDING);
+    it->underived = 1;
     return 1;
 }
 
@@ -45,6 +46,21 @@ static int bounded(const state_values *state) {
     return sum <= LARGEST_STATE * LARGEST_STATE;
 }
 
+/* Whether a number of the state is one that its enumeration has, if it is of one. */
+static int is_member(const numbers *of, double number, message *why) {
+    return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
+           compose(why, "%f is not of type %s", number, of->name);
+}
+
+static int has_members(const double values[], message *why) {
+    for (size_t i = 0; i < N_STATE_NUMBERS; values += state_numbers[i++].n) {
+        for (size_t k = 0; state_numbers[i].name != NULL && k < state_numbers[i].n; k++) {
+            if (!is_member(&state_numbers[i], values[k], why)) return 0;
+        }
+    }
+    return 1;
+}
+
 /* Takes over what was computed for the next moment, if no number of it is out of bounds. */
 static int accept(instance *it, const Error *error, message *why) {
     run *run = &it->run;
@@ -52,6 +68,7 @@ static int accept(instance *it, const Error *error, message *why) {
     double draws[AT_LEAST_ONE(MODEL_DRAWS)];
     Error unmeasured;
     if (error->raised) return compose(why, "%s", error->why);
+    if (!has_members(next->state.values, why)) return 0;
     if (!bounded(&next->state)) {
         return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
     }
@@ -71,6 +88,7 @@ static int accept(instance *it, const Error *error, message *why) {
     }
     run->now = !run->now;
     run->begun = 1;
+    it->underived = 0;
     return 1;
 }
 
@@ -184,6 +202,8 @@ static int advance(instance *it, double time, double step, message *why) {
         compose(&said, MODEL_RESTARTED, time);
         say(it, &said, FMI_WARNING, "observer restarted");
         model_restart(parameters, &next->state.groups, inputs, &error);
+    } else if (it->underived) {
+        model_derive(parameters, &next->state.groups, &error);
     }
     model_advance(parameters, &next->state.groups, inputs, time, step / n, n,
                   &next->outputs.groups, &error);

@@ -117,8 +117,7 @@ static int good_number(const numbers *of, double number, message *why) {
     if (of->type == BOOLEAN && !is_truth(number)) {
         return compose(why, "%f is not of type bool", number);
     }
-    return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
-           compose(why, "%f is not of type %s", number, of->name);
+    return is_member(of, number, why);
 }
 
 static int take_state(reader *from, double values[], message *why) {
@@ -203,8 +202,7 @@ static int nearly_equal(const double one[], const double other[]) {
     return 1;
 }
 
-/* Whether a run can have led to a state and outputs, all of them finite; what follows from the
- * state is computed. */
+/* Whether a run can have led to a state and outputs, all of them finite. */
 static int can_be_reached(run *it, message *why) {
     const model_parameters *parameters = &it->parameters.model;
     moment *now = &it->moments[it->now];
@@ -212,7 +210,6 @@ static int can_be_reached(run *it, message *why) {
     Error error = {0};
     model_check(parameters, &error);
     if (!error.raised && !bounded(&now->state)) return compose(why, "it exceeds %g", LARGEST_STATE);
-    model_derive(parameters, &now->state.groups, &error);
     model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
     if (error.raised) return compose(why, "%s", error.why);
     if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values)) {

@@ -119,13 +119,14 @@ def begin(parameters: Parameters, inputs: Inputs, t: float) -> tuple[State, Deri
         mixed=parameters.mixed,
         counters=(inputs.pair[0], inputs.pair[1], 0),
     )
-    derived = derive(state)
+    derived = derive(parameters, state)
     return state, derived, _seen(state, derived)
 
 
-def derive(state: State) -> Derived:
+def derive(parameters: Parameters, state: State) -> Derived:
     """What follows from the state."""
-    return Derived(state.n % 4, 2.0 * state.line, state.mode == Mode.OFF)
+    double = (1.5 + parameters.gain) * state.line
+    return Derived(state.n % 4, double, state.mode == Mode.OFF)
 
 
 def credible(state: State) -> bool:
@@ -178,7 +179,7 @@ def advance(
         mixed=(state.mixed[0] + inputs.pair[0], state.mixed[1] + t),
         counters=(state.counters[1], state.counters[2], state.counters[0] + 1),
     )
-    again = derive(after)
+    again = derive(parameters, after)
     return after, again, _seen(after, again)
 
 
@@ -196,9 +197,9 @@ def measured(
     return noisy + parameters.gain * n / parameters.limits.default
 
 
-def expected(state: State, outputs: Outputs) -> Outputs:
+def expected(parameters: Parameters, state: State, outputs: Outputs) -> Outputs:
     """The outputs that belong to a state."""
-    seen = _seen(state, derive(state))
+    seen = _seen(state, derive(parameters, state))
     return seen._replace(noisy=outputs.noisy)
 
 

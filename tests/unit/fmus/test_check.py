@@ -2,10 +2,21 @@
 
 from __future__ import annotations
 
+import py_compile
+import shutil
 import subprocess
 import sys
+from importlib.util import cache_from_source
+from pathlib import Path
 
+import pytest
+
+from fmus import check
+from fmus.compilers import machines_compiler
+from fmus.native import packaging
 from support.own import write
+
+FOLDER = Path(__file__).parents[2] / "fmu" / "first_order_lag"
 
 
 def mistakes(*arguments: object) -> tuple[int, list[str]]:
@@ -85,3 +96,58 @@ def test_what_is_no_component_is_refused(tmp_path):
             "check its FMU"
         ],
     )
+
+
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_what_the_compiler_says_of_the_translation_is_told(tmp_path, monkeypatch):
+    monkeypatch.setattr(packaging, "tables", lambda definition: "int = 1;\n")
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path, name="own_c")
+    [line] = check.mistakes(Path("own_c.py"), tmp_path)
+    assert line.startswith("own_c.py: ") and "ports.h:1" in line
+
+
+def test_a_folder_without_a_page_is_told(tmp_path, monkeypatch):
+    shutil.copytree(FOLDER, tmp_path / "my_lag")
+    texts = tmp_path / "my_lag" / "ports.py"
+    texts.write_text(texts.read_text().replace("fmus.first_order_lag", "my_lag"))
+    monkeypatch.chdir(tmp_path)
+    assert mistakes("my_lag") == (0, [])
+    (tmp_path / "my_lag" / "page.md").unlink()
+    status, [line] = mistakes("my_lag")
+    assert status == 0
+    assert line.startswith("my_lag: ") and "page.md" in line
+
+
+def test_what_a_hook_says_wrong_is_told_with_the_line_of_the_argument(tmp_path, monkeypatch):
+    write(tmp_path, ("inputs: Inputs, h: float", "inputs: Inputs,\n    h: int"))
+    monkeypatch.chdir(tmp_path)
+    why = "own_lag.py:55: own_lag.advance takes h as int; write float"
+    assert mistakes("own_lag.py") == (0, [why])
+
+
+def test_what_the_component_prints_is_no_mistake(tmp_path):
+    path = write(tmp_path, ('__author__ = "Me"', '__author__ = print("Hello") or "Me"'))
+    assert mistakes(path) == (0, ["Hello"])
+
+
+@pytest.mark.parametrize("module", ["check", "build"])
+def test_byte_code_beside_a_component_is_neither_believed_nor_written(tmp_path, module):
+    """Python would take this byte code for that of the text, whatever the text says."""
+    write(tmp_path, ("from math import expm1", "from beside import expm1"))
+    (tmp_path / "beside.py").write_text("from math import expm1\n")
+    (tmp_path / "other.py").write_text("raise SystemExit('other code')\n")
+    for name in ("own_lag", "beside"):
+        py_compile.compile(
+            str(tmp_path / "other.py"),
+            cache_from_source(str(tmp_path / f"{name}.py")),
+            invalidation_mode=py_compile.PycInvalidationMode.UNCHECKED_HASH,
+        )
+    (tmp_path / "other.py").unlink()
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.py*") if path.is_file()}
+    out = tmp_path / "out"
+    out.mkdir()
+    command = [sys.executable, "-P", "-m", f"fmus.{module}", "own_lag.py", "--out", str(out)]
+    process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert (process.returncode, process.stdout + process.stderr) == (0, "")
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.py*")} == before

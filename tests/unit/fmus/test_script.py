@@ -69,7 +69,7 @@ def test_functions_make_a_component(tmp_path, text, answer):
         ("fmus", "fmus is already a module of Python; choose another name"),
         ("my-law", "my-law is not a name for a component; use letters, digits and underscores"),
         ("2nd", "2nd is not a name for a component"),
-        ("lambda", "lambda is not a name for a component"),
+        ("lambda", "lambda is a word of Python; choose another name"),
         ("_own", "_own is not a name for a component"),
     ],
 )
@@ -101,7 +101,7 @@ MISTAKES = {
         ("state: State, inputs: Inputs", "state: State"),
         "own_lag.py:24: Inputs is there, but no hook takes inputs",
     ),
-    "hook": (("h: float", "dt: float"), "own_lag.py:53: own_lag.advance takes dt, which is not"),
+    "hook": (("h: float", "dt: float"), "own_lag.py:54: own_lag.advance takes dt, which is not"),
     "missing": (("def begin", "def _begin"), "own_lag.py: own_lag has no begin"),
     "import": (
         ("from math", "from maths"),

@@ -21,6 +21,7 @@ from hypothesis import strategies as st
 
 from fmus.ports.definition import define
 from fmus.python.slave import slave_of
+from fmus.python.state import from_bytes, to_bytes
 from support.all_types import build
 from support.fmi3 import Fmi3Library
 from support.instances import messages_of
@@ -337,6 +338,69 @@ def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeyp
     assert messages_of(slave) == [said.text] == ["u = 8.5: must be at most 8"]
 
 
+MEMBERS = """\
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, NamedTuple
+
+from fmus.ports.variable import Variable
+
+
+class Mode(IntEnum):
+    OFF = 0
+    ON = 1
+    FAR = 4
+
+
+class Inputs(NamedTuple):
+    k: Annotated[int, Variable()] = 0
+
+
+class State(NamedTuple):
+    mode: Mode
+    last: int
+
+
+class Outputs(NamedTuple):
+    last: Annotated[int, Variable()]
+
+
+def begin() -> tuple[State, Outputs]:
+    return State(Mode.ON, Mode.FAR), Outputs(Mode.FAR)
+
+
+def advance(state: State, inputs: Inputs) -> tuple[State, Outputs]:
+    after = State((state.mode + inputs.k) % 6, min(state.mode, inputs.k > 0))
+    return after, Outputs(after.last)
+"""
+
+
+def test_an_int_may_be_a_member_or_a_truth_value_but_a_member_no_other_int(tmp_path, monkeypatch):
+    """A state that an FMU gives is one that it takes; any other is refused as a step."""
+    (tmp_path / "members.py").write_text(MEMBERS)
+    monkeypatch.syspath_prepend(tmp_path)
+    module = import_module("members")
+    slave = slave_of("Members", module)(instance_name="members")
+    slave._has_loader = True
+    slave.setup_experiment(0.0)
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    library = Library(build.native(tmp_path / "native", of=define("Members", module)))
+    with initialised(library) as host:
+        for t, k in enumerate((0, 3, 1, 2, 0)):
+            for state in (slave._get_fmu_state(), from_bytes(to_bytes(slave._get_fmu_state()))):
+                slave._set_fmu_state(state)
+            assert host.set_state(host.get_state()) == Status.OK
+            slave.set_integer([0], [k])
+            host.set("Integer", [0], [k])
+            assert host.get("Integer", [1])[1] == slave.get_integer([1])
+            steps = slave.do_step(t, 1.0), host.step(t, 1.0) == Status.OK
+            assert steps == ((False, False) if k == 1 else (True, True))
+        texts = {"step refused at t = 2 s: 5 is not of type Mode"}
+        assert {*messages_of(slave)} == {said.text for said in host.messages} == texts
+
+
 # Any calls
 
 numbers = st.sampled_from((0, 1, -1, 3, 7, 2, -7, -5, -6, MOST, LEAST, MOST - 3)) | st.integers(
@@ -371,6 +435,25 @@ calls = st.one_of(
 
 @given(before=st.lists(calls, max_size=4), after=st.lists(calls, max_size=25))
 @example(before=[("set_all", "Integer", {"k": MOST})], after=[("step", 0.02), ("look",)])
+@example(
+    before=[],
+    after=[
+        ("set_all", "Real", {"v[1]": 1.0, "v[2]": 2.0, "v[3]": 3.0}),
+        ("step", 0.02),
+        ("save",),
+        ("set_all", "Real", {"gain": 2.5}),
+        ("step", 0.02),
+        ("look",),
+        ("restore", 0, True),
+        ("set_all", "Real", {"gain": 2.5}),
+        ("step", 0.02),
+        ("look",),
+        ("set_all", "Real", {"u": 1e300}),
+        ("step", 0.02),
+        ("set_all", "Real", {"u": 0.0, "gain": 0.5}),
+        ("step", 0.02),
+    ],
+)
 def test_both_kinds_answer_alike_whatever_is_called(libraries, before, after):
     with ExitStack() as stack:
         runs = [Run(stack.enter_context(instance(library))) for library in libraries]
@@ -423,10 +506,10 @@ def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
     [
         (("state", 0), 1.0, "1.0 is not of type int"),
         (("state", 0), MOST + 1, "an integer exceeds 32 bits"),
-        (("state", 0), True, "True is not of type int"),
+        (("state", 0), "1", "'1' is not of type int"),
         (("state", 2), 1, "1 is not of type bool"),
         (("state", 3), 1, "1 is not of type Mode"),
-        (("state", 3), True, "True is not of type Mode"),
+        (("state", 3), 2.0, "2.0 is not of type Mode"),
         (("state", 4), [0.0] * 3, "[0.0, 0.0, 0.0] instead of 4 values"),
         (("state", 4, 3), nan, "a value is not finite"),
         (("state", 5), [[1.0, 2.0], [3.0]], "[3.0] instead of 2 values"),

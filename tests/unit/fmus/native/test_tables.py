@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from typing import NamedTuple
 
 from fmus.native.tables import names_of_choices, tables
-from fmus.ports.port import setting
+from fmus.ports.groups import ParameterSet
+from fmus.ports.port import inputs, setting
 from support.all_types import build
+
+
+class One(NamedTuple):
+    odd: int
 
 
 def row_of(name: str) -> list[str]:
@@ -39,6 +46,20 @@ def test_reals_lie_before_all_others_in_the_order_of_their_ports():
 def test_inputs_start_with_values_in_ranges():
     assert row_of("k")[4:7] == ["3.0", "-5.0", "2147483647.0"]
     assert row_of("go")[4] == "1.0"
+
+
+def test_a_start_of_minus_zero_stays_one():
+    port = inputs("u", {"x": "m"}, "Place")[0]
+    of = replace(build.definition(), ports=(replace(port, start=-0.0),))
+    assert '"u.x", REAL, INPUT, CONTINUOUS, 0, -0.0, ' in tables(of)
+
+
+def test_choices_are_texts_in_c():
+    odd = {'a"b\\': 0, "??/": -(2**31)}
+    of = replace(build.definition(), ports=(setting("odd", "??/", "Any", odd),))
+    of = replace(of, parameters=ParameterSet(One, odd=of.ports[0]))
+    of = replace(of, behaviour=of.behaviour._replace(parameters=One))
+    assert r'{{"a\"b\\", 0}, {"\?\?/", -2147483648}};' in tables(of)
 
 
 def test_members_of_enumerations_are_choices_of_texts_and_states():

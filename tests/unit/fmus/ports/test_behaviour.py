@@ -6,12 +6,14 @@ import re
 import sys
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 from fmus.discovery import package_folder
 from fmus.ports.behaviour import HOOKS, read_behaviour
 from fmus.ports.groups import Nothing
+from fmus.ports.port import Misdeclared
 
 GOOD = """\
 from __future__ import annotations
@@ -103,11 +105,140 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
             f"{SEED}{MEASURED}\n\ndef _moved".replace(", y: tuple[float, float])", ")"),
             "measured takes 0 groups of outputs, not one",
         ),
+        ("def _moved", "seed = measured = 1\n\n\ndef _moved", "seed is no function, but has the"),
+        (
+            "class Outputs(TypedDict)",
+            "Outputs = 1\n\n\nclass Out(TypedDict)",
+            "Outputs is no class",
+        ),
+        ("(h: float,", "(h: float, derived: State,", "takes derived, but there is no derive"),
+        ("    x: float\n", "    x: str\n", "State.x has the type str; use float, int"),
+        ("    x: float\n", "    x: State\n", "State.x is a State within a State"),
+        ("    x: float\n", "    x: Real\n", "State.x has a type that is not known: name 'Real'"),
     ],
 )
 def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
-    with pytest.raises(TypeError, match=f"^own_behaviour.*{why}"):
+    with pytest.raises(TypeError, match=f"^(own_behaviour.*)?{why}"):
         behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
+
+
+# Every argument and every result of every hook, with every type but its own
+
+CLASSES = """\
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector
+
+
+class Mode(IntEnum):
+    OFF = 0
+
+
+class Record(NamedTuple):
+    x: float
+    on: bool
+
+
+class Parameters(NamedTuple):
+    k: float
+
+
+class Inputs(NamedTuple):
+    u: float
+
+
+class State(NamedTuple):
+    x: float
+    mode: Mode
+
+
+class Derived(NamedTuple):
+    x: float
+
+
+class Outputs(NamedTuple):
+    y: Annotated[Vector, 2]
+    n: int
+
+
+RESTARTED = "again"
+"""
+
+_BOTH = "tuple[State, Derived, Outputs]"
+_Y = "Annotated[Vector, 2]"
+
+#: What each argument and each result is, as the documentation of the hooks says.
+RIGHT: dict[str, dict[str, str]] = {
+    "check": {"parameters": "Parameters", "return": "None"},
+    "begin": {"parameters": "Parameters", "inputs": "Inputs", "t": "float", "return": _BOTH},
+    "derive": {"parameters": "Parameters", "state": "State", "return": "Derived"},
+    "credible": {
+        "parameters": "Parameters", "state": "State", "inputs": "Inputs", "return": "bool",
+    },
+    "restarted": {
+        "parameters": "Parameters", "state": "State", "inputs": "Inputs", "return": "State",
+    },
+    "advance": {
+        "parameters": "Parameters", "state": "State", "derived": "Derived", "inputs": "Inputs",
+        "t": "float", "h": "float", "n": "int", "return": _BOTH,
+    },
+    "seed": {"parameters": "Parameters", "return": "int"},
+    "measured": {"parameters": "Parameters", "n": "tuple[float, float]", "y": _Y, "return": _Y},
+    "expected": {
+        "parameters": "Parameters", "state": "State", "outputs": "Outputs", "return": "Outputs",
+    },
+}  # fmt: skip
+
+WRONG = (
+    "float", "int", "bool", "str", "None", "Mode", "Record", "Parameters", "Inputs", "State",
+    "Derived", "Outputs", "tuple[float, float]", "tuple[int, float]", "Annotated[Vector, 2]",
+    "Annotated[Vector, 3]", "Annotated[Matrix, 2, 2]", "Vector", "list[float]", "float | None",
+    "tuple[State, Outputs]", "tuple[Outputs, Derived, State]",
+)  # fmt: skip
+
+#: Draws are floats, however many.
+DRAWS = {"float", "Derived", "Inputs", "Parameters"} | {
+    word for word in WRONG if word.startswith(("Annotated", "tuple[float"))
+}
+
+
+def of_hooks(patch: pytest.MonkeyPatch, hooks: dict[str, dict[str, str]]) -> ModuleType:
+    module = ModuleType("own_hooks")
+    patch.setitem(sys.modules, module.__name__, module)
+    text = CLASSES
+    for name, types in hooks.items():
+        taken = ", ".join(f"{k}: {hint}" for k, hint in types.items() if k != "return")
+        text += f"\n\ndef {name}({taken}) -> {types['return']}: ..."
+    exec(text, vars(module))
+    return module
+
+
+def test_hooks_of_the_right_types_are_taken(monkeypatch):
+    said = read_behaviour(of_hooks(monkeypatch, RIGHT))
+    classes = (said.parameters, said.inputs, said.state, said.derived, said.outputs)
+    words = ["Parameters", "Inputs", "State", "Derived", "Outputs"]
+    assert [kind.__name__ for kind in classes] == words
+
+
+@pytest.mark.parametrize(
+    ("hook", "argument"), [(hook, argument) for hook, types in RIGHT.items() for argument in types]
+)
+def test_no_other_type_is_taken(monkeypatch, hook, argument):
+    for wrong in WRONG:
+        is_draw = (hook, argument) == ("measured", "n") and wrong in DRAWS
+        if wrong == RIGHT[hook][argument] or is_draw:
+            continue
+        module = of_hooks(monkeypatch, {**RIGHT, hook: {**RIGHT[hook], argument: wrong}})
+        with pytest.raises(Misdeclared) as caught:
+            read_behaviour(module)
+        told = str(caught.value)
+        assert len(told.splitlines()) == 1
+        # What begin takes is what the others are held against.
+        assert caught.value.place[0] == hook or hook == "begin"
+        assert argument in (*caught.value.place, "return"), wrong
 
 
 @pytest.mark.parametrize("path", ["native/translator.py", "python/slave.py"])

@@ -134,7 +134,7 @@ def advance(t: float, h: float) -> tuple[Nothing, Outputs]:
             "inputs: Inputs",
             "inputs: State",
             "inputs are of the type State; call it Inputs",
-            ("advance",),
+            ("advance", "inputs"),
         ),
         (
             "state: State, inputs: Inputs",
@@ -160,7 +160,7 @@ def advance(t: float, h: float) -> tuple[Nothing, Outputs]:
             "h: float",
             "dt: float",
             "own_lag.advance takes dt, which is not one of parameters, sta",
-            ("advance",),
+            ("advance", "dt"),
         ),
     ],
 )

@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from enum import IntEnum
+from math import inf, nan
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 import pytest
+from fmpy.validation import validate_fmu
+from hypothesis import given
+from hypothesis import strategies as st
 
 from auv_fmu.linear_algebra import Matrix, Vector
+from fmus.discovery import source_of
+from fmus.ports.description import fmi2_description
+from fmus.ports.description_fmi3 import fmi3_description
 from fmus.ports.groups import ParameterSet, ports_in
 from fmus.ports.port import Misdeclared, Port
 from fmus.ports.variable import POSITIVE, Variable, declared
@@ -142,12 +151,12 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         (
             "input",
             Annotated[Vector, METRES],
-            "is a Vector without its size; write Annotated[Vector, 3, Variable(...)]",
+            "is a Vector without its size; write Annotated[Vector, 3, ...]",
         ),
         (
             "input",
             Annotated[Matrix, 2, METRES],
-            "is a Matrix without its size; write Annotated[Matrix, 2, 3, Variable(...)]",
+            "is a Matrix without its size; write Annotated[Matrix, 2, 3, ...]",
         ),
         ("input", Annotated[Vector, 0, METRES], "is a Vector without its size"),
         (
@@ -181,7 +190,7 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         (
             "output",
             Annotated[float, Variable(feedthrough="u")],
-            "has the feedthrough u; write a tuple of names",
+            "has the feedthrough 'u'; write a tuple of different names",
         ),
         (
             "output",
@@ -215,14 +224,77 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         ),
         ("parameter", (Annotated[Mode, PLAIN], 3), "starts with 3, which is no Mode"),
         ("parameter", (Gains, 3), "starts with 3, which is no Gains"),
+        (
+            "input",
+            Annotated[Vector, 2, Variable(members=("x", "x"))],
+            "has the members ('x', 'x'); write a tuple of different names",
+        ),
+        ("input", Annotated[Vector, 2, Variable(members=('a"b', "c"))], "has the members ('a\"b'"),
+        ("input", Annotated[Vector, 2, Variable(members="xz")], "has the members 'xz'; write a tu"),
+        (
+            "input",
+            Annotated[bool, Variable(minimum=0)],
+            "has a minimum, which is for a float or an",
+        ),
+        (
+            "input",
+            Annotated[int, Variable(minimum=0.5)],
+            "has the minimum 0.5, which is not a fini",
+        ),
+        (
+            "input",
+            Annotated[int, Variable(maximum=2**31)],
+            "has the maximum 2147483648, which is n",
+        ),
+        (
+            "input",
+            Annotated[float, Variable(maximum=inf)],
+            "has the maximum inf, which is not a fi",
+        ),
+        (
+            "input",
+            Annotated[float, Variable(minimum=1.0, maximum=-1.0)],
+            "has the minimum 1.0 above the maximum -1.0",
+        ),
+        (
+            "input",
+            Annotated[Mode, Variable(minimum=0)],
+            "has a minimum or maximum, but its range i",
+        ),
+        (
+            "parameter",
+            (Annotated[Mode, Variable(minimum=0)], Mode.OFF),
+            "has a minimum, which is f",
+        ),
+        (
+            "input",
+            Annotated[float, Variable("m", "a\vb")],
+            "has the description 'a\\x0bb'; write on",
+        ),
+        (
+            "input",
+            Annotated[float, Variable("m", "a\nb")],
+            "has the description 'a\\nb'; write one",
+        ),
+        (
+            "input",
+            Annotated[float, Variable("cubic m/s")],
+            "has the unit 'cubic m/s'; write it with",
+        ),
+        ("input", Annotated[IntEnum("Far", {"A": 0, "B": 5 * 10**9}), PLAIN], None),
+        ("input", (Annotated[float, METRES], 10**400), "starts with p = 1000000000000000000"),
     ],
 )
 def test_mistakes_are_named(causality, field, why):
-    if why is None:
+    if isinstance(field, tuple) and why is None:
         assert ports(causality, p=field)[0].start == 0.0
         return
     with pytest.raises(Misdeclared) as caught:
         ports(causality, p=field)
+    if why is None:
+        why = "Far has the member 'B' = 5000000000; write a name and 32 bits"
+        assert (str(caught.value), caught.value.place) == (why, ("Far", "B"))
+        return
     assert str(caught.value).startswith(f"Fields.p {why}")
     assert caught.value.place == ("Fields", "p")
 
@@ -240,3 +312,78 @@ def test_a_type_that_is_not_known_is_named_with_its_field():
     cls.__annotations__ = {"u": "float", "v": "Annotate[float, 3]"}
     with pytest.raises(Misdeclared, match=r"^Fields\.v has a type .*: name 'Annotate' is not def"):
         declared(cls, "input")
+
+
+def test_a_name_that_fmi_does_not_know_is_refused():
+    with pytest.raises(Misdeclared, match=r"^Fields\.\u03bc is not a name of FMI; use the letters"):
+        declared(made(**{"\u03bc": Annotated[float, METRES]}), "input")
+
+
+# Anything that can be written
+
+Odd = IntEnum("Odd", {'a"b': 0, "c": 1})  # type: ignore[misc]
+Far = IntEnum("Far", {"A": 0, "B": 5 * 10**9})  # type: ignore[misc]
+
+
+def mostly(value: Any, other: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+    """A good value, or once in a while any other."""
+    return st.integers(0, 7).flatmap(lambda k: st.just(value) if k else other)
+
+
+texts = st.sampled_from(("m", "\u00b5m", 'a"b\\', "<&>", "two words", 5)) | st.text(max_size=3)
+numbers: st.SearchStrategy[Any] = st.sampled_from(
+    (0, 1, -1, 0.5, -0.0, True, nan, inf, 2**31, 10**400, 5e-324, "0")
+)
+starts = numbers | st.sampled_from((Mode.SLOW, (1, 2), Odd.c, Matrix(((1.0, 2.0),))))
+members = st.sampled_from((("x", "z"), ("x", "x"), ('a"b', "c"), ("1", "2"), "xz", ("x",)))
+kinds: st.SearchStrategy[Any] = st.sampled_from(
+    (
+        ((float,), -0.0), ((float,), 2), ((int,), 3), ((bool,), True), ((Mode,), Mode.SLOW),
+        ((Vector, 2), Vector((1.0, -0.0))), ((tuple[int, int],), (1, 2)),
+        ((Matrix, 1, 2), Matrix(((1.0, 2.0),))), ((tuple[bool, bool],), (True, False)),
+        ((tuple[float, int],), (0.0, 1)), ((str,), ""), ((Vector,), None), ((Odd,), Odd.c),
+        ((Far,), Far.A),
+    )
+)  # fmt: skip
+
+
+@st.composite
+def fields(draw: st.DrawFn) -> tuple[Any, Any]:
+    """A type with what is said of it, and a start value."""
+    kind, start = draw(kinds)
+    unit = "N" if kind[0] in (float, Vector, Matrix) else "1"
+    bounds = (draw(mostly(None, numbers)) for _ in range(2))
+    said = Variable(
+        draw(mostly(unit, texts)),
+        draw(mostly("Plain", texts)),
+        *bounds,
+        draw(mostly(False, st.just(True))),
+        draw(mostly((), members)),
+    )
+    return Annotated[(*kind, said)], draw(mostly(start, starts))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("described")
+
+
+@given(
+    causality=st.sampled_from(("input", "output", "parameter")),
+    fields=st.dictionaries(mostly("p", st.sampled_from(("q_", "\u03bc"))), fields(), max_size=2),
+)
+def test_what_is_declared_can_be_described(folder, causality, fields):
+    """A flaw is told in one line; without one, the schemas and rules of FMI have no objection."""
+    flaw = None
+    try:
+        found = ports(causality, **fields)
+    except Misdeclared as error:
+        flaw = error
+    if flaw:
+        assert len(str(flaw).splitlines()) == 1
+        assert flaw.place[0] in ("Fields", "Odd", "Far")
+        return
+    it = replace(source_of("Sea").definition, ports=tuple(found))
+    for describe in (fmi2_description, fmi3_description):
+        (folder / "modelDescription.xml").write_bytes(describe(it, "{1}"))
+        assert validate_fmu(str(folder)) == []

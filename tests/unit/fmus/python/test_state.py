@@ -467,6 +467,18 @@ def test_integers_of_more_than_32_bits_have_no_size(n):
         measuring(Typed)(TYPED._replace(n=n))
 
 
+def test_numbers_that_an_enumeration_lacks_have_no_size():
+    assert measuring(Typed)(TYPED._replace(colour=4)) == 5.0
+    with pytest.raises(Refusal, match=r"^2 is not of type Colour$"):
+        measuring(Typed)(TYPED._replace(colour=2))
+
+
+@pytest.mark.parametrize("value", [True, Colour.RED, 1])
+def test_a_truth_value_or_a_member_is_an_int_and_an_int_a_member(value):
+    assert (restored(int, value), type(restored(int, value))) == (1, int)
+    assert restored(Colour, value) is Colour.RED
+
+
 def test_json_gives_members_vectors_and_matrices_back():
     again = restored(Typed, json.loads(json.dumps(TYPED)))
     assert again == TYPED
@@ -481,7 +493,6 @@ def test_json_gives_members_vectors_and_matrices_back():
         (int, -(2**31) - 1, "an integer exceeds 32 bits"),
         (Colour, 2, "2 is not of type Colour"),
         (Colour, 1.0, "1.0 is not of type Colour"),
-        (Colour, True, "True is not of type Colour"),
         (Colour, "RED", "'RED' is not of type Colour"),
         (Annotated[Vector, 2], [1.0], "[1.0] instead of 2 values"),
         (Annotated[Matrix, 1, 2], [[1.0, inf]], "a value is not finite"),

@@ -1,0 +1,349 @@
+"""Random components: what `check` passes can be built, and both kinds do the same.
+
+    PYTHONPATH=tests python -m fuzz.components --runs 100
+
+Each is a script made from a seed, with ports, state and noise of any types and any of the hooks.
+Every other one has one type exchanged for another. What is wrong is told with its line. What passes
+has valid descriptions, and both kinds take the same steps: parameters change during the run, and
+from a state that is restored they go on as they did before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import fmpy
+from fmpy.validation import validate_fmu
+
+from fmus import check
+from fmus.compilers import compiler_for
+from fmus.kinds import platforms
+from fmus.native.packaging import NativeKind
+from fmus.python.packaging import PythonKind, best_loader
+from fmus.script import source_of_script
+from support.raw import Host, Library, Variable, instance
+
+FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR = (
+    "float", "int", "bool", "Mode", "Annotated[Vector, 3]", "Annotated[Matrix, 2, 2]",
+    "tuple[int, int]", "tuple[float, float]", "tuple[bool, bool]", "Pair",
+)  # fmt: skip
+
+#: How a value of each type is made of values of the types of its parts, and how these are read.
+PARTS: Mapping[str, tuple[str, Sequence[tuple[str, str]]]] = {
+    V3: ("Vector(({}, {}, {}))", [(f"[{i}]", FLOAT) for i in range(3)]),
+    M22: (
+        "Matrix((({}, {}), ({}, {})))",
+        [(f"[{i}, {k}]", FLOAT) for i in range(2) for k in range(2)],
+    ),
+    II: ("({}, {})", [("[0]", INT), ("[1]", INT)]),
+    FF: ("({}, {})", [("[0]", FLOAT), ("[1]", FLOAT)]),
+    BB: ("({}, {})", [("[0]", BOOL), ("[1]", BOOL)]),
+    PAIR: ("Pair({}, {}, {})", [(".a", FLOAT), (".n", INT), (".on", BOOL)]),
+}
+TYPES = (FLOAT, INT, BOOL, MODE, *PARTS)
+
+#: What a number is made of others by.
+RULES: Mapping[str, Sequence[str]] = {
+    FLOAT: ("0.5 * {f} - 0.25 * {f}", "({f} if {b} else 0.5 * {f})", "{f} / (2.0 + abs({f}))"),
+    INT: ("({i} % 1000 + 3 * ({i} % 1000)) % 997", "int({f} % 50.0)", "max({i} % 7, -2)"),
+    BOOL: ("{f} < {f}", "not {b}", "{i} % 3 == {i} % 2", "{m} == Mode.LOW"),
+    MODE: ("(Mode.HIGH if {b} else {m})", "Mode.LOW"),
+}
+LETTERS = {"f": FLOAT, "i": INT, "b": BOOL, "m": MODE}
+CONSTANTS = {FLOAT: ("-0.0", "1.25"), INT: ("0", "-3"), BOOL: ("True",), MODE: ("Mode.OFF",)}
+
+#: A type in the annotation of an argument, a result or a field.
+_TYPE = re.compile(
+    r"(?<=[ \[])(float|int|bool|Mode|Pair|State|Inputs|Outputs|Derived|Parameters|None)"
+    r"(?=[,\]):]| =)"
+)
+
+#: What a mistake begins with.
+_PLACE = re.compile(r"\S+\.py:\d+: ")
+
+#: What stands in descriptions.
+ABOUT = ("", "Plain", 'ü \\" \\\\ <&> 100 % {t:g} ??/ */', "'")
+
+HEAD = '''\
+"""A random component."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import Annotated, NamedTuple
+
+from auv_fmu.linear_algebra import Matrix, Vector
+from fmus.ports.variable import Refusal, Variable
+
+
+class Mode(IntEnum):
+    """An enumeration."""
+
+    OFF = 0
+    LOW = -2147483648
+    HIGH = 7
+
+
+class Pair(NamedTuple):
+    """A record."""
+
+    a: Annotated[float, Variable("m")] = 0.25
+    n: Annotated[int, Variable()] = 4
+    on: Annotated[bool, Variable()] = True
+'''
+
+#: Names that something has, and their types.
+Names = dict[str, str]
+
+
+class Component:
+    """One component on its way, from a seed."""
+
+    def __init__(self, seed: int) -> None:
+        self._random = Random(seed)
+
+    def text(self) -> str:
+        """The script."""
+        draw = self._random
+        groups = {
+            name: {f"{name[0].lower()}{i}": draw.choice(TYPES) for i in range(draw.randint(1, 4))}
+            for name in ("Parameters", "Inputs", "State", "Outputs", "Derived")
+        }
+        groups["Parameters"] = {"gain": FLOAT, **groups["Parameters"]}
+        derives, restarts = draw.random() < 0.7, draw.random() < 0.5
+        parts = [HEAD, *(self._class(name, fields) for name, fields in groups.items())]
+        known = {
+            argument: _names(argument, groups[name])
+            for argument, name in (
+                ("parameters", "Parameters"), ("inputs", "Inputs"), ("state", "State"),
+                ("after", "State"), ("derived", "Derived"), ("again", "Derived"),
+            )
+        }  # fmt: skip
+        more = "Derived, " if derives else ""
+        result = f"-> tuple[State, {more}Outputs]:"
+
+        def ending(names: Names) -> list[str]:
+            lines = [f"after = {self._made('State', groups['State'], names)}"]
+            names = names | known["after"]
+            if derives:
+                lines += ["again = derive(parameters, after)"]
+                names = names | known["again"]
+            outputs = self._made("Outputs", groups["Outputs"], names)
+            return [*lines, f"return after, {'again, ' if derives else ''}{outputs}"]
+
+        before = known["parameters"] | known["inputs"] | {"t": FLOAT}
+        arguments = "parameters: Parameters, inputs: Inputs, t: float"
+        parts += [_function(f"begin({arguments}) {result}", ending(before))]
+        arguments += ", h: float, n: int, state: State" + (", derived: Derived" * derives)
+        before |= known["state"] | {"h": FLOAT, "n": INT} | (known["derived"] if derives else {})
+        parts += [_function(f"advance({arguments}) {result}", ending(before))]
+        if derives:
+            made = self._made("Derived", groups["Derived"], known["parameters"] | known["state"])
+            head = "derive(parameters: Parameters, state: State) -> Derived:"
+            parts += [_function(head, [f"return {made}"])]
+        if restarts:
+            parts += self._restart(groups["State"], known["state"], known["inputs"])
+        if draw.random() < 0.7:
+            parts += self._noise(groups["Outputs"], known["parameters"])
+        lines = ["if parameters.gain > 50.0:", "    raise Refusal('gain is large')"]
+        parts += [_function("check(parameters: Parameters) -> None:", lines)]
+        return "\n\n".join(parts)
+
+    def _class(self, name: str, fields: Names) -> str:
+        lines = [f"    {self._field(name, field, hint)}" for field, hint in fields.items()]
+        return "\n".join([f"class {name}(NamedTuple):", f'    """{name}."""', "", *lines]) + "\n"
+
+    def _field(self, name: str, field: str, hint: str) -> str:
+        if name in ("State", "Derived"):
+            return f"{field}: {hint}"
+        draw, said = self._random, [f'description="{self._random.choice(ABOUT)}"']
+        if name == "Parameters" and (field == "gain" or draw.random() < 0.5):
+            said += ["tunable=True"]
+        if name != "Outputs" and hint in (FLOAT, INT) and draw.random() < 0.5:
+            said += ["minimum=-1000", "maximum=1000"]
+        if hint == V3 and draw.random() < 0.5:
+            said += ['members=("x", "v", "double")']
+        note = f"Variable({', '.join(said)})"
+        inner = hint[len("Annotated[") : -1] if hint.startswith("Annotated") else hint
+        kind = PAIR if hint == PAIR else f"Annotated[{inner}, {note}]"
+        return f"{field}: {kind}" + ("" if name == "Outputs" else f" = {self._value(hint, {})}")
+
+    def _restart(self, fields: Names, state: Names, inputs: Names) -> Iterator[str]:
+        test = self._number(BOOL, state)
+        yield 'RESTARTED = "again at {t:g} s"\n'
+        yield _function("credible(state: State) -> bool:", [f"return {test}"])
+        made = self._made("State", fields, state | inputs)
+        head = "restarted(state: State, inputs: Inputs) -> State:"
+        yield _function(head, [f"return {made}"])
+
+    def _noise(self, fields: Names, parameters: Names) -> Iterator[str]:
+        group, hint = self._random.choice([*fields.items()])
+        drawn = self._random.choice((FLOAT, FF, V3))
+        names = _names("", {"n": drawn, group: hint}) | parameters
+        yield _function("seed() -> int:", [f"return {self._random.randint(-5, 5)}"])
+        head = f"measured(parameters: Parameters, n: {drawn}, {group}: {hint}) -> {hint}:"
+        yield _function(head, [f"return {self._value(hint, names)}"])
+
+    # Values
+
+    def _made(self, name: str, fields: Names, names: Names) -> str:
+        return f"{name}({', '.join(self._value(hint, names) for hint in fields.values())})"
+
+    def _value(self, hint: str, names: Names) -> str:
+        if hint not in PARTS:
+            return self._number(hint, names)
+        text, parts = PARTS[hint]
+        return text.format(*(self._number(part, names) for _, part in parts))
+
+    def _number(self, hint: str, names: Names, depth: int = 1) -> str:
+        found = [name for name, kind in names.items() if kind == hint]
+        if not names or not depth:
+            return self._random.choice(found or CONSTANTS[hint])
+        rule = self._random.choice(RULES[hint])
+        for letter, kind in LETTERS.items():
+            while f"{{{letter}}}" in rule:
+                rule = rule.replace(f"{{{letter}}}", self._number(kind, names, depth - 1), 1)
+        return f"({rule})"
+
+
+def _names(owner: str, fields: Names) -> Names:
+    """The numbers in the fields of something, as they are written."""
+    found = {}
+    for field, hint in fields.items():
+        name = f"{owner}.{field}" if owner else field
+        found |= {f"{name}{part}": kind for part, kind in PARTS.get(hint, ("", [("", hint)]))[1]}
+    return found
+
+
+def _function(head: str, lines: Sequence[str]) -> str:
+    return (
+        "\n".join([f"def {head}", '    """A hook."""', *(f"    {line}" for line in lines)]) + "\n"
+    )
+
+
+def text_of(seed: int) -> str:
+    """The component of a seed; of an odd one with one type exchanged."""
+    text, draw = Component(seed).text(), Random(seed)
+    if seed % 2:
+        place = draw.choice([found for found in _TYPE.finditer(text) if found.start() > len(HEAD)])
+        other = draw.choice((*TYPES, "State", "Inputs", "Outputs", "Parameters", "None", "str"))
+        text = text[: place.start()] + other + text[place.end() :]
+    return text
+
+
+# Trials
+
+
+def finding(seed: int) -> str:
+    """What is wrong with the component of a seed; empty: nothing."""
+    name = f"random_{seed}"
+    with TemporaryDirectory() as temporary:
+        folder = Path(temporary)
+        script = folder / f"{name}.py"
+        script.write_text(text_of(seed), encoding="utf-8")
+        (folder / "checked").mkdir()
+        try:
+            return _finding(script, folder, seed)
+        finally:
+            sys.path.remove(str(folder.resolve()))
+            sys.modules.pop(name, None)
+
+
+def _finding(script: Path, folder: Path, seed: int) -> str:
+    said = check.mistakes(script, folder / "checked")
+    if said:
+        is_told = seed % 2 and all(map(_PLACE.match, said))
+        return "" if is_told else f"refused: {said}"
+    for fmu in (folder / "checked").glob("*.fmu"):
+        if flaws := validate_fmu(str(fmu)):
+            return f"{fmu.name}: {flaws}"
+    here = platforms("2", None)
+    plan, traces = [*range(seed, seed + 6)], []
+    for kind in (
+        PythonKind(best_loader()),
+        NativeKind("2", here, compiler_for(here), lambda line: None),
+    ):
+        fmu = folder / f"{kind.name}.fmu"
+        kind.write(source_of_script(script), fmu)
+        traces.append(_trace(Library(Path(fmpy.extract(fmu, folder / kind.name))), plan))
+    for place, (one, other) in enumerate(zip(*traces, strict=True)):
+        if repr(one) != repr(other):
+            return f"at {place}: Python {one}, C {other}"
+    return ""
+
+
+def _trace(library: Library, plan: Sequence[int]) -> list[Any]:
+    """All values after each step, the second half twice, from the same state."""
+    found: list[Any] = []
+    with instance(library) as host:
+        host.setup()
+        _set(host, Random(plan[0]), ("input",))
+        host.enter()
+        host.exit()
+        for seed in plan[1:]:
+            _step(host, Random(seed), found.append)
+            state = host.get_state()
+            again: list[list[Any]] = [[], []]
+            for answers in again:
+                host.set_state(state)
+                _step(host, Random(seed + 1), answers.append)
+                _step(host, Random(seed + 2), answers.append)
+            host.set_state(state)
+            host.free_state(state)
+            straight: list[Any] = []
+            _step(host, Random(seed + 1), straight.append)
+            found += [*straight, *again[0]]
+            if repr(again[0]) != repr(again[1]) or repr(again[0][:1]) != repr(straight):
+                found.append(("not restored", library.description.kind))
+    return found
+
+
+def _step(host: Host, draw: Random, note: Callable[[Any], None]) -> None:
+    """Set inputs, and perhaps parameters, and take a step."""
+    _set(host, draw, ("input", "parameter") if draw.random() < 0.5 else ("input",))
+    note((host.step(draw.random(), draw.choice((0.02, 0.1))), sorted(host.values().items())))
+
+
+def _set(host: Host, draw: Random, causalities: Sequence[str]) -> None:
+    for variable in host.description.variables:
+        if variable.causality in causalities and draw.random() < 0.7:
+            host.set(variable.type, [variable.reference], [_value(variable, draw)])
+
+
+def _value(variable: Variable, draw: Random) -> Any:
+    return {
+        "Real": draw.choice((-0.0, 0.5, 60.0, draw.uniform(-3.0, 3.0))),
+        "Integer": draw.choice((0, 7, -(2**31), draw.randint(-100, 100))),
+        "Boolean": draw.randint(0, 1),
+        "String": draw.choice((b"LOW", b"HIGH", b"MIDDLE")),
+    }[variable.type]
+
+
+def main() -> int:
+    """Command line."""
+    parser = argparse.ArgumentParser(prog="python -m fuzz.components", description=__doc__)
+    parser.add_argument("--runs", type=int, default=100, help="components (default: %(default)s)")
+    parser.add_argument("--seed", type=int, default=0, help="of the first component")
+    parser.add_argument("--show", action="store_true", help="print the component of the first seed")
+    options = parser.parse_args()
+    if options.show:
+        print(text_of(options.seed))
+        return 0
+    wrong = 0
+    for seed in range(options.seed, options.seed + options.runs):
+        if said := finding(seed):
+            wrong += 1
+            print(f"seed {seed}: {said:.500}", flush=True)
+    print(f"{options.runs} components, {wrong} with a finding")
+    return 1 if wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

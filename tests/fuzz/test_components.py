@@ -1,0 +1,19 @@
+"""Random components in CI: few of what `python -m fuzz.components` tries."""
+
+from __future__ import annotations
+
+import pytest
+
+from fmus.compilers import machines_compiler
+from fuzz.components import finding, text_of
+from support.tiers import slow
+
+
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+@pytest.mark.parametrize("seed", [*range(4), *slow(*range(4, 40))])
+def test_what_check_passes_is_built_and_does_the_same_in_both_kinds(seed):
+    assert finding(seed) == ""
+
+
+def test_a_seed_is_a_component():
+    assert text_of(6) == text_of(6) != text_of(8)
