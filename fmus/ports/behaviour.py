@@ -1,16 +1,15 @@
 """What a component's `behaviour.py` may say: the hooks that both kinds of FMU call.
 
-Each public function of a behaviour is one of the :class:`Hooks`. It takes the hook's
-arguments that it needs, under their names and in any order; functions that only the behaviour
-itself calls begin with an underscore. All of it is in the language of equations (language.md),
-because the C kind runs its translation.
+The functions of a behaviour are the :class:`Hooks`, and those that they call. A hook takes the
+arguments that it needs, under their names and in any order. All of it is in the language of
+equations (language.md), because the C kind runs its translation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from inspect import signature
-from types import FunctionType, ModuleType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
 from fmus.ports.groups import Nothing, count_values, hints_of
@@ -198,11 +197,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         missing = [name for name in together if name not in said]
         if there and missing:
             raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
-    for name, value in said.items():
-        own = isinstance(value, FunctionType) and value.__module__ == where
-        if own and name not in HOOKS and not name.startswith("_"):
-            others = f"{', '.join(HOOKS)}; names of other functions begin with _"
-            raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
+    for name in _without_use(module):
+        others = f"{', '.join(HOOKS)}, and no function here calls it"
+        raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     outputs = said["Outputs"]
@@ -239,6 +236,25 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         said.get("RESTARTED", ""),
     )
+
+
+def _without_use(module: ModuleType) -> list[str]:
+    """Functions that nothing calls: perhaps hooks whose names are misspelt."""
+    own = {
+        name: value
+        for name, value in vars(module).items()
+        if isinstance(value, FunctionType) and value.__module__ == module.__name__
+    }
+    used = {name for function in own.values() for name in _names_in(function.__code__)}
+    return [name for name in own if name not in {*HOOKS, *used} and not name.startswith("_")]
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    """The names outside of a function that it uses, also in functions within it."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_in(constant)
 
 
 def _types(where: str, hook: FunctionType) -> dict[str, Any]:
