@@ -117,21 +117,8 @@ class _Translation:
     def _statement(self, node: ast.stmt, indent: str) -> Iterator[list[str]]:
         if isinstance(node, (ast.If, ast.While, ast.For)):
             yield from self._hoisting(node, indent)
-        elif isinstance(node, ast.Return) and node.value is None:
-            if not self._returns_nothing:
-                raise self._in_c.fail(node, f"{self._tree.name} has a result: return a value")
-            yield [f"{indent}return;"]
-            self._in_c.assigned = None
         elif isinstance(node, ast.Return):
-            assert node.value is not None
-            if self._returns_nothing:
-                raise self._in_c.fail(
-                    node, f"{self._tree.name} returns a value, and its type is None"
-                )
-            code = self._in_c.fitting(node.value, self._made.returns)
-            if self._made.returns is None:
-                self._made.returns = code.shape
-            yield laid_out(f"return {code.text};", indent)
+            yield laid_out(self._returned(node), indent)
             self._in_c.assigned = None
         elif isinstance(node, (ast.Break, ast.Continue)):
             yield [f"{indent}{'break' if isinstance(node, ast.Break) else 'continue'};"]
@@ -150,6 +137,19 @@ class _Translation:
             yield laid_out(f"{self._in_c.code(node.value).text};", indent)
         elif not (isinstance(node, ast.Pass) or is_text(node)):
             raise self._in_c.fail(node, f"{word_of(node)} is not in the language of equations")
+
+    def _returned(self, node: ast.Return) -> str:
+        name, gives = self._tree.name, not self._returns_nothing
+        if node.value is None and gives:
+            raise self._in_c.fail(node, f"{name} has a result: return a value")
+        if node.value is None:
+            return "return;"
+        if not gives:
+            raise self._in_c.fail(node, f"{name} returns a value, and its type is None")
+        code = self._in_c.fitting(node.value, self._made.returns)
+        if self._made.returns is None:
+            self._made.returns = code.shape
+        return f"return {code.text};"
 
     def _hoisting(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
         """A statement with blocks, after the declarations of what is used after it."""

@@ -177,7 +177,7 @@ _COLLECTIONS = frozenset(("Matrix", "Vector", "tuple"))
 #: What is often made of an expression with a for, and may not take one here.
 _REDUCTIONS = frozenset(("all", "any", "max", "min", "sum"))
 
-#: Blocks of a module that do not run when it is imported.
+#: Conditions that are false when a module is imported.
 _NEVER_RUN = ("__name__ == '__main__'", "TYPE_CHECKING", "typing.TYPE_CHECKING")
 
 
@@ -235,9 +235,14 @@ def _module(tree: ast.Module, path: Path) -> _Found:
                 yield from _names(node, known, modules)
         elif isinstance(node, ast.ClassDef):
             yield from _class(node)
-        elif not isinstance(node, _MODULE_LEVEL) and not is_text(node):
-            if not (isinstance(node, ast.If) and ast.unparse(node.test) in _NEVER_RUN):
-                yield node.lineno, f"{word_of(node)} at the level of the module"
+        elif not (isinstance(node, _MODULE_LEVEL) or is_text(node) or _never_runs(node)):
+            yield node.lineno, f"{word_of(node)} at the level of the module"
+
+
+def _never_runs(node: ast.stmt) -> bool:
+    """Whether a statement of a module does nothing when the module is imported."""
+    is_if = isinstance(node, ast.If) and not node.orelse
+    return is_if and ast.unparse(node.test) in _NEVER_RUN  # type: ignore[attr-defined]
 
 
 def _class(node: ast.ClassDef) -> _Found:

@@ -27,6 +27,7 @@ from fmus.native.shapes import (
     has_no_size,
     in_c,
     inner_structures,
+    is_of_library,
     matrix,
     place_of,
     shape_of,
@@ -112,6 +113,8 @@ class Program:
     def name(self, owner: Hashable, name: str) -> str:
         """A name in C that only its owner has, and no variable of a module met so far."""
         taken = words_of_runtime() | self.words | self.structures.keys()
+        if is_of_library(name):
+            name += "_"
         while name in taken or self._owners.setdefault(name, owner) != owner:
             name += "_"
         return name

@@ -36,7 +36,10 @@ _TAKEN = frozenset(
         "bool", "catch", "delete", "friend", "linux", "namespace", "new", "operator", "private",
         "protected", "public", "template", "this", "throw", "unix", "using", "virtual",
         # macros and types of the headers; longer ones in capitals are all taken
-        "EOF", "Error", "M_E", "NAN", "environ", "errno", "matherr", "stderr", "stdin", "stdout",
+        "EOF", "L_ctermid", "L_tmpnam", "L_tmpnam_s", "M_E", "NAN", "P_tmpdir", "environ", "errno",
+        "isascii", "iscsym", "iscsymf", "math_errhandling", "matherr", "onexit_t", "pclose",
+        "popen", "sa_handler", "sa_sigaction", "sched_priority", "stderr", "stdin", "stdout",
+        "sys_errlist", "sys_nerr", "toascii", "wcswcs", "wpopen",
         # what functions call or are given
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
         "cosh", "error", "exp", "expm1", "fabs", "floor", "fmod", "isfinite", "isinf", "isnan",
@@ -108,12 +111,21 @@ _SCALARS: dict[Any, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN, str: 
 _NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
 
 
-#: Words in capitals, for the headers of each system have macros of their own.
-_CAPITALS = re.compile(r"[A-Z][A-Z0-9_]{3,}|_[A-Z]\w*|__\w*")
+#: Words in capitals: the headers of each system have macros of their own.
+_MACROS = re.compile(r"[A-Z][A-Z0-9_]{3,}")
+
+#: Functions and types of the C libraries that could be those of a module and a function in it.
+_LIBRARY = re.compile(
+    r"(aligned|at|clock|cpu|fmi2|fmi3|function|getdate|int|is|max|mem|open|posix|pthread|quick|rlim|sched"
+    r"|sig|stack|str|sys|syscall|timer|timespec|u|uint|va)_\w+|[a-z]+_([a-z]|unlocked|explicit)"
+)
 
 #: Names of structures: of classes, and of tuples, which are joined from those of their parts.
 _CLASS = r"[A-Z][a-z]\w+"
-_STRUCTURES = re.compile(rf"(v_)*({_CLASS}|class_\w+|(int|double)(x\d+|_\w+))")
+_STRUCTURE = rf"{_CLASS}|class_\w+|(int|double)(x\d+|_\w+)"
+
+#: Variables that have one, or begin with _ as much in headers does.
+_PREFIXED = re.compile(rf"(v_)*({_STRUCTURE}|_\w+)")
 
 #: Classes that would have the name of a vector or a matrix.
 _ARRAYS = re.compile(r"(Vector|Matrix)\d\w*")
@@ -123,10 +135,10 @@ _ARRAYS = re.compile(r"(Vector|Matrix)\d\w*")
 def in_c(name: str) -> str:
     """The name of a variable or a member in C; no two have the same."""
     name = _without_marks(name)
-    if _STRUCTURES.fullmatch(name):
+    if _PREFIXED.fullmatch(name):
         return f"v_{name}"
     stem = name.rstrip("_")
-    is_taken = stem in _TAKEN | _arithmetic() or _CAPITALS.fullmatch(stem)
+    is_taken = stem in _TAKEN | _arithmetic() or _MACROS.fullmatch(stem)
     return f"{name}_" if is_taken else name
 
 
@@ -142,6 +154,11 @@ def words_of_runtime() -> frozenset[str]:
     texts = [path.read_text(encoding="utf-8") for path in sorted(RUNTIME.glob("*.[ch]"))]
     code = re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
     return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", code))
+
+
+def is_of_library(name: str) -> bool:
+    """Whether a C library may have a function, a type or a macro of this name."""
+    return name in _TAKEN or any(one.fullmatch(name) for one in (_LIBRARY, _MACROS))
 
 
 @cache

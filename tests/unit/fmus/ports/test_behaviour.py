@@ -80,8 +80,7 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
         (
             "def _moved",
             "def moved",
-            "moved is not one of the hooks check, .*, expected; names of other functions begin "
-            "with _$",
+            "moved is not one of the hooks check, .*, expected, and no function here calls it$",
         ),
         ("(h: float,", "(h,", "advance takes h of no type$"),
         ("(h: float,", "(h: real,", "advance has a type that is not known: name 'real' is not "),
