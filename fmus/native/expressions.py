@@ -40,10 +40,18 @@ TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, POSTFIX = range(9)
 #: Compilers take brackets within brackets, but not any number of them.
 _DEEPEST = 200
 
+
+def _power_of(base: Any, exponent: Any) -> Any:
+    """A power of an int that is no larger than sizes can be."""
+    if not (isinstance(base, int) and exponent in range(32)) or abs(base) > 2**31:
+        raise OverflowError
+    return base ** int(exponent)
+
+
 #: Operators between constants.
 _FOLDED: dict[type, Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
-    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: _power_of,
 }  # fmt: skip
 
 WHOLE = (INTEGER, BOOLEAN)

@@ -75,6 +75,7 @@ _WORDS = {
     "List": "a list",
     "ListComp": "a list with a for",
     "LShift": "<<",
+    "MatMult": "@",
     "Match": "match",
     "NamedExpr": ":=",
     "Nonlocal": "nonlocal",

@@ -118,8 +118,8 @@ class Operators(Expressions):
             if operand.text.endswith(" != 0.0") and operand.binding == EQUALITY:
                 return Code(f"{operand.text[:-7]} == 0.0", BOOLEAN, EQUALITY)
             return Code(f"!{operand.within(UNARY)}", BOOLEAN, UNARY)
-        if isinstance(node.op, ast.UAdd):
-            raise self.fail(node, "the operator +")
+        if not isinstance(node.op, ast.USub):
+            raise self.fail(node, f"the operator {word_of(node.op)}")
         if isinstance(node.operand, ast.Constant) and type(node.operand.value) is int:
             return Code(number_in_c(-node.operand.value), INTEGER, UNARY)
         operand = self.code(node.operand)

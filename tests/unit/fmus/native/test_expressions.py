@@ -86,6 +86,11 @@ N = 3
 TABLE = ((1, 50.0), (2, 10.0), (0, 30.0))
 RAGGED = Vector((1.0, 2.0)), Vector((3.0, 4.0, 5.0))
 MIXED, PAIR = (0, 1.5), (1, 2)
+SQUARED = 2.0
+
+
+def _doubled(given: tuple[Vector, float]) -> tuple[Vector, float]:
+    return 2.0 * given[0], given[1]
 '''
 
 #: A name for each construct, and a function that consists of little else.
@@ -407,6 +412,99 @@ CONSTRUCTS = {
         "def f(error: float, error_: float, Vector3: float) -> Annotated[Vector, 3]:\n"
         "    choice = File(error, error_)\n    return Vector((choice.a, choice.b, Vector3))\n"
     ),
+    "powers of a float": (
+        "def f(x: float) -> tuple[float, float, float, float, float]:\n"
+        "    return x**2, -(x**3), x**-1, x**0, (x * 2.0) ** (N + 2)\n"
+    ),
+    "powers to a float": (
+        "def f(x: float, k: int) -> tuple[float, float, float]:\n"
+        "    return x**-4.0, x**SQUARED, k**3.0\n"
+    ),
+    "powers of an int": (
+        "def f(k: int, on: bool) -> tuple[int, int, int, int, int]:\n"
+        "    k %= 17\n    return k**2, (k - 9) ** 7, -(k**0), on**3, (k % 3 - 1) ** 2000000001\n"
+    ),
+    "a power of an int below 1": "def f(k: int) -> float:\n    return k**-2 + (k % 5) ** -1\n",
+    "a power in place": "def f(x: float) -> float:\n    x **= 3\n    return x\n",
+    "a record in a condition": (
+        "def f(x: float, r: Inner) -> tuple[Inner, float]:\n"
+        "    return Inner(x) if Inner(x, 2).a > 0.0 else r, x\n"
+    ),
+    "a record with others in conditions": (
+        "def f(x: float, r: Record) -> Record:\n"
+        "    return r._replace(\n"
+        "        v=Vector((x, 1.0, 2.0)) if Vector((x, x)).sum() > 1.0 else r.v,\n"
+        "        inner=Inner(x) if (x, 1.0)[0] > 0.0 else r.inner._replace(a=2.0),\n"
+        "    )\n"
+    ),
+    "a vector in a condition in a matrix": (
+        "def f(x: float, v: Annotated[Vector, 2]) -> Annotated[Matrix, 2, 2]:\n"
+        "    return Matrix((Vector((x, 2.0)) if Vector((x, 1.0))[0] > v[0] else v, (1.0, x)))\n"
+    ),
+    "an expression with a name of the expression around it": (
+        "def f(x: Annotated[Vector, 2], x_in: float) -> Annotated[Matrix, 2, 3]:\n"
+        "    return Matrix((x * x_in for x_in in XS[:N]) for x in x)\n"
+    ),
+    "ranges of sums of constants": (
+        "def f(v: Annotated[Vector, 4], x: float) -> tuple[Annotated[Vector, 4], float]:\n"
+        "    w = Vector(x * k for k in range(N + 1))\n    d = 0.0\n"
+        "    for k in range(len(v) - 1):\n        d += v[k + 1] - v[k]\n"
+        "    for k in range(N**2 - 1, -N // 2, -(N % 2)):\n        d = d * x + k\n"
+        "    return w + Vector(d for _ in range(len(XS))), v[N] + MIXED[N - 2]\n"
+    ),
+    "slices by constants": (
+        "def f(v: Annotated[Vector, 4]) -> tuple[Annotated[Vector, 3], float, float]:\n"
+        "    return v[:N], v[N - 2 :: N - 1].sum(), max(v[-N : len(v)])\n"
+    ),
+    "loops over names that have a value": (
+        "def f(x: float, k: int, v: Annotated[Vector, 3]) -> tuple[float, int]:\n"
+        "    for k in range(k % 4):\n        for k in range(2):\n            x += k\n"
+        "        x = x * 0.5 + k\n    y = k + x\n"
+        "    for x in v:\n        y = y * x\n    for k, y in enumerate(v):\n        pass\n"
+        "    return x + y, k\n"
+    ),
+    "loops that change their names": (
+        "def f(x: float, n: int) -> float:\n"
+        "    for k in range(n % 5):\n        k *= 2\n        x += k\n"
+        "    for a in XS:\n        if a < x:\n            a = x\n        x = 0.5 * a + 1.0\n"
+        "    for i, b in enumerate(XS):\n        i += 1\n        b /= i\n        x += b\n"
+        "    return x\n"
+    ),
+    "zip of ranges": (
+        "def f(v: Annotated[Vector, 4]) -> Annotated[Vector, 3]:\n"
+        "    y = 0.0\n    for k, x in zip(range(7, -5, -N), v):\n        y = y * x + k\n"
+        "    for i, (k, n) in enumerate(zip(range(N), range(2, 9, 2))):\n        y += i * k - n\n"
+        "    return Vector(x * k + y for k, x in zip(range(1, N + 1), v))\n"
+    ),
+    "an early return": (
+        "def f(x: float, k: int) -> float:\n"
+        "    def check(a: float) -> None:\n        if a < 1.0:\n            return\n"
+        "        for _ in range(k):\n            if a > 2.0:\n                return\n"
+        "        raise Refusal(\"no\")\n"
+        "    check(x)\n    return x\n"
+    ),
+    "lists in vectors and matrices": (
+        "def f(x: float) -> tuple[Annotated[Vector, 2], Annotated[Matrix, 2, 2]]:\n"
+        "    v = Vector([x, 1.0])\n    return v, Matrix([[x, 0.0], v]) + Matrix(([1.0, x], (x, 2)))\n"
+    ),
+    "results of any size": (
+        "def f(v: Annotated[Vector, 3], w: Annotated[Vector, 2]) -> tuple[Annotated[Vector, 3], float]:\n"
+        "    def halved(x: Annotated[Vector, 2]) -> tuple[Vector, float]:\n"
+        "        return 0.5 * x, x.sum()\n"
+        "    (a, b), (c, d) = _doubled((v, 2.0)), halved(w)\n    return a, b + c @ w + d\n"
+    ),
+    "names of structures": (
+        "def f(x: float, Inner_Record: float, File_: Inner) -> tuple[Inner, Record]:\n"
+        "    Inner_Record_, Inner_double, Inner_, class_pose = x, 2.0, x * 3.0, pose(x)\n"
+        "    int_Inner, pairs = (1, File_), ((x, 2), (Inner_Record, 3))\n"
+        "    y = Inner_Record_ * Inner_double + Inner_ + pairs[1][0] + int_Inner[0]\n"
+        "    return Inner(y), Record(class_pose.x, XS[:3], int_Inner[1])\n"
+    ),
+    "names that are numbers of others in C": (
+        "def f(x\u0302: float, x_u0302: float, x_u00302: float, v__x: float, _x: float) -> float:\n"
+        "    llabs, v_State = abs(int(x_u0302 / 1e9)), 2.0\n"
+        "    return x\u0302 - x_u0302 * x_u00302 + llabs + v__x / _x + v_State\n"
+    ),
     "range of a constant": (
         "def f(x: float) -> Annotated[Vector, 3]:\n    return Vector(x * k for k in range(N))\n"
     ),
@@ -525,6 +623,19 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = 1.0 * round(v[1], ndigits=1)", "round with ndigits="),
         ("y = v.sum(axis=0)", "sum with axis="),
         ("y = 1.0 * float(*v)", "float with a star"),
+        ("y = y**0.5", "** with other than a whole constant is not in"),
+        ("y = y**y", "** with other than a constant whole number: write math.pow(x, y)"),
+        ("y = v**2", "a Vector of 3 where a number is wanted"),
+        ("for k in range(N / 2): y += k", "a bound of a range that is a float, not an int"),
+        ("y = v[: int(y)].sum()", "a slice other than a constant one"),
+        ("y = v[:: N - 3].sum()", "a slice with a step of 0"),
+        ("y = Vector(1.0 for _ in range(N - 3)).sum()", "a number of elements that is not a con"),
+        ("for k, a in zip(range(int(y)), v): y += k", "a range of other than constants within a z"),
+        ("for k, a in zip(range(-(2**31), 2**31, 3), v): y += k", "2147483648 is an int"),
+        ("for k, a in zip(range(-2147483647, 2147483647), v): y += k", "a range of so many"),
+        ("for v in v: y += v", "v is a Vector of 3 and gets a float: use another name"),
+        ("y = interpolate(y, (0, 1), (10, 20))", "a tuple of 2 with other than floats"),
+        ("y = {1: y}[1]", "a dict that is not a result: write a NamedTuple"),
         ("k = 3000000000", "3000000000 is an int of more than 32 bits: write 3000000000.0"),
         ("y = Vector(0.0 for _ in range(70000)).sum()", "a Vector of 70000 is too large for C"),
         ("k = LARGE", "3000000000 is an int of more than 32 bits"),
