@@ -197,9 +197,11 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         missing = [name for name in together if name not in said]
         if there and missing:
             raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
-    for name in _without_use(module):
+    unused = _without_use(module)
+    if unused:
         others = f"{', '.join(HOOKS)}, and no function here calls it"
-        raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
+        alike = f"; nor {', '.join(unused[1:])}" if len(unused) > 1 else ""
+        raise Misdeclared(f"{where}.{unused[0]} is not one of the hooks {others}{alike}", unused[0])
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = {**hints["begin"], **hints["advance"]}
     outputs = said["Outputs"]

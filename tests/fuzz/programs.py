@@ -158,7 +158,14 @@ class Program:
 
     def text(self) -> str:
         """The function."""
-        arguments: Variables = {"x": FLOAT, "x_in": FLOAT, "k": INT, "on": BOOL, "v": V3, "r": RECORD}
+        arguments: Variables = {
+            "x": FLOAT,
+            "x_in": FLOAT,
+            "k": INT,
+            "on": BOOL,
+            "v": V3,
+            "r": RECORD,
+        }
         variables = dict(arguments)
         self._block(variables, "    ", self._random.randint(3, 8), depth=0)
         results = list(variables)
@@ -255,7 +262,15 @@ class Program:
             # It has a value already, which is lost.
             name = self._random.choice([n for n, h in known.items() if h == hint] or [name])
         if kind == 0:
-            stops = ("3", "1, 4", "4, 0, -1", "0, 7, 3", "SIZE + 1", "len(XS) - 3", "SIZE**2, -1, -SIZE")
+            stops = (
+                "3",
+                "1, 4",
+                "4, 0, -1",
+                "0, 7, 3",
+                "SIZE + 1",
+                "len(XS) - 3",
+                "SIZE**2, -1, -SIZE",
+            )
             stop = self._random.choice((*stops, f"{name}_n"))
             if stop == f"{name}_n":
                 self._add(indent, f"{name}_n = {self._expression(INT, known, 1)} % 4")
@@ -275,7 +290,9 @@ class Program:
             self._add(indent, f"for {name} in PRIMES:")
             inside[name] = INT
         elif kind == 5:
-            self._add(indent, f"for {name}, {name}_b in zip(range(9, SIZE, -3), {self._vector(known)}):")
+            self._add(
+                indent, f"for {name}, {name}_b in zip(range(9, SIZE, -3), {self._vector(known)}):"
+            )
             inside |= {name: INT, f"{name}_b": FLOAT}
         else:
             self._add(indent, "for _ in range(2):")

@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmus.native.language import CONSTANTS, MATHEMATICS
+from fmus.native.language import CONSTANTS, MATHEMATICS, foreign
 from fmus.native.program import Untranslatable
 from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 
@@ -485,10 +485,12 @@ CONSTRUCTS = {
     ),
     "lists in vectors and matrices": (
         "def f(x: float) -> tuple[Annotated[Vector, 2], Annotated[Matrix, 2, 2]]:\n"
-        "    v = Vector([x, 1.0])\n    return v, Matrix([[x, 0.0], v]) + Matrix(([1.0, x], (x, 2)))\n"
+        "    v = Vector([x, 1.0])\n"
+        "    return v, Matrix([[x, 0.0], v]) + Matrix(([1.0, x], (x, 2)))\n"
     ),
     "results of any size": (
-        "def f(v: Annotated[Vector, 3], w: Annotated[Vector, 2]) -> tuple[Annotated[Vector, 3], float]:\n"
+        "def f(v: Annotated[Vector, 3], w: Annotated[Vector, 2]) -> tuple[\n"
+        "    Annotated[Vector, 3], float\n]:\n"
         "    def halved(x: Annotated[Vector, 2]) -> tuple[Vector, float]:\n"
         "        return 0.5 * x, x.sum()\n"
         "    (a, b), (c, d) = _doubled((v, 2.0)), halved(w)\n    return a, b + c @ w + d\n"
@@ -515,6 +517,27 @@ WRONG_CONSTANTS = """
 class Default(NamedTuple):
     a: float
     n: int = 2.5
+
+
+class Texts(NamedTuple):
+    a: float
+    b: str
+
+
+class Lists(NamedTuple):
+    a: list[float]
+
+
+class Inner_double(NamedTuple):
+    a: int
+
+
+def _listed(x: list[float]) -> float:
+    return 1.0
+
+
+def _listing(x: float) -> tuple[float, ...]:
+    return (x,)
 
 
 LARGE, ZERO, WRONG = 3000000000, Inner(0), Inner(0.5, 2.5)
@@ -623,6 +646,11 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = 1.0 * round(v[1], ndigits=1)", "round with ndigits="),
         ("y = v.sum(axis=0)", "sum with axis="),
         ("y = 1.0 * float(*v)", "float with a star"),
+        ("y = Texts(y, 'b').a", "Texts.b: texts are for raise Refusal(...) only"),
+        ("y = Lists((y,)).a[0]", "Lists.a: list[float] is not a type in the language"),
+        ("y = _listed((y,))", "the argument x of _listed: list[float] is not a type"),
+        ("y = _listing(y)[0]", "the result of _listing: tuple[float, ...] is not a type"),
+        ("k = (Inner(y), y)\n    y = k[1] * Inner_double(2).a", "the class Inner_double has"),
         ("y = y**0.5", "** with other than a whole constant is not in"),
         ("y = y**y", "** with other than a constant whole number: write math.pow(x, y)"),
         ("y = v**2", "a Vector of 3 where a number is wanted"),
@@ -630,7 +658,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = v[: int(y)].sum()", "a slice other than a constant one"),
         ("y = v[:: N - 3].sum()", "a slice with a step of 0"),
         ("y = Vector(1.0 for _ in range(N - 3)).sum()", "a number of elements that is not a con"),
-        ("for k, a in zip(range(int(y)), v): y += k", "a range of other than constants within a z"),
+        ("for k, a in zip(range(int(y)), v): y += k", "a range of other than constants"),
         ("for k, a in zip(range(-(2**31), 2**31, 3), v): y += k", "2147483648 is an int"),
         ("for k, a in zip(range(-2147483647, 2147483647), v): y += k", "a range of so many"),
         ("for v in v: y += v", "v is a Vector of 3 and gets a float: use another name"),
@@ -708,8 +736,47 @@ def test_what_c_would_compute_otherwise_is_refused(tmp_path: Path, line: str, wh
     function = f"def f(y: float, v: Annotated[Vector, 3]) -> float:\n    {line}\n    return y\n"
     constants = WRONG_CONSTANTS
     module = module_of(HEAD + SHARED + constants + function, tmp_path, "refused")
-    with pytest.raises(Untranslatable, match=re.escape(why)):
+    with pytest.raises((TypeError, Untranslatable), match=re.escape(why)) as error:
         c_text({"f": module.f})
+    assert re.match(rf"{tmp_path}/refused\.py:\d+: ", str(error.value))
+
+
+def test_classes_of_one_name_in_two_modules_are_refused(tmp_path, monkeypatch):
+    """One is named with its line, the user's own if the other is ours."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "tanks.py").write_text(
+        "from __future__ import annotations\n\nfrom typing import NamedTuple\n\n\n"
+        "class State(NamedTuple):\n    level: float\n\n\n"
+        "def filled(x: float) -> State:\n    return State(x)\n"
+    )
+    text = HEAD + (
+        "from tanks import filled\nfrom fmus.ports.groups import Nothing as Void\n\n\n"
+        "class State(NamedTuple):\n    x: float\n\n\nclass Nothing(NamedTuple):\n    x: float\n\n\n"
+        "def f(x: float) -> State:\n    return State(filled(x).level)\n\n\n"
+        "def g(x: float) -> Nothing:\n    _ = Void()\n    return Nothing(x)\n"
+    )
+    module = module_of(text, tmp_path, "of_two")
+    first = HEAD.count("\n")
+    for name, place, other in (
+        ("f", "tanks.py:6", "of_two"),
+        ("g", f"of_two.py:{first + 9}", "fmus.ports.groups"),
+    ):
+        with pytest.raises(Untranslatable) as error:
+            c_text({name: getattr(module, name)})
+        assert str(error.value).startswith(f"{tmp_path}/{place}: the class ")
+        assert f"of {other} in C" in str(error.value)
+    sys.modules.pop("tanks")
+
+
+def test_vectors_may_be_imported_by_another_name(tmp_path: Path):
+    text = HEAD + (
+        "from auv_fmu.linear_algebra import Matrix as M, Vector as V\n\n\n"
+        "def f(x: float) -> Annotated[V, 2]:\n"
+        "    return M((x * j for j in range(2)) for _ in range(2)) @ V(k + x for k in range(2))\n"
+    )
+    both = Twins(module_of(text, tmp_path, "renamed"), tmp_path)
+    assert foreign(tmp_path / "renamed.py") == []
+    assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (12.0, 12.0)
 
 
 def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):

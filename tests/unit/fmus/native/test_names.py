@@ -81,8 +81,8 @@ def test_every_name_that_a_compiler_knows_can_be_a_variable_and_a_function(tmp_p
 
 
 parts = st.sampled_from(
-    ["x", "_", "__", "u", "_u", "00302", "0302", "\u0302", "int", "v_", "class_", "State", "Vector3",
-     "EOF", "double", "error", "1", "é"]
+    ["x", "_", "__", "u", "_u", "00302", "0302", "\u0302", "int", "v_", "class_", "State",
+     "Vector3", "EOF", "double", "error", "1", "é"]
 )  # fmt: skip
 
 

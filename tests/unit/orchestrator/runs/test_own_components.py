@@ -183,8 +183,8 @@ def test_check_lists_problems(tmp_path, monkeypatch, capsys):
     write(tmp_path, ("x = state.x -", "x = state.x ** 0.5 -"))
     assert main(["check", "own_lag.py"]) == 2
     assert capsys.readouterr().out == (
-        "problem: own_lag.py:57: ** with other than a whole constant is not in the language of equations; "
-        "write math.pow(x, y), or sqrt(x)\n"
+        "problem: own_lag.py:57: ** with other than a whole constant is not in the language of "
+        "equations; write math.pow(x, y), or sqrt(x)\n"
     )
 
 
