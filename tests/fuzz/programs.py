@@ -106,7 +106,8 @@ DEEPER = {
         | atan2(F, F) | copysign(F, F) | fmod(F, F) | pow(F, F) | abs(F) | fabs(F) | sin(F) | cos(F)
         | tan(F) | atan(F) | tanh(F) | exp(F) | expm1(F) | sqrt(F) | log(F) | log1p(F) | log2(F)
         | log10(F) | asin(F) | acos(F) | sinh(F) | cosh(F) | asinh(F) | acosh(F) | atanh(F)
-        | degrees(F) | radians(F) | R.x | 0.5 | inf | (F**2) | (F**-1) | (F**SIZE) | (F**3.0) | (I**-2)
+        | degrees(F) | radians(F) | R.x | 0.5 | inf
+        | (F**2) | (F**-1) | (F**SIZE) | (F**3.0) | (I**-2)
         | (F, F)[I % 2] | (F, F)[SIZE - 2] | Record(F, V).x | _both(V, F)[1]
     """,
     INT: """
@@ -124,7 +125,8 @@ DEEPER = {
         | V.replaced(I % 4, F) | Vector((F, F, I)) | (N.T @ W) | solve(A, V) | M[I % 3] | R.v
         | Vector(each * F for each in V) | Vector(F + each for each in range(3))
         | Vector(one - other for one, other in zip(V, XS)) | Vector(x * F for x in V)
-        | Vector(x_in - F for x_in in V) | Vector(F + k for k in range(SIZE + 1)) | XS[SIZE - 1 : SIZE + 2]
+        | Vector(x_in - F for x_in in V) | Vector(F + k for k in range(SIZE + 1))
+        | XS[SIZE - 1 : SIZE + 2]
         | Vector([F, I, F]) | (Vector((F, F, F)) if Vector((F, F))[0] > F else V) | _both(V, F)[0]
         | Vector(k * x for k, x in zip(range(3, -9, -SIZE), V))
     """,
