@@ -18,6 +18,7 @@ from fmus.native.expressions import (
     WHOLE,
     Code,
 )
+from fmus.native.flat import has_only_doubles
 from fmus.native.layout import laid_out
 from fmus.native.loops import loop_over
 from fmus.native.operators import Operators
@@ -181,9 +182,9 @@ class Calls(Operators):
         [given] = node.args
         if isinstance(given, ast.GeneratorExp):
             return self._comprehension(given, made)
-        if isinstance(given, ast.Tuple) and made is Matrix:
+        if isinstance(given, (ast.List, ast.Tuple)) and made is Matrix:
             rows = [self._row(row) for row in given.elts]
-        elif isinstance(given, ast.Tuple):
+        elif isinstance(given, (ast.List, ast.Tuple)):
             codes = self.elements(given.elts, ())
             return self.literal(self._array_of(node, made, codes), codes)
         else:
@@ -210,7 +211,7 @@ class Calls(Operators):
         return vector(len(codes))
 
     def _row(self, node: ast.expr) -> Code:
-        if isinstance(node, ast.Tuple):
+        if isinstance(node, (ast.List, ast.Tuple)):
             codes = self.elements(node.elts, ())
             return self.literal(self._array_of(node, Vector, codes), codes)
         if isinstance(node, ast.GeneratorExp):
@@ -287,7 +288,7 @@ class Calls(Operators):
         owner = (self.made.name, word, type(node))
         name = self.program.name(owner, f"{self.made.name}_{word}")
         made = Function(name, {n: self.local[n] for n in captured}, None)
-        inner = type(self)(self.program, self.path, self.scope, made, set(captured))
+        inner = type(self)(self.program, self.path, self.scope, made, set(captured), self.words)
         if self.assigned is not None:
             known = self.assigned & self.functions.keys()
             inner.functions = {name: self.functions[name] for name in known}
@@ -371,6 +372,10 @@ class Calls(Operators):
         if any(has_no_size(hints[name]) for name in names):
             # What has no size of its own has the one that is passed.
             codes = [self.code(argument) for argument in given]
+            for argument, code, name in zip(given, codes, names):
+                if has_no_size(hints[name]) and not has_only_doubles(code.shape):
+                    why = f"{code.shape.word} with other than floats: write them as 1.0"
+                    raise self.fail(argument, why)
             function = self.program.function(called, [code.shape for code in codes])
             wanted = list(function.arguments.values())
             texts = [self.fit(*each).text for each in zip(given, codes, wanted)]

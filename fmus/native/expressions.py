@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import math
+import operator
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from enum import IntEnum
 from itertools import count
 from types import ModuleType
@@ -13,6 +15,7 @@ from typing import Any, NamedTuple
 
 from auv_fmu.arrays import Matrix
 from fmus.native import arrays
+from fmus.native.language import word_of
 from fmus.native.layout import quoted
 from fmus.native.program import Function, Program, Untranslatable, home, number_in_c
 from fmus.native.shapes import (
@@ -20,6 +23,7 @@ from fmus.native.shapes import (
     DOUBLE,
     INTEGER,
     NOTHING,
+    PLACED,
     TEXT,
     Shape,
     Structure,
@@ -36,19 +40,38 @@ TERNARY, OR, AND, EQUALITY, RELATION, SUM, PRODUCT, UNARY, POSTFIX = range(9)
 #: Compilers take brackets within brackets, but not any number of them.
 _DEEPEST = 200
 
-#: How a text begins that says where it is about.
-_PLACED = re.compile(r".+:\d+: ")
+
+def _power_of(base: Any, exponent: Any) -> Any:
+    """A power of an int that is no larger than sizes can be."""
+    if not (isinstance(base, int) and exponent in range(32)) or abs(base) > 2**31:
+        raise OverflowError
+    return base ** int(exponent)
+
+
+#: Operators between constants.
+_FOLDED: dict[type, Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: _power_of,
+}  # fmt: skip
 
 WHOLE = (INTEGER, BOOLEAN)
 NUMBERS = (DOUBLE, *WHOLE)
 
 
 class Code(NamedTuple):
-    """An expression in C."""
+    """An expression in C.
+
+    Attributes:
+        text, shape: what it says, and what it is.
+        binding: how tightly its outermost operator binds.
+        literal: the part of the text after the type, if the whole is a structure written out.
+
+    """
 
     text: str
     shape: Shape
     binding: int = POSTFIX
+    literal: str = ""
 
     def within(self, binding: int) -> str:
         """The text as an operand of what binds so tightly."""
@@ -67,6 +90,7 @@ class Expressions:
     Attributes:
         made: the function, of which it notes whether it raises.
         names: all names of its arguments and variables.
+        words: names in the text around it, also those that belong to expressions.
         local: shapes of the ones that have been met.
         assigned: names that have a value here; None: here no step of the program comes.
         functions: local functions by their names: the function, and what it captures.
@@ -75,7 +99,13 @@ class Expressions:
     """
 
     def __init__(
-        self, program: Program, path: str, scope: dict[str, Any], made: Function, names: set[str]
+        self,
+        program: Program,
+        path: str,
+        scope: dict[str, Any],
+        made: Function,
+        names: set[str],
+        words: set[str],
     ) -> None:
         """Begin with the arguments.
 
@@ -85,9 +115,11 @@ class Expressions:
             scope: of its module.
             made: the function in C.
             names: of its arguments and variables.
+            words: names in the text around it.
 
         """
         self.made, self.names, self.local = made, names, dict(made.arguments)
+        self.words = words
         self.assigned: set[str] | None = set(made.arguments)
         self.functions: dict[str, tuple[Function, list[str]]] = {}
         self.program, self.path, self.scope = program, path, scope
@@ -98,7 +130,7 @@ class Expressions:
     def unused(self, name: str) -> str:
         """A name for C only, which the function has not and gets now."""
         names = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
-        taken = self.names | self._made_up | self.program.taken
+        taken = self.names | self.words | self._made_up | self.program.taken
         found = next(n for n in names if n not in taken)
         self._made_up.add(found)
         self.program.words.add(found)
@@ -110,7 +142,7 @@ class Expressions:
 
     def placed(self, node: ast.AST, error: Exception) -> Exception:
         """What to raise for an error: with the line, if it does not say one."""
-        if _PLACED.match(str(error)) or isinstance(error, RecursionError):
+        if PLACED.match(str(error)) or isinstance(error, RecursionError):
             return error
         ours = isinstance(error, (TypeError, Untranslatable))
         return self.fail(node, str(error) if ours else f"{type(error).__name__}: {error}")
@@ -145,6 +177,28 @@ class Expressions:
                 return getattr(owner, node.attr, None)
         return None
 
+    def constant(self, node: ast.expr) -> float | None:
+        """The number that an expression of constants is; None: it is computed."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            operand = self.constant(node.operand)
+            return None if operand is None else -operand
+        if isinstance(node, ast.BinOp) and type(node.op) in _FOLDED:
+            one, other = self.constant(node.left), self.constant(node.right)
+            if one is None or other is None:
+                return None
+            with suppress(ArithmeticError):
+                return _FOLDED[type(node.op)](one, other)
+            return None
+        if isinstance(node, ast.Call) and self.known(node.func) is len:
+            return int(self.code(node).text)
+        value = node.value if isinstance(node, ast.Constant) else self.known(node)
+        return value if type(value) in (int, float) else None  # type: ignore[return-value]
+
+    def size(self, node: ast.expr | None) -> int | None:
+        """The int that an expression of constants is; None: it is none, or computed."""
+        value = None if node is None else self.constant(node)
+        return value if isinstance(value, int) else None
+
     def code(self, node: ast.expr, wanted: Shape | None = None) -> Code:
         """An expression in C, of a shape if there is a choice.
 
@@ -154,7 +208,7 @@ class Expressions:
         """
         name = f"_{type(node).__name__.lower()}"
         if not hasattr(self, name):
-            raise self.fail(node, f"{type(node).__name__} has no counterpart in C here")
+            raise self.fail(node, f"{word_of(node)} has no counterpart in C here")
         method: Callable[[Any, Shape | None], Code] = getattr(self, name)
         self._depth += 1
         if self._depth > _DEEPEST:
@@ -264,12 +318,16 @@ class Expressions:
         if getattr(code.shape, "made", None) is not Matrix:
             raise self.fail(node, f"two subscripts of {code.shape.word}")
         for place in node.slice.elts:
+            if isinstance(place, ast.Slice):
+                raise self.fail(node, "a slice of a Matrix: its column j is A.T[j], its row i A[i]")
             code = self._element(node, place, code)
         return code
 
     def _element(self, node: ast.Subscript, place: ast.expr, code: Code) -> Code:
         parts = code.shape.parts if isinstance(code.shape, Structure) else ()
         key = constant_of(place)
+        if key is None and not (isinstance(code.shape, Structure) and code.shape.is_array):
+            key = self.size(place)
         if isinstance(key, float) or (isinstance(key, str) and _fields(code.shape)):
             raise self.fail(node, f"there is no element {ast.unparse(place)} here")
         key = in_c(key) if isinstance(key, str) else key
@@ -301,10 +359,12 @@ class Expressions:
     def _sliced(self, node: ast.Subscript, places: ast.Slice, code: Code) -> list[Code]:
         """The elements of a constant slice."""
         bounds = [places.lower, places.upper, places.step]
-        numbers = [None if bound is None else constant_of(bound) for bound in bounds]
+        numbers = [self.size(bound) for bound in bounds]
         known = all(n is not None or bound is None for n, bound in zip(numbers, bounds))
         if not known or not isinstance(code.shape, Structure) or not code.shape.is_array:
             raise self.fail(node, "a slice other than a constant one of a vector or tuple")
+        if numbers[2] == 0:
+            raise self.fail(node, "a slice with a step of 0")
         if not is_dotted_name(node.value):
             raise self.fail(node, "a slice of something that has no name")
         parts = self.parts(node, code)[slice(*numbers)]
@@ -346,7 +406,7 @@ class Expressions:
 
     def _dict(self, node: ast.Dict, wanted: Shape | None) -> Code:
         if not isinstance(wanted, Structure):
-            raise self.fail(node, "a dict that is not a result")
+            raise self.fail(node, "a dict that is not a result: write a NamedTuple")
         keys = [in_c(ast.literal_eval(key)) for key in node.keys if key is not None]
         given = dict(zip(keys, node.values))
         for suffix, _ in wanted.parts:
@@ -360,21 +420,17 @@ class Expressions:
     def literal(self, shape: Structure, codes: Sequence[Code]) -> Code:
         """A structure with these values."""
         self.program.defined(shape)
-        texts = [_initializer(code) for code in codes]
+        texts = [code.literal or code.text for code in codes]
         if shape.is_array:
-            return Code(f"({shape.name}){{{{{', '.join(texts)}}}}}", shape)
-        names = [suffix for suffix, _ in shape.parts]
-        filled = [f"{name} = {text}" for name, text in zip(names, texts)]
-        return Code(f"({shape.name}){{{', '.join(filled) or '0'}}}", shape)
+            values = f"{{{{{', '.join(texts)}}}}}"
+        else:
+            names = [suffix for suffix, _ in shape.parts]
+            filled = [f"{name} = {text}" for name, text in zip(names, texts)]
+            values = f"{{{', '.join(filled) or '0'}}}"
+        return Code(f"({shape.name}){values}", shape, literal=values)
 
 
 def _fields(shape: Shape) -> Sequence[tuple[str, Shape]]:
     """The fields of a NamedTuple."""
     is_record = isinstance(shape, Structure) and hasattr(shape.made, "_fields")
     return shape.parts if is_record else ()  # type: ignore[union-attr]
-
-
-def _initializer(code: Code) -> str:
-    """An expression within a literal, which says its type."""
-    prefix = f"({code.shape.name}){{"
-    return code.text[len(prefix) - 1 :] if code.text.startswith(prefix) else code.text

@@ -15,7 +15,7 @@ from typing import Any
 
 from fmus.native.calls import Calls
 from fmus.native.expressions import AND, OR, WHOLE, Code
-from fmus.native.language import foreign
+from fmus.native.language import foreign, is_text, word_of
 from fmus.native.layout import INDENT, annotated, comment_of, comments_of, laid_out, quoted
 from fmus.native.loops import loop_over
 from fmus.native.program import Function, Program, Untranslatable
@@ -73,8 +73,10 @@ def function_in_c(program: Program, function: FunctionType, made: Function) -> N
         raise Untranslatable(f"{path}:{line}: {function.__name__} is not made by def in a module")
     tree = found[0]
     names = {*made.arguments, *stored_names(*tree.body)}
+    words = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
     nothing = function.__annotations__.get("return") in (None, "None")
-    _Translation(tree, Calls(program, path, function.__globals__, made, names), nothing).write()
+    calls = Calls(program, path, function.__globals__, made, names, words)
+    _Translation(tree, calls, nothing).write()
 
 
 class _Translation:
@@ -115,15 +117,8 @@ class _Translation:
     def _statement(self, node: ast.stmt, indent: str) -> Iterator[list[str]]:
         if isinstance(node, (ast.If, ast.While, ast.For)):
             yield from self._hoisting(node, indent)
-        elif isinstance(node, ast.Return) and node.value is not None:
-            if self._returns_nothing:
-                raise self._in_c.fail(
-                    node, f"{self._tree.name} returns a value, and its type is None"
-                )
-            code = self._in_c.fitting(node.value, self._made.returns)
-            if self._made.returns is None:
-                self._made.returns = code.shape
-            yield laid_out(f"return {code.text};", indent)
+        elif isinstance(node, ast.Return):
+            yield laid_out(self._returned(node), indent)
             self._in_c.assigned = None
         elif isinstance(node, (ast.Break, ast.Continue)):
             yield [f"{indent}{'break' if isinstance(node, ast.Break) else 'continue'};"]
@@ -140,6 +135,21 @@ class _Translation:
             self._local_function(node)
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             yield laid_out(f"{self._in_c.code(node.value).text};", indent)
+        elif not (isinstance(node, ast.Pass) or is_text(node)):
+            raise self._in_c.fail(node, f"{word_of(node)} is not in the language of equations")
+
+    def _returned(self, node: ast.Return) -> str:
+        name, gives = self._tree.name, not self._returns_nothing
+        if node.value is None and gives:
+            raise self._in_c.fail(node, f"{name} has a result: return a value")
+        if node.value is None:
+            return "return;"
+        if not gives:
+            raise self._in_c.fail(node, f"{name} returns a value, and its type is None")
+        code = self._in_c.fitting(node.value, self._made.returns)
+        if self._made.returns is None:
+            self._made.returns = code.shape
+        return f"return {code.text};"
 
     def _hoisting(self, node: ast.If | ast.While | ast.For, indent: str) -> Iterator[list[str]]:
         """A statement with blocks, after the declarations of what is used after it."""
@@ -175,16 +185,14 @@ class _Translation:
         yield from self._loop(node, indent)
 
     def _loop(self, node: ast.While | ast.For, indent: str) -> Iterator[list[str]]:
-        before, bound = self._in_c.assigned, []
+        before, bound, known = self._in_c.assigned, [], set[str]()
         if isinstance(node, ast.While):
             condition = self._in_c.condition(node.test).within(AND)
         else:
-            changed = set(stored_names(*node.body))
+            known = names_in(node.target) & set().union(*self._scopes)
+            changed = {*stored_names(*node.body), *known}
             loop = loop_over(self._in_c, node.target, node.iter, changed)
             bound = loop.bound
-            for name, _ in bound:
-                if any(name in scope for scope in self._scopes):
-                    raise self._in_c.fail(node, f"{name} has a value already: rename it here")
             yield [line for text in loop.before for line in laid_out(text, indent)]
         # After an error the turns that it counts may be any number: it ends at once.
         self._made.raises |= isinstance(node, ast.While) or loop.turns is None
@@ -195,7 +203,7 @@ class _Translation:
                 self._scopes[-1].add(name)
                 self._in_c.local[name] = code.shape
                 self._note(name)
-            elif name in set(loaded_names(*node.body)):
+            elif name in {*known, *loaded_names(*node.body)}:
                 body += laid_out(self._stored(node, [(name, code)]), indent + INDENT)
         body += self._block(node.body, indent + INDENT)
         self._scopes.pop()

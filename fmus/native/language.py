@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from operator import itemgetter
 from pathlib import Path
 
+import auv_fmu
+
 #: Functions of `math` that equations may use.
 MATHEMATICS = frozenset(
     (
@@ -39,76 +41,145 @@ OUTSIDE = {
     "closed_loop.closed_loop": "is the generator of instants that all else is checked against",
 }
 
+#: Where these stand: a user's module may have the same name.
+_EQUATIONS = Path(str(auv_fmu.__file__)).resolve().parent
+
+#: What readers call the parts of a program, by the names that Python's syntax tree has for them.
+_WORDS = {
+    "AnnAssign": "a variable without a value",
+    "Assert": "assert",
+    "AsyncFor": "async for",
+    "AsyncFunctionDef": "async def",
+    "AsyncWith": "async with",
+    "Attribute": "a field",
+    "AugAssign": "a changed variable",
+    "Await": "await",
+    "BitAnd": "&",
+    "BitOr": "|",
+    "BitXor": "^",
+    "ClassDef": "a class",
+    "Delete": "del",
+    "Dict": "a dict",
+    "DictComp": "a dict with a for",
+    "Expr": "a line that does nothing",
+    "For": "for",
+    "FunctionDef": "def",
+    "GeneratorExp": "an expression with a for",
+    "Global": "global",
+    "If": "if",
+    "Import": "import",
+    "ImportFrom": "import",
+    "Invert": "~",
+    "JoinedStr": "an f-string",
+    "Lambda": "lambda",
+    "List": "a list",
+    "ListComp": "a list with a for",
+    "LShift": "<<",
+    "MatMult": "@",
+    "Match": "match",
+    "NamedExpr": ":=",
+    "Nonlocal": "nonlocal",
+    "RShift": ">>",
+    "Set": "a set",
+    "SetComp": "a set with a for",
+    "Slice": "a slice",
+    "Starred": "a star",
+    "Subscript": "an element",
+    "TemplateStr": "a t-string",
+    "Try": "try",
+    "TryStar": "try",
+    "TypeAlias": "type",
+    "UAdd": "+",
+    "While": "while",
+    "With": "with",
+    "Yield": "yield",
+    "YieldFrom": "yield from",
+}
+
 #: What to write instead of what is outside the language.
 INSTEAD = {
-    "the operator Pow": "write a product, x * x, or math.pow",
+    ":=": "write the assignment on a line of its own",
+    "** with other than a whole constant": "write math.pow(x, y), or sqrt(x)",
     "a comparison other than of size": "write == or <, or an or of them",
-    "a dict whose keys are not constants": "use a NamedTuple",
-    "a raise without a text": "write raise Refusal(\"...\")",
+    "a dict whose keys are not constants": "write if and elif, or a tuple and a place in it",
+    "a dict with a for": "use a NamedTuple",
+    "a line that does nothing": "leave it out",
+    "a list": "write a tuple, or Vector((...))",
+    "a list with a for": "write Vector(... for ...)",
+    "a raise without a text": 'write raise Refusal("...")',
+    "a set": "write a tuple",
+    "a set with a for": "write Vector(... for ...)",
+    "a value of _": "give it a name: _ is for what is not used",
+    "a variable without a value": "give it a value",
     "a while that changes nothing in its condition": "write for _ in range(most): and break",
+    "all of an expression with a for": "write a loop with break",
+    "an argument _": "give it a name: _ is for what is not used",
+    "an assignment to a field": "write x = x._replace(field=...)",
+    "an assignment to a star": "write w = v[1:]",
+    "an assignment to an element": "write v = v.replaced(k, x)",
+    "an assignment to an element of a matrix": "write A = A.replaced(i, A[i].replaced(j, x))",
+    "an expression with a for": "write it in Vector(...), Matrix(...) or tuple(...)",
+    "an f-string": 'texts are for raise Refusal(f"...") only',
+    "any of an expression with a for": "write a loop with break",
+    "assert": 'write if not ...: raise Refusal("...")',
+    "async def": "write def",
+    "del": "leave it out",
+    "global": "keep it in State",
+    "if at the level of the module": "put what is no equation into a file of its own",
+    "import": "import at the top of the file",
+    "lambda": "write def",
+    "match": "write if and elif",
+    "max of an expression with a for": "write max(Vector(... for ...))",
+    "min of an expression with a for": "write min(Vector(... for ...))",
     "more names than one for a value": "write one assignment a line",
     "a name twice in one assignment": "use _ for what is not needed",
-    "the operator BitAnd": "write and, or arithmetic such as k % 8",
-    "the operator BitOr": "write or, or arithmetic",
-    "the operator BitXor": "write !=, or arithmetic",
-    "the operator LShift": "write a product",
-    "the operator RShift": "write // of a power of two",
-    "the operator UAdd": "leave it out",
-    "the name pow": "write math.pow",
-    "the name reversed": "write range(n - 1, -1, -1)",
-    "the name divmod": "write // and %",
-    "the name str": "texts are for raise Refusal(f\"...\") only",
-    "AnnAssign": "give it a value",
-    "Return": "write an if around the rest",
-    "the name sum": "write v.sum() of a Vector: Python's sum rounds differently from 3.12 on",
-    "the name hypot": "write sqrt(x * x + y * y): Python's hypot has an algorithm of its own",
-    "the name print": "use a debugger, or an output",
-    "the name list": "use a Vector or a tuple",
-    "the name sorted": "use min, max or a loop",
-    "the name any": "write a loop with break, or an or",
+    "nonlocal": "return the value",
+    "sum of an expression with a for": "write Vector(... for ...).sum()",
     "the name all": "write a loop with break, or an and",
+    "the name any": "write a loop with break, or an or",
+    "the name dict": "use a NamedTuple",
+    "the name divmod": "write // and %",
+    "the name hypot": "write sqrt(x * x + y * y): Python's hypot has an algorithm of its own",
+    "the name list": "use a Vector or a tuple",
     "the name np": "use Vector and Matrix of auv_fmu.linear_algebra",
     "the name numpy": "use Vector and Matrix of auv_fmu.linear_algebra",
+    "the name pow": "write math.pow",
+    "the name print": "use a debugger, or an output",
     "the name random": "use the hooks seed and measured",
-    "an assignment to Attribute": "write x = x._replace(field=...)",
-    "an assignment to Subscript": "write v = v.replaced(k, x)",
-    "a value of _": "give it a name: _ is for what is not used",
-    "an argument _": "give it a name: _ is for what is not used",
-    "Assert": "write if not ...: raise Refusal(\"...\")",
-    "AsyncFunctionDef": "write def",
-    "Delete": "leave it out",
-    "Expr": "leave it out",
-    "DictComp": "use a NamedTuple",
-    "GeneratorExp": "write it in Vector(...), Matrix(...) or tuple(...)",
-    "Global": "keep it in State",
-    "Import": "import at the top of the file",
-    "ImportFrom": "import at the top of the file",
-    "JoinedStr": "texts are for raise Refusal(f\"...\") only",
-    "Lambda": "write def",
-    "List": "write a tuple, or Vector((...))",
-    "ListComp": "write Vector(... for ...)",
-    "Match": "write if and elif",
-    "NamedExpr": "write the assignment on a line of its own",
-    "Nonlocal": "return the value",
-    "Set": "write a tuple",
-    "SetComp": "write Vector(... for ...)",
-    "Try": "test before: if x <= 0.0",
-    "With": "files and locks are for plain PythonFMU",
-}  # fmt: skip
+    "the name reversed": "write range(n - 1, -1, -1)",
+    "the name sorted": "use min, max or a loop",
+    "the name str": 'texts are for raise Refusal(f"...") only',
+    "the name sum": "write v.sum() of a Vector: Python's sum rounds differently from 3.12 on",
+    "the operator &": "write and, or arithmetic such as k % 8",
+    "the operator +": "leave it out",
+    "the operator <<": "write a product",
+    "the operator >>": "write // of a power of two",
+    "the operator ^": "write !=, or arithmetic",
+    "the operator |": "write or, or arithmetic",
+    "try": "test before: if x <= 0.0",
+    "with": "files and locks are for plain PythonFMU",
+}
 
 #: Packages whose functions, tuples and constants equations share.
 _PACKAGES = frozenset(("auv_fmu", "fmus"))
 
 _BASES = frozenset(("NamedTuple", "TypedDict", "ArithmeticError", "IntEnum"))
 _OPERATORS = (
-    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.MatMult, ast.USub, ast.Not,
+    ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.MatMult, ast.USub,
+    ast.Not,
 )  # fmt: skip
 _COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq)
 _CONSTANTS = (float, int, bool)
 _MODULE_LEVEL = (ast.Import, ast.ImportFrom, ast.Assign, ast.AnnAssign)
 
-#: What may take an expression with a for.
+#: What may take an expression with a for, or a list.
 _COLLECTIONS = frozenset(("Matrix", "Vector", "tuple"))
+
+#: What is often made of an expression with a for, and may not take one here.
+_REDUCTIONS = frozenset(("all", "any", "max", "min", "sum"))
+
+#: Conditions that are false when a module is imported.
+_NEVER_RUN = ("__name__ == '__main__'", "TYPE_CHECKING", "typing.TYPE_CHECKING")
 
 
 def foreign(path: Path) -> list[str]:
@@ -117,6 +188,7 @@ def foreign(path: Path) -> list[str]:
         tree = ast.parse(path.read_bytes())
     except SyntaxError as error:
         return [f"{path}:{error.lineno}: {error.msg}"]
+    _drop_aliases(tree)
     return [
         f"{path}:{line}: {what} is not in the language of equations{_advice(what)}"
         for line, what in sorted(_module(tree, path), key=itemgetter(0))
@@ -130,6 +202,26 @@ def _advice(what: str) -> str:
     return f"; {INSTEAD[known]}" if known in INSTEAD else ""
 
 
+def word_of(node: ast.AST) -> str:
+    """What readers call a part of a program."""
+    name = type(node).__name__
+    return _WORDS.get(name, name)
+
+
+def _drop_aliases(tree: ast.Module) -> None:
+    """Call Vector and Matrix by their names where they were imported by others."""
+    imports = [node for node in tree.body if isinstance(node, ast.ImportFrom)]
+    names = {
+        alias.asname: alias.name
+        for node in imports
+        for alias in node.names
+        if alias.asname and alias.name in _COLLECTIONS
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            node.id = names.get(node.id, node.id)
+
+
 _Found = Iterator["tuple[int, str]"]
 
 
@@ -138,13 +230,20 @@ def _module(tree: ast.Module, path: Path) -> _Found:
     modules = dict(_modules(tree, path))
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
-            if f"{path.stem}.{node.name}" not in OUTSIDE:
+            is_ours = path.resolve().parent == _EQUATIONS
+            if not (is_ours and f"{path.stem}.{node.name}" in OUTSIDE):
                 yield from _function(node)
                 yield from _names(node, known, modules)
         elif isinstance(node, ast.ClassDef):
             yield from _class(node)
-        elif not isinstance(node, _MODULE_LEVEL) and not _is_text(node):
-            yield node.lineno, f"{_kind(node)} at the level of the module"
+        elif not (isinstance(node, _MODULE_LEVEL) or is_text(node) or _never_runs(node)):
+            yield node.lineno, f"{word_of(node)} at the level of the module"
+
+
+def _never_runs(node: ast.stmt) -> bool:
+    """Whether a statement of a module does nothing when the module is imported."""
+    is_if = isinstance(node, ast.If) and not node.orelse
+    return is_if and ast.unparse(node.test) in _NEVER_RUN  # type: ignore[attr-defined]
 
 
 def _class(node: ast.ClassDef) -> _Found:
@@ -153,8 +252,8 @@ def _class(node: ast.ClassDef) -> _Found:
         yield node.lineno, f"the class {node.name}"
     wanted = ast.Assign if bases == ["IntEnum"] else ast.AnnAssign
     for part in node.body:
-        if not isinstance(part, wanted) and not _is_text(part):
-            yield part.lineno, f"{_kind(part)} in the class {node.name}"
+        if not isinstance(part, wanted) and not is_text(part):
+            yield part.lineno, f"{word_of(part)} in the class {node.name}"
 
 
 def _known(tree: ast.Module, path: Path) -> Iterator[str]:
@@ -176,7 +275,8 @@ def _known(tree: ast.Module, path: Path) -> Iterator[str]:
                 allowed = MATHEMATICS | CONSTANTS
                 yield from (own for name, own in names_in.items() if name in allowed)
             elif package in _PACKAGES or _lies_beside(path, package):
-                yield from names_in.values()
+                yield from (own if name not in _COLLECTIONS else name
+                            for name, own in names_in.items())  # fmt: skip
 
 
 def _modules(tree: ast.Module, path: Path) -> Iterator[tuple[str, str]]:
@@ -236,8 +336,8 @@ def _function(node: ast.FunctionDef) -> _Found:
 
 def _block(statements: list[ast.stmt]) -> _Found:
     for node in statements:
-        if isinstance(node, ast.Return) and node.value is not None:
-            yield from _expression(node.value)
+        if isinstance(node, ast.Return):
+            yield from _expression(node.value) if node.value is not None else ()
         elif isinstance(node, ast.Assign):
             if len(node.targets) != 1:
                 yield node.lineno, "more names than one for a value"
@@ -255,8 +355,8 @@ def _block(statements: list[ast.stmt]) -> _Found:
             yield from _raised(node)
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             yield from _expression(node.value)
-        elif not isinstance(node, (ast.Break, ast.Continue, ast.Pass)) and not _is_text(node):
-            yield node.lineno, _kind(node)
+        elif not isinstance(node, (ast.Break, ast.Continue, ast.Pass)) and not is_text(node):
+            yield node.lineno, word_of(node)
 
 
 def _compound(node: ast.If | ast.While | ast.For | ast.FunctionDef) -> _Found:
@@ -275,7 +375,7 @@ def _compound(node: ast.If | ast.While | ast.For | ast.FunctionDef) -> _Found:
         if not names & stored:
             yield node.lineno, "a while that changes nothing in its condition"
     if node.orelse and not isinstance(node, ast.If):
-        yield node.orelse[0].lineno, f"else of a {_kind(node).lower()}"
+        yield node.orelse[0].lineno, f"else of a {word_of(node)}"
     yield from _block([*node.body, *node.orelse])
 
 
@@ -287,7 +387,9 @@ def _target(node: ast.expr) -> _Found:
         for element in node.elts:
             yield from _target(element)
     elif not isinstance(node, ast.Name):
-        yield node.lineno, f"an assignment to {_kind(node)}"
+        is_of_matrix = isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple)
+        what = f"{word_of(node)} of a matrix" if is_of_matrix else word_of(node)
+        yield node.lineno, f"an assignment to {what}"
 
 
 def _raised(node: ast.Raise) -> _Found:
@@ -312,7 +414,7 @@ _EXPRESSIONS = (
 
 
 def _expression(node: ast.expr) -> _Found:
-    wrong = _wrong(node) if isinstance(node, _EXPRESSIONS) else _kind(node)
+    wrong = _wrong(node) if isinstance(node, _EXPRESSIONS) else word_of(node)
     if wrong:
         yield node.lineno, wrong
     for part in _parts(node):
@@ -330,8 +432,19 @@ def _parts(node: ast.expr) -> Iterator[ast.AST]:
     for part in (*node.args, *(keyword.value for keyword in node.keywords)):
         if called in _COLLECTIONS and isinstance(part, ast.GeneratorExp):
             yield from _comprehension(part)
+        elif called in _COLLECTIONS:
+            yield from _items(part)
         else:
             yield part
+
+
+def _items(node: ast.expr) -> Iterator[ast.AST]:
+    """The elements of a list, in which each may be one, or of a tuple of lists."""
+    if not isinstance(node, (ast.List, ast.Tuple)):
+        yield node
+        return
+    for element in node.elts:
+        yield from _items(element) if isinstance(element, ast.List) else [element]
 
 
 def _comprehension(node: ast.GeneratorExp) -> Iterator[ast.AST]:
@@ -348,13 +461,17 @@ def _wrong(node: ast.expr) -> str | None:
     if isinstance(node, ast.Constant) and type(node.value) not in (*_CONSTANTS, str):
         wrong = f"the constant {node.value!r}"
     elif isinstance(node, (ast.BinOp, ast.UnaryOp)) and not isinstance(node.op, _OPERATORS):
-        wrong = f"the operator {_kind(node.op)}"
+        wrong = f"the operator {word_of(node.op)}"
+    elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Pow) and _is_broken(node.right):
+        wrong = "** with other than a whole constant"
     elif isinstance(node, ast.Compare) and not all(isinstance(o, _COMPARISONS) for o in node.ops):
         wrong = "a comparison other than of size"
     elif isinstance(node, ast.Dict) and not all(isinstance(k, ast.Constant) for k in node.keys):
         wrong = "a dict whose keys are not constants"
     elif isinstance(node, ast.Call) and any(keyword.arg is None for keyword in node.keywords):
         wrong = "a call with **"
+    elif isinstance(node, ast.Call) and _reduces(node):
+        wrong = f"{ast.unparse(node.func)} of an expression with a for"
     elif _is_of_math(node):
         wrong = f"the name {ast.unparse(node)}"
     return wrong
@@ -366,10 +483,22 @@ def _is_of_math(node: ast.expr) -> bool:
     return is_of_it and ast.unparse(node)[5:] not in MATHEMATICS | CONSTANTS
 
 
-def _is_text(node: ast.stmt) -> bool:
+def _reduces(node: ast.Call) -> bool:
+    """Whether a call is such as `sum(x for x in v)`."""
+    takes_for = any(isinstance(one, (ast.GeneratorExp, ast.ListComp)) for one in node.args)
+    return takes_for and ast.unparse(node.func) in _REDUCTIONS
+
+
+def _is_broken(exponent: ast.expr) -> bool:
+    """Whether an exponent that is written out is no whole number."""
+    try:
+        value = ast.literal_eval(exponent)
+    except ValueError:
+        return False
+    return not isinstance(value, int) and not (isinstance(value, float) and value.is_integer())
+
+
+def is_text(node: ast.stmt) -> bool:
+    """Whether a statement is a text, as docstrings are."""
     value = node.value if isinstance(node, ast.Expr) else None
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
-
-
-def _kind(node: ast.AST) -> str:
-    return type(node).__name__

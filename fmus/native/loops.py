@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 from typing import NamedTuple
 
-from fmus.native.expressions import Code, Expressions
+from fmus.native.expressions import SUM, Code, Expressions
 from fmus.native.shapes import INTEGER, Structure, in_c
-from fmus.native.variables import is_fixed_name, names_in
+from fmus.native.variables import is_fixed_name
 
 
 class Loop(NamedTuple):
@@ -41,22 +41,20 @@ def loop_over(within: Expressions, target: ast.expr, iterable: ast.expr, changed
         within: translates expressions of the function.
         target: what gets the values.
         iterable: what they come from.
-        changed: names that the body changes.
+        changed: names that the body changes, or that have a value already.
 
     Raises:
         Untranslatable: it is nothing that a loop can run over.
 
     """
-    for name in sorted(names_in(target) & changed - {"_"}):
-        raise within.fail(target, f"{name} is the loop's own and cannot be changed in it")
     if _called(within, iterable) is range:
         assert isinstance(iterable, ast.Call)
-        return _range(within, target, iterable)
+        return _range(within, target, iterable, changed)
     before: list[str] = []
     names = (n.id.lstrip("_") for n in ast.walk(target) if isinstance(n, ast.Name))
     first = next(filter(None, names), "x")
     items = _Items(within, before, changed, first)
-    place = Code(within.unused(f"{first}_at"), INTEGER)
+    place = Code(in_c(within.unused(f"{first}_at")), INTEGER)
     bound, count = items.taken(target, iterable, place)
     at = place.text
     return Loop(before, f"int {at} = 0", f"{at} < {count}", f"{at}++", bound, count)
@@ -66,16 +64,10 @@ def _called(within: Expressions, node: ast.expr) -> object:
     return within.known(node.func) if isinstance(node, ast.Call) else None
 
 
-def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
+def _range(within: Expressions, target: ast.expr, call: ast.Call, changed: set[str]) -> Loop:
     if not isinstance(target, ast.Name):
         raise within.fail(target, "more than one name for the numbers of a range")
-    within.check_plain(call, "range")
-    if not 1 <= len(call.args) <= 3:
-        raise within.fail(call, f"range with {len(call.args)} arguments")
-    arguments = [_bound(within, argument) for argument in call.args]
-    if len(arguments) == 1:
-        arguments = [Code("0", INTEGER), *arguments]
-    first, stop, step = [*arguments, Code("1", INTEGER)][:3]
+    first, stop, step = _bounds(within, call)
     numbers = [_number(code.text) for code in (first, stop, step)]
     if not numbers[2]:
         raise within.fail(call, "a step of a range that is not a constant other than 0")
@@ -91,6 +83,9 @@ def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
         # The counter may pass the largest int.
         at = within.unused(f"{name}_at")
         kind, counter = "long long", Code(f"(int){at}", INTEGER)
+    elif target.id in changed and name != "_":
+        at, kind = within.unused(f"{name}_at"), "int"
+        counter = Code(at, INTEGER)
     else:
         at, kind, counter = name, "int", Code(name, INTEGER)
     change = {1: "++", -1: "--"}.get(numbers[2], f" += {step.text}")
@@ -99,10 +94,21 @@ def _range(within: Expressions, target: ast.expr, call: ast.Call) -> Loop:
     return Loop(before, begin, test, f"{at}{change}", bound, known)
 
 
+def _bounds(within: Expressions, call: ast.Call) -> list[Code]:
+    """Where a range begins and ends, and its step."""
+    within.check_plain(call, "range")
+    if not 1 <= len(call.args) <= 3:
+        raise within.fail(call, f"range with {len(call.args)} arguments")
+    bounds = [_bound(within, argument) for argument in call.args]
+    if len(bounds) == 1:
+        bounds = [Code("0", INTEGER), *bounds]
+    return [*bounds, Code("1", INTEGER)][:3]
+
+
 def _bound(within: Expressions, node: ast.expr) -> Code:
-    """A bound of a range; a constant of a module is the number that it stands for."""
-    value = within.known(node)
-    if type(value) is int:
+    """A bound of a range; what consists of constants is the number that it stands for."""
+    value = within.size(node)
+    if value is not None:
         return within.code(ast.copy_location(ast.Constant(value), node))
     return within.integer(node, "a bound of a range")
 
@@ -141,6 +147,9 @@ class _Items:
                 raise self._within.fail(target, "another number of names than zip has parts")
             pairs = [self.taken(t, i, place) for t, i in zip(target.elts, iterable.args)]
             return [one for bound, _ in pairs for one in bound], min(n for _, n in pairs)
+        if called is range:
+            assert isinstance(iterable, ast.Call)
+            return self._numbers(target, iterable, place)
         code = self._named(iterable, self._within.code(iterable))
         if not isinstance(code.shape, Structure) or not code.shape.is_array:
             raise self._within.fail(
@@ -149,12 +158,27 @@ class _Items:
         item = Code(f"{code.text}.v[{place.text}]", code.shape.parts[0][1])
         return list(self._within.taken_apart(target, item)), len(code.shape.parts)
 
+    def _numbers(
+        self, target: ast.expr, call: ast.Call, place: Code
+    ) -> tuple[list[tuple[str, Code]], int]:
+        """The numbers of a range that stands beside something else."""
+        first, stop, step = (_number(code.text) for code in _bounds(self._within, call))
+        if first is None or stop is None or not step:
+            raise self._within.fail(call, "a range of other than constants within a zip")
+        n = len(range(first, stop, step))
+        if abs(step) * n >= 2**31:
+            raise self._within.fail(call, "a range of so many numbers within a zip")
+        moved = f"{place.text} * {step}" if step != 1 else place.text
+        text = f"{first} + {moved}" if first else moved
+        item = Code(text, INTEGER, SUM)
+        return list(self._within.taken_apart(target, item)), n
+
     def _named(self, node: ast.expr, code: Code) -> Code:
         """The same, in a variable if it is no name, or if the body changes what it is made of."""
         used = {n.id for n in ast.walk(node) if isinstance(n, ast.Name)}
         if is_fixed_name(node) and not used & self._changed:
             return code
-        name = self._within.unused(f"{self._name}_all")
+        name = in_c(self._within.unused(f"{self._name}_all"))
         self._within.program.defined(code.shape)
         self._before.append(f"const {code.shape.name} {name} = {code.text};")
         return Code(name, code.shape)

@@ -21,6 +21,7 @@ from fmus.native.expressions import (
     Code,
     Expressions,
 )
+from fmus.native.language import word_of
 from fmus.native.program import number_in_c
 from fmus.native.shapes import BOOLEAN, DOUBLE, INTEGER, Shape
 from fmus.native.variables import is_dotted_name
@@ -46,7 +47,10 @@ class Operators(Expressions):
     """Translates what operators make, and the other expressions of a function."""
 
     def _binop(self, node: ast.BinOp, wanted: Shape | None) -> Code:
-        left, right = self.code(node.left), self.code(node.right)
+        left = self.code(node.left)
+        if isinstance(node.op, ast.Pow):
+            return self._power(node, left)
+        right = self.code(node.right)
         if arrays.is_array(left.shape) or arrays.is_array(right.shape):
             return self._of_arrays(node, left, right)
         for side, code in ((node.left, left), (node.right, right)):
@@ -58,7 +62,7 @@ class Operators(Expressions):
         if type(node.op) in _DIVISIONS:
             return self._divided(node, left, right, is_float)
         if type(node.op) not in _BINARY:
-            raise self.fail(node, f"the operator {type(node.op).__name__}")
+            raise self.fail(node, f"the operator {word_of(node.op)}")
         sign, binding = _BINARY[type(node.op)]
         if is_float:
             text = f"{left.within(binding)} {sign} {right.within(binding + 1)}"
@@ -75,6 +79,19 @@ class Operators(Expressions):
         function = of_floats if is_float else of_integers
         shape = DOUBLE if is_float or is_quotient else INTEGER
         return Code(f"{function}({left.argument}, {right.argument})", shape)
+
+    def _power(self, node: ast.BinOp, base: Code) -> Code:
+        exponent = self.constant(node.right)
+        if exponent is None or not float(exponent).is_integer():
+            why = "** with other than a constant whole number: write math.pow(x, y), or sqrt(x)"
+            raise self.fail(node, why)
+        if base.shape not in NUMBERS:
+            raise self.fail(node.left, f"{base.shape.word} where a number is wanted")
+        self.made.raises = True
+        if base.shape in WHOLE and isinstance(exponent, int) and exponent >= 0:
+            return Code(f"INT_POW({base.argument}, {number_in_c(exponent)})", INTEGER)
+        number = self.number(node.left, base)
+        return Code(f"RAISED({number.argument}, {number_in_c(float(exponent))})", DOUBLE)
 
     def _of_arrays(self, node: ast.BinOp, left: Code, right: Code) -> Code:
         operation = arrays.binary(self.program, node.op, left.shape, right.shape)
@@ -101,8 +118,8 @@ class Operators(Expressions):
             if operand.text.endswith(" != 0.0") and operand.binding == EQUALITY:
                 return Code(f"{operand.text[:-7]} == 0.0", BOOLEAN, EQUALITY)
             return Code(f"!{operand.within(UNARY)}", BOOLEAN, UNARY)
-        if isinstance(node.op, ast.UAdd):
-            raise self.fail(node, "the operator +")
+        if not isinstance(node.op, ast.USub):
+            raise self.fail(node, f"the operator {word_of(node.op)}")
         if isinstance(node.operand, ast.Constant) and type(node.operand.value) is int:
             return Code(number_in_c(-node.operand.value), INTEGER, UNARY)
         operand = self.code(node.operand)

@@ -19,6 +19,7 @@ from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,
     INTEGER,
+    PLACED,
     Shape,
     Structure,
     declaration,
@@ -26,7 +27,9 @@ from fmus.native.shapes import (
     has_no_size,
     in_c,
     inner_structures,
+    is_of_library,
     matrix,
+    place_of,
     shape_of,
     structure,
     vector,
@@ -95,6 +98,7 @@ class Program:
         """
         self._translate = translate
         self.structures: dict[str, str] = {}
+        self._made: dict[str, Structure] = {}
         self.constants: dict[str, str] = {}
         self.functions: dict[Hashable, Function] = {}
         self._begun: set[Hashable] = set()
@@ -108,7 +112,9 @@ class Program:
 
     def name(self, owner: Hashable, name: str) -> str:
         """A name in C that only its owner has, and no variable of a module met so far."""
-        taken = words_of_runtime() | self.words
+        taken = words_of_runtime() | self.words | self.structures.keys()
+        if is_of_library(name):
+            name += "_"
         while name in taken or self._owners.setdefault(name, owner) != owner:
             name += "_"
         return name
@@ -120,9 +126,10 @@ class Program:
     def defined(self, shape: Shape) -> Shape:
         """The shape, whose structures are defined."""
         for part in inner_structures(shape):
-            text = declaration(part)
-            if self.structures.setdefault(part.name, text) != text:
-                raise Untranslatable(f"two classes have the name {part.name}: rename one")
+            other, text = self._made.setdefault(part.name, part), declaration(part)
+            is_taken = part.name in self._owners
+            if is_taken or self.structures.setdefault(part.name, text) != text:
+                raise Untranslatable(_alike(part, other))
         return shape
 
     def constant(self, module: str, name: str, value: Any) -> tuple[str, Shape]:
@@ -153,19 +160,32 @@ class Program:
         self._begun.add(key)
         self.words |= _words(function.__module__)
         arguments = {
-            name: shapes[i] if has_no_size(hint) and i < len(shapes) else self.shape(hint)
+            name: shapes[i] if has_no_size(hint) and i < len(shapes) else
+            self._shape_in(function, f"the argument {name}", hint)
             for i, (name, hint) in enumerate(hints.items())
-        }
+        }  # fmt: skip
         name = c_name(function.__module__, function.__name__)
         if unsized:
             sizes = "_".join(shape.name for shape in arguments.values())
             name = re.sub(r"\W+", "_", f"{name}_{sizes}")
         is_open = returns in (None, type(None)) or has_no_size(returns)
-        shape = None if is_open else self.shape(returns)
+        shape = None if is_open else self._shape_in(function, "the result", returns)
         made = Function(self.name(key, name), arguments, shape)
         self._translate(self, function, made)
         self.functions[key] = made
         return made
+
+    def _shape_in(self, function: FunctionType, what: str, hint: Any) -> Shape:
+        """The shape of an argument or a result."""
+        try:
+            return self.shape(hint)
+        except (TypeError, Untranslatable) as error:
+            if PLACED.match(str(error)):
+                raise
+            code = function.__code__
+            place = f"{code.co_filename}:{code.co_firstlineno}"
+            why = f"{what} of {function.__name__}: {error}"
+            raise Untranslatable(f"{place}: {why}") from None
 
     def helper(self, name: str, arguments: dict[str, Shape], returns: Shape, body: str) -> Function:
         """A function that is written in C, made once; it raises if it uses DIV or PLACE."""
@@ -178,6 +198,19 @@ class Program:
             made.text = f"{made.head}\n{body}\n}}"
             self.functions[name] = made
         return self.functions[name]
+
+
+def _alike(*structures: Structure) -> str:
+    """What to say of structures that would have one name in C; the user's class is named first."""
+    made = [shape.made for shape in structures if shape.made]
+    made.sort(key=lambda one: one.__module__.partition(".")[0] in ("auv_fmu", "fmus"))
+    if not made:
+        return f"two things have the name {structures[0].name} in C: rename a class"
+    beside = f" of {made[1].__module__}" if len(made) > 1 else ""
+    return (
+        f"{place_of(made[0])}the class {made[0].__name__} has the name of another "
+        f"structure{beside} in C: rename it"
+    )
 
 
 @cache

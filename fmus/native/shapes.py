@@ -19,6 +19,9 @@ from fmus.ports.groups import hints_of, is_class
 #: What all components share in C.
 RUNTIME = Path(__file__).parent / "runtime"
 
+#: How a text begins that says where it is about.
+PLACED = re.compile(r".+:\d+: ")
+
 #: A vector or matrix may be copied to the stack, which has 1 MB in Windows.
 _MOST_NUMBERS = 65_536
 
@@ -33,7 +36,10 @@ _TAKEN = frozenset(
         "bool", "catch", "delete", "friend", "linux", "namespace", "new", "operator", "private",
         "protected", "public", "template", "this", "throw", "unix", "using", "virtual",
         # macros and types of the headers; longer ones in capitals are all taken
-        "EOF", "Error", "M_E", "NAN", "environ", "errno", "matherr", "stderr", "stdin", "stdout",
+        "EOF", "L_ctermid", "L_tmpnam", "L_tmpnam_s", "M_E", "NAN", "P_tmpdir", "environ", "errno",
+        "isascii", "iscsym", "iscsymf", "math_errhandling", "matherr", "onexit_t", "pclose",
+        "popen", "sa_handler", "sa_sigaction", "sched_priority", "stderr", "stdin", "stdout",
+        "sys_errlist", "sys_nerr", "toascii", "wcswcs", "wpopen",
         # what functions call or are given
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
         "cosh", "error", "exp", "expm1", "fabs", "floor", "fmod", "isfinite", "isinf", "isnan",
@@ -105,20 +111,41 @@ _SCALARS: dict[Any, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN, str: 
 _NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
 
 
-#: Words in capitals, for the headers of each system have macros of their own; structures' names.
-_PATTERNS = re.compile(
-    r"[A-Z][A-Z0-9_]{3,}|_[A-Z]\w*|__\w*|(Vector|Matrix|int|double)(\d*x?\d+|_int|_double)\w*"
+#: Words in capitals: the headers of each system have macros of their own.
+_MACROS = re.compile(r"[A-Z][A-Z0-9_]{3,}")
+
+#: Functions and types of the C libraries that could be those of a module and a function in it.
+_LIBRARY = re.compile(
+    r"(aligned|at|clock|cpu|fmi2|fmi3|function|getdate|int|is|max|mem|open|posix|pthread|quick|rlim|sched"
+    r"|sig|stack|str|sys|syscall|timer|timespec|u|uint|va)_\w+|[a-z]+_([a-z]|unlocked|explicit)"
 )
+
+#: Names of structures: of classes, and of tuples, which are joined from those of their parts.
+_CLASS = r"[A-Z][a-z]\w+"
+_STRUCTURE = rf"{_CLASS}|class_\w+|(int|double)(x\d+|_\w+)"
+
+#: Variables that have one, or begin with _ as much in headers does.
+_PREFIXED = re.compile(rf"(v_)*({_STRUCTURE}|_\w+)")
+
+#: Classes that would have the name of a vector or a matrix.
+_ARRAYS = re.compile(r"(Vector|Matrix)\d\w*")
 
 
 @cache
 def in_c(name: str) -> str:
-    """The name of a variable or a member in C."""
-    # A mark over a letter is one of its own, which not all compilers take.
-    name = "".join(f"_u{ord(c):04x}" if category(c).startswith("M") else c for c in name)
+    """The name of a variable or a member in C; no two have the same."""
+    name = _without_marks(name)
+    if _PREFIXED.fullmatch(name):
+        return f"v_{name}"
     stem = name.rstrip("_")
-    is_taken = stem in _TAKEN | _arithmetic() or _PATTERNS.fullmatch(stem)
+    is_taken = stem in _TAKEN | _arithmetic() or _MACROS.fullmatch(stem)
     return f"{name}_" if is_taken else name
+
+
+def _without_marks(name: str) -> str:
+    """A name in which a mark over a letter is a number: not all compilers take marks."""
+    name = re.sub(r"_u+(?=[0-9a-f]{5})", r"\g<0>u", name)
+    return "".join(f"_u{ord(c):05x}" if category(c).startswith("M") else c for c in name)
 
 
 @cache
@@ -127,6 +154,11 @@ def words_of_runtime() -> frozenset[str]:
     texts = [path.read_text(encoding="utf-8") for path in sorted(RUNTIME.glob("*.[ch]"))]
     code = re.sub(r"/\*.*?\*/", "", "\n".join(texts), flags=re.DOTALL)
     return frozenset(re.findall(r"\b[A-Za-z_]\w*\b", code))
+
+
+def is_of_library(name: str) -> bool:
+    """Whether a C library may have a function, a type or a macro of this name."""
+    return name in _TAKEN or any(one.fullmatch(name) for one in (_LIBRARY, _MACROS))
 
 
 @cache
@@ -160,18 +192,44 @@ def shape_of(hint: Any) -> Shape:
     if is_class(hint, IntEnum):
         return INTEGER
     if isinstance(hint, type) and hasattr(hint, "__annotations__"):
-        parts = [(f".{in_c(name)}", shape_of(part)) for name, part in hints_of(hint).items()]
-        name = in_c(hint.__name__)
-        # A name in lower case may be that of a variable, too.
-        is_taken = name in words_of_runtime() or not name[0].isupper()
+        fields = hints_of(hint).items()
+        parts = [(f".{in_c(name)}", _field(hint, name, part)) for name, part in fields]
+        name = _without_marks(hint.__name__)
+        is_free = re.fullmatch(_CLASS, name) and not _ARRAYS.fullmatch(name)
+        is_taken = not is_free or name in words_of_runtime()
         return Structure(f"class_{name}" if is_taken else name, tuple(parts), hint)
     name = hint.__name__ if isinstance(hint, type) else hint
     raise TypeError(f"{name} is not a type in the language of equations")
 
 
+def _field(made: type, name: str, hint: Any) -> Shape:
+    """The shape of a field of a class."""
+    try:
+        shape = shape_of(hint)
+        if shape == TEXT:
+            raise TypeError("texts are for raise Refusal(...) only")
+    except TypeError as error:
+        if PLACED.match(str(error)):
+            raise
+        raise TypeError(f"{place_of(made, name)}{made.__name__}.{name}: {error}") from None
+    return shape
+
+
+def place_of(made: type, field: str = "") -> str:
+    """Where a class stands, or a field of it, as the beginning of a message; empty: not known."""
+    try:
+        lines, first = inspect.getsourcelines(made)
+        path = inspect.getsourcefile(made)
+    except OSError:
+        return ""
+    at = [i for i, line in enumerate(lines) if field and re.match(rf"\s+{field}\s*:", line)]
+    return f"{path}:{first + (at or [0])[0]}: "
+
+
 def has_no_size(hint: Any) -> bool:
-    """Whether a type is a vector or a matrix of any size."""
-    return hint in (Vector, Matrix)
+    """Whether a type is a vector or a matrix of any size, or a tuple with one."""
+    parts = get_args(hint) if get_origin(hint) is tuple else ()
+    return hint in (Vector, Matrix) or any(map(has_no_size, parts))
 
 
 def vector(n: int) -> Structure:

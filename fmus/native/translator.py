@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from functools import cache
 from textwrap import wrap
 
@@ -10,7 +11,7 @@ from fmus.native.flat import Passage, count, passage
 from fmus.native.functions import function_in_c
 from fmus.native.layout import LINE_WIDTH, laid_out, quoted
 from fmus.native.program import Function, Program, Untranslatable
-from fmus.native.shapes import Structure, closed, in_c, shape_of
+from fmus.native.shapes import Shape, Structure, closed, in_c, shape_of
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 
@@ -171,8 +172,9 @@ def _moved(
 def _measured(said: Behaviour, outputs: Passage, function: Function) -> list[str]:
     """What gives a group of outputs its noise."""
     shape = function.arguments["n"]
-    drawn = [f"draws[{i}]" for i in range(said.draws)]
-    n = f"({shape.name}){{{{{', '.join(drawn)}}}}}" if isinstance(shape, Structure) else drawn[0]
+    n = _drawn(shape, map("draws[{}]".format, range(said.draws)))
+    if isinstance(shape, Structure):
+        n = f"({shape.name}){n}"
     where = "groups." if outputs.gather else "outputs->"
     group = f"{where}{in_c(said.noisy)}"
     given = {"parameters": "*parameters", "n": n, said.noisy: group}
@@ -184,6 +186,14 @@ def _measured(said: Behaviour, outputs: Passage, function: Function) -> list[str
         change,
         outputs.put("", "outputs", "groups"),
     ]
+
+
+def _drawn(shape: Shape, draws: Iterator[str]) -> str:
+    """The next numbers in a shape, as an initializer."""
+    if not isinstance(shape, Structure):
+        return next(draws)
+    parts = ", ".join(_drawn(part, draws) for _, part in shape.parts)
+    return f"{{{{{parts}}}}}" if shape.is_array else f"{{{parts}}}"
 
 
 def _defined(name: str, arguments: str, body: list[str]) -> str:

@@ -1,16 +1,15 @@
 """What a component's `behaviour.py` may say: the hooks that both kinds of FMU call.
 
-Each public function of a behaviour is one of the :class:`Hooks`. It takes the hook's
-arguments that it needs, under their names and in any order; functions that only the behaviour
-itself calls begin with an underscore. All of it is in the language of equations (language.md),
-because the C kind runs its translation.
+The functions of a behaviour are the :class:`Hooks`, and those that they call. A hook takes the
+arguments that it needs, under their names and in any order. All of it is in the language of
+equations (language.md), because the C kind runs its translation.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from inspect import signature
-from types import FunctionType, GenericAlias, ModuleType
+from types import CodeType, FunctionType, GenericAlias, ModuleType
 from typing import Any, NamedTuple, Protocol, get_args
 
 from fmus.ports.groups import (
@@ -267,10 +266,10 @@ def _hooks(module: ModuleType) -> dict[str, FunctionType]:
     for name, value in said.items():
         if name in HOOKS and not isinstance(value, FunctionType):
             raise Misdeclared(f"{where}.{name} is no function, but has the name of a hook", name)
-        own = isinstance(value, FunctionType) and value.__module__ == where
-        if own and name not in HOOKS and not name.startswith("_"):
-            others = f"{', '.join(HOOKS)}; names of other functions begin with _"
-            raise Misdeclared(f"{where}.{name} is not one of the hooks {others}", name)
+    if unused := _without_use(module):
+        others = f"{', '.join(HOOKS)}, and no function here calls it"
+        alike = f"; nor {', '.join(unused[1:])}" if len(unused) > 1 else ""
+        raise Misdeclared(f"{where}.{unused[0]} is not one of the hooks {others}{alike}", unused[0])
     return {name: said[name] for name in HOOKS if name in said}
 
 
@@ -327,6 +326,25 @@ def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) ->
         takes = "returns" if argument == "return" else f"takes {argument} as"
         why = f"{takes} {word(form(hint))}; write {word(form(wanted))}"
         raise Misdeclared(f"{where}.{name} {why}", name, argument)
+
+
+def _without_use(module: ModuleType) -> list[str]:
+    """Functions that nothing calls: perhaps hooks whose names are misspelt."""
+    own = {
+        name: value
+        for name, value in vars(module).items()
+        if isinstance(value, FunctionType) and value.__module__ == module.__name__
+    }
+    used = {name for function in own.values() for name in _names_in(function.__code__)}
+    return [name for name in own if name not in {*HOOKS, *used} and not name.startswith("_")]
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    """The names outside of a function that it uses, also in functions within it."""
+    yield from code.co_names
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _names_in(constant)
 
 
 def _types(where: str, hook: FunctionType) -> dict[str, Any]:

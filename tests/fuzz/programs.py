@@ -55,6 +55,23 @@ YS = Vector((3.0, -1.0, 0.0, 0.5, 0.25))
 A = Matrix(((2.0, -1.0, 0.5), (0.0, 1.5, -0.25), (1.0, 0.0, 3.0)))
 PRIMES = (2, 3, 5, 7)
 TABLE = ((1, 50.0), (2, -0.5), (0, 1e3))
+SIZE = 2
+
+
+def _check(x: float, k: int) -> None:
+    """Refuse some numbers, and return early from others."""
+    if x < 3.0:
+        return
+    for j in range(k % 3):
+        if j > 0:
+            return
+    if k == 1:
+        raise Refusal(f"{x:g} is refused")
+
+
+def _both(v: Vector, x: float) -> tuple[Vector, float]:
+    """A result of any size."""
+    return x * v, v.sum()
 '''
 
 #: Names that loops and expressions share, and local functions have beside those around them.
@@ -90,12 +107,14 @@ DEEPER = {
         | tan(F) | atan(F) | tanh(F) | exp(F) | expm1(F) | sqrt(F) | log(F) | log1p(F) | log2(F)
         | log10(F) | asin(F) | acos(F) | sinh(F) | cosh(F) | asinh(F) | acosh(F) | atanh(F)
         | degrees(F) | radians(F) | R.x | 0.5 | inf
+        | (F**2) | (F**-1) | (F**SIZE) | (F**3.0) | (I**-2)
+        | (F, F)[I % 2] | (F, F)[SIZE - 2] | Record(F, V).x | _both(V, F)[1]
     """,
     INT: """
         (I + I) | (I - I) | I * I | (I // I) | (I % I) | abs(I) | min(I, I) | max(I, I, 2) | -I | 5
         | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
         | int(B)
-        | Mode.HIGH | R.k
+        | Mode.HIGH | R.k | (I**2) | ((I % 7)**3) | (I**0) | PRIMES[SIZE]
     """,
     BOOL: """
         (F < F) | (F <= I) | (I > F) | (I >= I) | (F == F) | (I != I) | (B and B) | (B or B)
@@ -105,16 +124,25 @@ DEEPER = {
         (V + V) | (V - V) | (F * V) | (V * F) | (V / F) | (-V) | (V * 2) | (A @ V) | (M @ V)
         | V.replaced(I % 4, F) | Vector((F, F, I)) | (N.T @ W) | solve(A, V) | M[I % 3] | R.v
         | Vector(each * F for each in V) | Vector(F + each for each in range(3))
-        | Vector(one - other for one, other in zip(V, XS))
+        | Vector(one - other for one, other in zip(V, XS)) | Vector(x * F for x in V)
+        | Vector(x_in - F for x_in in V) | Vector(F + k for k in range(SIZE + 1))
+        | XS[SIZE - 1 : SIZE + 2]
+        | Vector([F, I, F]) | (Vector((F, F, F)) if Vector((F, F))[0] > F else V) | _both(V, F)[0]
+        | Vector(k * x for k, x in zip(range(3, -9, -SIZE), V))
     """,
-    V2: "Vector((F, F)) | $v[1:] | (N @ V) | (W + YS[3:]) | Vector(a + k for k, a in enumerate(W))",
+    V2: "Vector((F, F)) | $v[1:] | (N @ V) | (W + YS[3:]) | Vector(a + k for k, a in enumerate(W))"
+    " | YS[:SIZE] | Vector(x * F for x in W)",
     M33: """
         (M @ M) | (M + A) | (M - A.T) | M.T | (-M) | (F * M) | (M / F) | (N.T @ N)
         | M.replaced(I % 3, V) | Matrix((p + q * F for q in range(3)) for p in range(3))
+        | Matrix((x * x_in + F for x_in in V) for x in V) | Matrix((x - F for x in V) for x in V)
+        | Matrix([V, (F, 0.0, 1.0), [1.0, F, I]]) | (Matrix((V, V, V)) if B else M)
     """,
     M23: "Matrix((V, V)) | (N @ A) | Matrix(((1.0, F, 0.0), (2.0, 0.5, I)))",
     RECORD: """
         Record(F, V, on=B) | Record(v=V, x=F, k=I) | $r._replace(x=F, mode=Mode.HIGH)
+        | (Record(F, V) if B else R) | (R if Record(F, V).x > F else Record(F, V, I, B))
+        | Record(F, (V if (F, F)[0] > F else XS[:3]), on=(B if B else $r.on))
     """,
 }
 
@@ -132,7 +160,14 @@ class Program:
 
     def text(self) -> str:
         """The function."""
-        arguments: Variables = {"x": FLOAT, "y": FLOAT, "k": INT, "on": BOOL, "v": V3, "r": RECORD}
+        arguments: Variables = {
+            "x": FLOAT,
+            "x_in": FLOAT,
+            "k": INT,
+            "on": BOOL,
+            "v": V3,
+            "r": RECORD,
+        }
         variables = dict(arguments)
         self._block(variables, "    ", self._random.randint(3, 8), depth=0)
         results = list(variables)
@@ -154,6 +189,7 @@ class Program:
         self._add(indent, "pass")
         for _ in range(n):
             choices = [self._assign, self._assign, self._change, self._swap, self._table]
+            choices += [self._call] * (self._random.random() < 0.3)
             if depth < 3:
                 choices += [self._if, self._for, self._while, self._local]
             self._random.choice(choices)(known, indent, depth)
@@ -191,6 +227,10 @@ class Program:
         place = self._random.choice((one, f"({one} + int({other} > 0.0))"))
         self._add(indent, f"{one}, {other} = TABLE[{place} % 3]")
 
+    def _call(self, known: Variables, indent: str, depth: int) -> None:
+        given = ", ".join(self._expression(hint, known, 1) for hint in (FLOAT, INT))
+        self._add(indent, f"_check({given})")
+
     def _if(self, known: Variables, indent: str, depth: int) -> None:
         self._add(indent, f"if {self._expression(BOOL, known, 2)}:")
         inside = []
@@ -218,9 +258,22 @@ class Program:
         free = [one for one in _REUSED if one not in self._open]
         if free and self._random.random() < 0.5:
             name = self._random.choice(free)
-        kind = self._random.randrange(6)
+        kind = self._random.randrange(7)
+        hint = INT if kind in (0, 4, 5) else FLOAT
+        if self._random.random() < 0.3:
+            # It has a value already, which is lost.
+            name = self._random.choice([n for n, h in known.items() if h == hint] or [name])
         if kind == 0:
-            stop = self._random.choice(("3", "1, 4", "4, 0, -1", "0, 7, 3", f"{name}_n"))
+            stops = (
+                "3",
+                "1, 4",
+                "4, 0, -1",
+                "0, 7, 3",
+                "SIZE + 1",
+                "len(XS) - 3",
+                "SIZE**2, -1, -SIZE",
+            )
+            stop = self._random.choice((*stops, f"{name}_n"))
             if stop == f"{name}_n":
                 self._add(indent, f"{name}_n = {self._expression(INT, known, 1)} % 4")
                 known[f"{name}_n"] = inside[f"{name}_n"] = INT
@@ -238,12 +291,18 @@ class Program:
         elif kind == 4:
             self._add(indent, f"for {name} in PRIMES:")
             inside[name] = INT
+        elif kind == 5:
+            self._add(
+                indent, f"for {name}, {name}_b in zip(range(9, SIZE, -3), {self._vector(known)}):"
+            )
+            inside |= {name: INT, f"{name}_b": FLOAT}
         else:
             self._add(indent, "for _ in range(2):")
-        before = set(inside)
+        was_open = name in self._open
         self._open.add(name)
-        self._loop_body(inside, known, before, indent, depth)
-        self._open.remove(name)
+        self._loop_body(inside, indent, depth)
+        if not was_open:
+            self._open.remove(name)
 
     def _vector(self, known: Variables) -> str:
         names = [name for name, hint in known.items() if hint in (V3, V2)]
@@ -257,20 +316,10 @@ class Program:
         self._add(indent, f"while {name} > 0 and {test}:")
         self._add(indent, f"    {name} -= 1")
         inside = {n: hint for n, hint in known.items() if n != name}
-        self._loop_body(inside, known, set(inside), indent, depth)
+        self._loop_body(inside, indent, depth)
 
-    def _loop_body(
-        self, inside: Variables, known: Variables, before: set[str], indent: str, depth: int
-    ) -> None:
-        # The loop's own names cannot be changed in it.
-        own = before - known.keys()
-        readable = dict(inside)
-        changeable = {n: hint for n, hint in inside.items() if n not in own}
-        if own:
-            name = sorted(own)[0]
-            self._add(f"{indent}    ", f"{name}_c = {name}")
-            changeable[f"{name}_c"] = readable[name]
-        self._block(changeable, f"{indent}    ", self._random.randint(1, 3), depth + 1, loop=True)
+    def _loop_body(self, inside: Variables, indent: str, depth: int) -> None:
+        self._block(dict(inside), f"{indent}    ", self._random.randint(1, 3), depth + 1, loop=True)
 
     def _local(self, known: Variables, indent: str, depth: int) -> None:
         name = self._new(BOOL)

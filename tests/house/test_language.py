@@ -23,6 +23,27 @@ def test_equations_keep_to_their_language(path):
     assert foreign(path) == []
 
 
+@pytest.mark.parametrize("name", OUTSIDE)
+def test_what_stands_outside_is_that_of_the_equations_only(tmp_path, name):
+    """A module of the user's with the same name is held to the language."""
+    module, function = name.split(".")
+    path = tmp_path / f"{module}.py"
+    path.write_text(f"def {function}(x: float) -> float:\n    with x:\n        return x\n")
+    assert [line.partition(" is ")[0] for line in foreign(path)] == [f"{path}:2: with"]
+
+
+def test_blocks_that_do_not_run_when_a_module_is_imported_are_skipped(tmp_path):
+    path = tmp_path / "equation.py"
+    path.write_text(
+        'if __name__ == "__main__":\n    import pylab\n    print(pylab)\n'
+        "if TYPE_CHECKING:\n    from collections.abc import Callable\n"
+        'if __name__ == "__main__":\n    pass\nelse:\n    x = 1.0\n'
+    )
+    assert [line.partition(" is ")[0] for line in foreign(path)] == [
+        f"{path}:6: if at the level of the module"
+    ]
+
+
 def test_what_stands_outside_is_there():
     for name in OUTSIDE:
         module, function = name.split(".")
@@ -42,24 +63,31 @@ def test_page_names_the_functions_and_what_stands_outside():
         ("    return hypot(x, 1.0)", "the name hypot"),
         ("    return sum((x, 1.0))", "the name sum"),
         ("    return math.gamma(x)", "the name math.gamma"),
-        ("    return x**2", "the operator Pow"),
-        ("    return x | 2", "the operator BitOr"),
-        ("    return max(a * x for a in (1.0, 2.0))", "GeneratorExp"),
-        ("    return [x][0]", "List"),
+        ("    return x**0.5", "** with other than a whole constant"),
+        ("    return x | 2", "the operator |"),
+        ("    return f(a * x for a in (1.0, 2.0))", "an expression with a for"),
+        ("    return max(a * x for a in (1.0, 2.0))", "max of an expression with a for"),
+        ("    return sum([a * x for a in (1.0, 2.0)])", "sum of an expression with a for"),
+        ("    return any(a > x for a in (1.0, 2.0))", "any of an expression with a for"),
+        ("    return [x][0]", "a list"),
+        ("    return {1: x, x: 2.0}[1]", "a dict whose keys are not constants"),
+        ("    return (y := x)", ":="),
+        ("    return f\"{x}\"", "an f-string"),
         ("    return x if x is x else 1.0", "a comparison other than of size"),
         ("    return cos(**x)", "a call with **"),
-        ("    return (lambda y: y)(x)", "Lambda"),
+        ("    return (lambda y: y)(x)", "lambda"),
         ("    return 1j", "the constant 1j"),
         ("    while True:\n        x += 1.0", "a while that changes nothing in its condition"),
         ("    x = y = 1.0\n    return x", "more names than one for a value"),
         ("    for k in range(3):\n        x += k\n    else:\n        x = 1.0", "else of a for"),
-        ("    try:\n        return x\n    finally:\n        pass", "Try"),
-        ("    with x:\n        return x", "With"),
-        ("    x.y = 1.0\n    return x", "an assignment to Attribute"),
-        ("    x[0] = 1.0\n    return x", "an assignment to Subscript"),
-        ("    global y\n    return x", "Global"),
+        ("    try:\n        return x\n    finally:\n        pass", "try"),
+        ("    with x:\n        return x", "with"),
+        ("    x.y = 1.0\n    return x", "an assignment to a field"),
+        ("    x[0] = 1.0\n    return x", "an assignment to an element"),
+        ("    x[0, 1] = 1.0\n    return x", "an assignment to an element of a matrix"),
+        ("    global y\n    return x", "global"),
         ("    raise ValueError", "a raise without a text"),
-        ("    x: float\n    return x", "AnnAssign"),
+        ("    x: float\n    return x", "a variable without a value"),
     ],
 )  # fmt: skip
 def test_what_is_foreign_is_named_with_its_line(tmp_path, line, what):
@@ -79,12 +107,12 @@ def test_what_is_foreign_is_named_with_its_line(tmp_path, line, what):
         ("def f(x=1.0):\n    return x\n", 1, "more than plain arguments of f"),
         ("def f(x):\n    return x\n", 1, "an argument or a result of f without a type"),
         ("class A:\n    x: float\n", 1, "the class A"),
-        ("x = 1.0\nfor y in (1, 2):\n    x = y\n", 2, "For at the level of the module"),
+        ("x = 1.0\nfor y in (1, 2):\n    x = y\n", 2, "for at the level of the module"),
         (
             "from typing import NamedTuple\nclass A(NamedTuple):\n    x: float\n"
             "    def f(self) -> float:\n        return self.x\n",
             4,
-            "FunctionDef in the class A",
+            "def in the class A",
         ),
     ],
 )

@@ -139,6 +139,16 @@ static inline double power(double x, double y, Error *error) {
     return z;
 }
 
+/* Python's x ** y for a whole y; for another one Python's result may be complex. */
+static inline double raised_to(double x, double y, Error *error) {
+    double z = pow(x, y);
+    if (x == 0.0 && y < 0.0)
+        raise_error(error, "ZeroDivisionError: 0.0 cannot be raised to a negative power");
+    else if (isinf(z) && isfinite(x))
+        raise_error(error, "OverflowError: (34, 'Numerical result out of range')");
+    return z;
+}
+
 static inline double remainder_of(double x, double y, Error *error) {
     double z = isinf(y) && !isinf(x) ? x : fmod(x, y);
     if (isnan(z) && !isnan(x) && !isnan(y)) raise_domain_error(error);
@@ -187,6 +197,16 @@ static inline int integer_of(double x, Error *error) {
                        : isinf(x) ? "OverflowError: cannot convert float infinity to integer"
                                   : "OverflowError: an integer exceeds 32 bits");
     return 0;
+}
+
+static inline long long magnitude(long long k) { return k < 0 ? -k : k; }
+
+/* Python's k ** n for n >= 0. */
+static inline int integer_power(int k, int n, Error *error) {
+    long long z = 1;
+    if (magnitude(k) < 2 && n > 2) n = 2 - n % 2; /* only whether it is odd matters */
+    for (; n > 0 && magnitude(z) <= INT_MAX; n--) z *= k;
+    return integer(n > 0 ? LLONG_MAX : z, error);
 }
 
 static inline double integer_quotient(int a, int b, Error *error) {
@@ -253,6 +273,7 @@ static inline int place_in(int i, int n, Error *error) {
 #define ACOSH(x) inverse_cosh(x, error)
 #define ATANH(x) inverse_tanh(x, error)
 #define POW(x, y) power(x, y, error)
+#define RAISED(x, y) raised_to(x, y, error)
 #define FMOD(x, y) remainder_of(x, y, error)
 #define MOD(a, b) modulo(a, b, error)
 #define FLOORDIV(a, b) floor_quotient(a, b, error)
@@ -260,7 +281,8 @@ static inline int place_in(int i, int n, Error *error) {
 #define SUB(a, b) integer((long long)(a) - (b), error)
 #define MUL(a, b) integer((long long)(a) * (b), error)
 #define NEG(k) integer(-(long long)(k), error)
-#define ABS(k) integer(llabs(k), error)
+#define ABS(k) integer(magnitude(k), error)
+#define INT_POW(k, n) integer_power(k, n, error)
 #define INT_OF(x) integer_of(x, error)
 #define INT_DIV(a, b) integer_quotient(a, b, error)
 #define INT_FLOORDIV(a, b) floor_integer_quotient(a, b, error)

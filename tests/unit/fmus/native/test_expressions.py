@@ -18,7 +18,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmus.native.language import CONSTANTS, MATHEMATICS
+from fmus.native.language import CONSTANTS, MATHEMATICS, foreign
 from fmus.native.program import Untranslatable
 from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 
@@ -86,6 +86,11 @@ N = 3
 TABLE = ((1, 50.0), (2, 10.0), (0, 30.0))
 RAGGED = Vector((1.0, 2.0)), Vector((3.0, 4.0, 5.0))
 MIXED, PAIR = (0, 1.5), (1, 2)
+SQUARED = 2.0
+
+
+def _doubled(given: tuple[Vector, float]) -> tuple[Vector, float]:
+    return 2.0 * given[0], given[1]
 '''
 
 #: A name for each construct, and a function that consists of little else.
@@ -407,6 +412,101 @@ CONSTRUCTS = {
         "def f(error: float, error_: float, Vector3: float) -> Annotated[Vector, 3]:\n"
         "    choice = File(error, error_)\n    return Vector((choice.a, choice.b, Vector3))\n"
     ),
+    "powers of a float": (
+        "def f(x: float) -> tuple[float, float, float, float, float]:\n"
+        "    return x**2, -(x**3), x**-1, x**0, (x * 2.0) ** (N + 2)\n"
+    ),
+    "powers to a float": (
+        "def f(x: float, k: int) -> tuple[float, float, float]:\n"
+        "    return x**-4.0, x**SQUARED, k**3.0\n"
+    ),
+    "powers of an int": (
+        "def f(k: int, on: bool) -> tuple[int, int, int, int, int]:\n"
+        "    k %= 17\n    return k**2, (k - 9) ** 7, -(k**0), on**3, (k % 3 - 1) ** 2000000001\n"
+    ),
+    "a power of an int below 1": "def f(k: int) -> float:\n    return k**-2 + (k % 5) ** -1\n",
+    "a power in place": "def f(x: float) -> float:\n    x **= 3\n    return x\n",
+    "a record in a condition": (
+        "def f(x: float, r: Inner) -> tuple[Inner, float]:\n"
+        "    return Inner(x) if Inner(x, 2).a > 0.0 else r, x\n"
+    ),
+    "a record with others in conditions": (
+        "def f(x: float, r: Record) -> Record:\n"
+        "    return r._replace(\n"
+        "        v=Vector((x, 1.0, 2.0)) if Vector((x, x)).sum() > 1.0 else r.v,\n"
+        "        inner=Inner(x) if (x, 1.0)[0] > 0.0 else r.inner._replace(a=2.0),\n"
+        "    )\n"
+    ),
+    "a vector in a condition in a matrix": (
+        "def f(x: float, v: Annotated[Vector, 2]) -> Annotated[Matrix, 2, 2]:\n"
+        "    return Matrix((Vector((x, 2.0)) if Vector((x, 1.0))[0] > v[0] else v, (1.0, x)))\n"
+    ),
+    "an expression with a name of the expression around it": (
+        "def f(x: Annotated[Vector, 2], x_in: float) -> Annotated[Matrix, 2, 3]:\n"
+        "    return Matrix((x * x_in for x_in in XS[:N]) for x in x)\n"
+    ),
+    "ranges of sums of constants": (
+        "def f(v: Annotated[Vector, 4], x: float) -> tuple[Annotated[Vector, 4], float]:\n"
+        "    w = Vector(x * k for k in range(N + 1))\n    d = 0.0\n"
+        "    for k in range(len(v) - 1):\n        d += v[k + 1] - v[k]\n"
+        "    for k in range(N**2 - 1, -N // 2, -(N % 2)):\n        d = d * x + k\n"
+        "    return w + Vector(d for _ in range(len(XS))), v[N] + MIXED[N - 2]\n"
+    ),
+    "slices by constants": (
+        "def f(v: Annotated[Vector, 4]) -> tuple[Annotated[Vector, 3], float, float]:\n"
+        "    return v[:N], v[N - 2 :: N - 1].sum(), max(v[-N : len(v)])\n"
+    ),
+    "loops over names that have a value": (
+        "def f(x: float, k: int, v: Annotated[Vector, 3]) -> tuple[float, int]:\n"
+        "    for k in range(k % 4):\n        for k in range(2):\n            x += k\n"
+        "        x = x * 0.5 + k\n    y = k + x\n"
+        "    for x in v:\n        y = y * x\n    for k, y in enumerate(v):\n        pass\n"
+        "    return x + y, k\n"
+    ),
+    "loops that change their names": (
+        "def f(x: float, n: int) -> float:\n"
+        "    for k in range(n % 5):\n        k *= 2\n        x += k\n"
+        "    for a in XS:\n        if a < x:\n            a = x\n        x = 0.5 * a + 1.0\n"
+        "    for i, b in enumerate(XS):\n        i += 1\n        b /= i\n        x += b\n"
+        "    return x\n"
+    ),
+    "zip of ranges": (
+        "def f(v: Annotated[Vector, 4]) -> Annotated[Vector, 3]:\n"
+        "    y = 0.0\n    for k, x in zip(range(7, -5, -N), v):\n        y = y * x + k\n"
+        "    for i, (k, n) in enumerate(zip(range(N), range(2, 9, 2))):\n        y += i * k - n\n"
+        "    return Vector(x * k + y for k, x in zip(range(1, N + 1), v))\n"
+    ),
+    "an early return": (
+        "def f(x: float, k: int) -> float:\n"
+        "    def check(a: float) -> None:\n        if a < 1.0:\n            return\n"
+        "        for _ in range(k):\n            if a > 2.0:\n                return\n"
+        "        raise Refusal(\"no\")\n"
+        "    check(x)\n    return x\n"
+    ),
+    "lists in vectors and matrices": (
+        "def f(x: float) -> tuple[Annotated[Vector, 2], Annotated[Matrix, 2, 2]]:\n"
+        "    v = Vector([x, 1.0])\n"
+        "    return v, Matrix([[x, 0.0], v]) + Matrix(([1.0, x], (x, 2)))\n"
+    ),
+    "results of any size": (
+        "def f(v: Annotated[Vector, 3], w: Annotated[Vector, 2]) -> tuple[\n"
+        "    Annotated[Vector, 3], float\n]:\n"
+        "    def halved(x: Annotated[Vector, 2]) -> tuple[Vector, float]:\n"
+        "        return 0.5 * x, x.sum()\n"
+        "    (a, b), (c, d) = _doubled((v, 2.0)), halved(w)\n    return a, b + c @ w + d\n"
+    ),
+    "names of structures": (
+        "def f(x: float, Inner_Record: float, File_: Inner) -> tuple[Inner, Record]:\n"
+        "    Inner_Record_, Inner_double, Inner_, class_pose = x, 2.0, x * 3.0, pose(x)\n"
+        "    int_Inner, pairs = (1, File_), ((x, 2), (Inner_Record, 3))\n"
+        "    y = Inner_Record_ * Inner_double + Inner_ + pairs[1][0] + int_Inner[0]\n"
+        "    return Inner(y), Record(class_pose.x, XS[:3], int_Inner[1])\n"
+    ),
+    "names that are numbers of others in C": (
+        "def f(x\u0302: float, x_u0302: float, x_u00302: float, v__x: float, _x: float) -> float:\n"
+        "    llabs, v_State = abs(int(x_u0302 / 1e9)), 2.0\n"
+        "    return x\u0302 - x_u0302 * x_u00302 + llabs + v__x / _x + v_State\n"
+    ),
     "range of a constant": (
         "def f(x: float) -> Annotated[Vector, 3]:\n    return Vector(x * k for k in range(N))\n"
     ),
@@ -417,6 +517,27 @@ WRONG_CONSTANTS = """
 class Default(NamedTuple):
     a: float
     n: int = 2.5
+
+
+class Texts(NamedTuple):
+    a: float
+    b: str
+
+
+class Lists(NamedTuple):
+    a: list[float]
+
+
+class Inner_double(NamedTuple):
+    a: int
+
+
+def _listed(x: list[float]) -> float:
+    return 1.0
+
+
+def _listing(x: float) -> tuple[float, ...]:
+    return (x,)
 
 
 LARGE, ZERO, WRONG = 3000000000, Inner(0), Inner(0.5, 2.5)
@@ -515,7 +636,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
 @pytest.mark.parametrize(
     ("line", "why"),
     [
-        ("y = float(sum(k * a for k, a in enumerate(v, 1)))", "GeneratorExp is not in"),
+        ("y = float(sum(k * a for k, a in enumerate(v, 1)))", "sum of an expression with a for"),
         ("for k, a in enumerate(v, 1): y += k * a", "enumerate with a start"),
         ("for k, a in enumerate(v, start=1): y += k * a", "enumerate with start="),
         ("for a, b in zip(v, v, strict=True): y += a * b", "zip with strict="),
@@ -525,10 +646,28 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = 1.0 * round(v[1], ndigits=1)", "round with ndigits="),
         ("y = v.sum(axis=0)", "sum with axis="),
         ("y = 1.0 * float(*v)", "float with a star"),
+        ("y = Texts(y, 'b').a", "Texts.b: texts are for raise Refusal(...) only"),
+        ("y = Lists((y,)).a[0]", "Lists.a: list[float] is not a type in the language"),
+        ("y = _listed((y,))", "the argument x of _listed: list[float] is not a type"),
+        ("y = _listing(y)[0]", "the result of _listing: tuple[float, ...] is not a type"),
+        ("k = (Inner(y), y)\n    y = k[1] * Inner_double(2).a", "the class Inner_double has"),
+        ("y = y**0.5", "** with other than a whole constant is not in"),
+        ("y = y**y", "** with other than a constant whole number: write math.pow(x, y)"),
+        ("y = v**2", "a Vector of 3 where a number is wanted"),
+        ("for k in range(N / 2): y += k", "a bound of a range that is a float, not an int"),
+        ("y = v[: int(y)].sum()", "a slice other than a constant one"),
+        ("y = v[:: N - 3].sum()", "a slice with a step of 0"),
+        ("y = Vector(1.0 for _ in range(N - 3)).sum()", "a number of elements that is not a con"),
+        ("for k, a in zip(range(int(y)), v): y += k", "a range of other than constants"),
+        ("for k, a in zip(range(-(2**31), 2**31, 3), v): y += k", "2147483648 is an int"),
+        ("for k, a in zip(range(-2147483647, 2147483647), v): y += k", "a range of so many"),
+        ("for v in v: y += v", "v is a Vector of 3 and gets a float: use another name"),
+        ("y = interpolate(y, (0, 1), (10, 20))", "a tuple of 2 with other than floats"),
+        ("y = {1: y}[1]", "a dict that is not a result: write a NamedTuple"),
         ("k = 3000000000", "3000000000 is an int of more than 32 bits: write 3000000000.0"),
         ("y = Vector(0.0 for _ in range(70000)).sum()", "a Vector of 70000 is too large for C"),
         ("k = LARGE", "3000000000 is an int of more than 32 bits"),
-        ("y += A[0:1, 2]", "Slice has no counterpart"),
+        ("y += A[0:1, 2]", "a slice of a Matrix: its column j is A.T[j]"),
         ('raise Refusal(f"{y!r}")', "!r in a text"),
         ("y, y = 1.0, y", "a name twice in one assignment"),
         (
@@ -597,8 +736,47 @@ def test_what_c_would_compute_otherwise_is_refused(tmp_path: Path, line: str, wh
     function = f"def f(y: float, v: Annotated[Vector, 3]) -> float:\n    {line}\n    return y\n"
     constants = WRONG_CONSTANTS
     module = module_of(HEAD + SHARED + constants + function, tmp_path, "refused")
-    with pytest.raises(Untranslatable, match=re.escape(why)):
+    with pytest.raises((TypeError, Untranslatable), match=re.escape(why)) as error:
         c_text({"f": module.f})
+    assert re.match(rf"{tmp_path}/refused\.py:\d+: ", str(error.value))
+
+
+def test_classes_of_one_name_in_two_modules_are_refused(tmp_path, monkeypatch):
+    """One is named with its line, the user's own if the other is ours."""
+    monkeypatch.syspath_prepend(str(tmp_path))
+    (tmp_path / "tanks.py").write_text(
+        "from __future__ import annotations\n\nfrom typing import NamedTuple\n\n\n"
+        "class State(NamedTuple):\n    level: float\n\n\n"
+        "def filled(x: float) -> State:\n    return State(x)\n"
+    )
+    text = HEAD + (
+        "from tanks import filled\nfrom fmus.ports.groups import Nothing as Void\n\n\n"
+        "class State(NamedTuple):\n    x: float\n\n\nclass Nothing(NamedTuple):\n    x: float\n\n\n"
+        "def f(x: float) -> State:\n    return State(filled(x).level)\n\n\n"
+        "def g(x: float) -> Nothing:\n    _ = Void()\n    return Nothing(x)\n"
+    )
+    module = module_of(text, tmp_path, "of_two")
+    first = HEAD.count("\n")
+    for name, place, other in (
+        ("f", "tanks.py:6", "of_two"),
+        ("g", f"of_two.py:{first + 9}", "fmus.ports.groups"),
+    ):
+        with pytest.raises(Untranslatable) as error:
+            c_text({name: getattr(module, name)})
+        assert str(error.value).startswith(f"{tmp_path}/{place}: the class ")
+        assert f"of {other} in C" in str(error.value)
+    sys.modules.pop("tanks")
+
+
+def test_vectors_may_be_imported_by_another_name(tmp_path: Path):
+    text = HEAD + (
+        "from auv_fmu.linear_algebra import Matrix as M, Vector as V\n\n\n"
+        "def f(x: float) -> Annotated[V, 2]:\n"
+        "    return M((x * j for j in range(2)) for _ in range(2)) @ V(k + x for k in range(2))\n"
+    )
+    both = Twins(module_of(text, tmp_path, "renamed"), tmp_path)
+    assert foreign(tmp_path / "renamed.py") == []
+    assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (12.0, 12.0)
 
 
 def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):

@@ -10,23 +10,26 @@ from ctypes import byref, c_double, c_ulong
 from importlib import import_module
 from pathlib import Path
 from random import Random
-from typing import Annotated, Any, get_origin
+from typing import Annotated, Any, NamedTuple, get_origin
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import acoustic_link, formation
+from auv_fmu.arrays import Matrix, Vector
 from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.sea import Sea
 from auv_fmu.waves import MOST as MOST_WAVES
 from auv_fmu.waves import SPECTRA, Waves
 from fmus.discovery import components, ports_of, source_of
+from fmus.native.functions import function_in_c
+from fmus.native.program import Program
 from fmus.native.shapes import strip_sphinx_marks
 from fmus.native.tables import tables
-from fmus.native.translator import translated
-from fmus.ports.groups import class_of, hints_of, parts_of
+from fmus.native.translator import _drawn, translated
+from fmus.ports.groups import class_of, count_values, hints_of, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.callbacks import describe_error
 from support.equations import (
@@ -502,6 +505,45 @@ def test_noise_of_the_localisation(random):
     both.library.measure(byref(given), (c_double * 3)(*n), byref(passed), byref(Error()))
     measured = both.behaviour.measured(parameters, outputs["y"], n)
     assert outcome(passed) == outcome({**outputs, "y": measured})
+
+
+def drawn_type(random: Random, depth: int = 0) -> Any:
+    """Something that `measured` may take its draws as: numbers in parts of any kind."""
+    kind = random.randrange(3 if depth > 2 else 6)
+    if kind < 3:
+        sizes = random.randint(1, 3), random.randint(1, 3)
+        vector, matrix = Annotated[Vector, sizes[0]], Annotated[Matrix, sizes[0], sizes[1]]
+        return (float, vector, matrix)[kind]
+    parts = [drawn_type(random, depth + 1) for _ in range(random.randint(1, 4))]
+    if kind == 3:
+        return tuple[tuple(parts)]
+    if kind == 4:
+        return tuple[tuple(parts[:1] * len(parts))]
+    name = f"Drawn{random.randrange(10**9)}"
+    return NamedTuple(name, [(f"x{i}", part) for i, part in enumerate(parts)])
+
+
+def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
+    program, lines, calls = Program(function_in_c), [], []
+    for i in range(60):
+        hint = drawn_type(Random(i))
+        shape, n = program.shape(hint), count_values(hint)
+        text = _drawn(shape, map("draws[{}]".format, range(n)))
+        lines += [f"static {shape.name} f{i}(const double draws[]) {{",
+                  f"    const {shape.name} it = {text};", "    return it;", "}"]  # fmt: skip
+        calls.append(
+            f"    const {shape.name} x{i} = f{i}(numbers);\n"
+            f"    if (sizeof x{i} != {n} * sizeof(double)) return {i + 1};\n"
+            f"    if (memcmp(&x{i}, numbers, sizeof x{i}) != 0) return {i + 1};"
+        )
+    numbers = ", ".join(map(str, range(1, 500)))
+    main = ["int main(void) {", f"    const double numbers[] = {{{numbers}}};", *calls]
+    main += ["    return 0;", "}"]
+    structures = "\n".join(program.structures.values())
+    source = tmp_path / "drawn.c"
+    source.write_text("\n".join(['#include "arithmetic.h"', structures, *lines, *main]))
+    subprocess.run(["cc", *FLAGS, "-I", str(RUNTIME), "-o", tmp_path / "drawn", source], check=True)
+    assert subprocess.run([tmp_path / "drawn"], check=False).returncode == 0
 
 
 @pytest.mark.parametrize("seed", [0, 1, -1, 2**31 - 1, -(2**31)])

@@ -75,6 +75,19 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
+    "use", ["k = {}(2.0)", "f = lambda: {}(2.0)", "def inner() -> float:\n        return {}(2.0)"]
+)
+@pytest.mark.parametrize("name", ["moved", "helper", "chek", "Advance"])
+def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, name, use):
+    helper = f"def {name}(x: float) -> float:\n    return x\n\n\n"
+    caller = f"def _caller() -> None:\n    {use.format(name)}\n\n\n"
+    said = behaviour(
+        tmp_path, monkeypatch, GOOD.replace("def _moved", f"{helper}{caller}def _moved")
+    )
+    assert [name for name, hook in said.hooks.items() if hook] == ["begin", "advance"]
+
+
+@pytest.mark.parametrize(
     ("old", "new", "why"),
     [
         ("def advance", "def _advance", "has no advance"),
@@ -82,8 +95,12 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
         (
             "def _moved",
             "def moved",
-            "moved is not one of the hooks check, .*, expected; names of other functions begin "
-            "with _$",
+            "moved is not one of the hooks check, .*, expected, and no function here calls it$",
+        ),
+        (
+            "\n\ndef _moved",
+            "\n\ndef chek() -> None:\n    pass\n\n\ndef half() -> None:\n    pass\n\n\ndef _moved",
+            "chek is not one of .* calls it; nor half$",
         ),
         ("(h: float,", "(h,", "advance takes h of no type$"),
         ("(h: float,", "(h: real,", "advance has a type that is not known: name 'real' is not "),
