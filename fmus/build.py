@@ -10,17 +10,37 @@ import argparse
 import hashlib
 import json
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from fmus.compilers import compiler_for
-from fmus.discovery import components, fingerprint, source_of
+from fmus.discovery import (
+    ORIGIN,
+    Origin,
+    add_to_archive,
+    components,
+    digest_at,
+    fingerprint,
+    source_of,
+)
 from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
+from fmus.python.modules import modules_of
 from fmus.python.own import build_script
 from fmus.python.packaging import LOADERS, PythonKind, best_loader
-from fmus.script import is_component, script_in, source_of_script, told
+from fmus.script import (
+    data_files,
+    is_component,
+    no_component,
+    script_in,
+    source_of_script,
+    told,
+)
+
+#: Exit status if the user's script cannot be built; 2 is for what else is wrong.
+FAILED = 1
 
 #: The file that says what a folder of FMUs was built from, and what was built.
 MANIFEST = "build.json"
@@ -106,22 +126,42 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind) -> int:
     """Build the FMU of the user's component, or say in a line where it has a mistake."""
     try:
         path = script_in(path)
+        if not is_component(path) and not isinstance(kind, PythonKind):
+            raise ValueError(f"{no_component(path)}; a class of PythonFMU needs --kind {PYTHON}")
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    modules: Sequence[str] = (path.stem,)
+    try:
         if is_component(path):
             source = source_of_script(path)
             # Before PythonFMU imports a copy, in which mistakes would be elsewhere.
             source.definition  # noqa: B018
-            kind.write(source, folder / f"{source.name}.fmu")
-        elif isinstance(kind, PythonKind):
-            build_script(path, folder, kind.loader)
+            fmu, modules = folder / f"{source.name}.fmu", source.modules
+            kind.write(source, fmu)
         else:
-            raise ValueError(
-                f"{path}: a slave of PythonFMU runs only in Python; use --kind {PYTHON}, or write "
-                "it as a component (auv-fmu new component)"
-            )
+            assert isinstance(kind, PythonKind)
+            fmu = build_script(path, folder, kind.loader)
+        _record_origin(fmu, path, modules, kind.name)
     except Exception as error:
         print(told(error, path), file=sys.stderr)
-        return 2
+        return FAILED
     return 0
+
+
+def _record_origin(fmu: Path, path: Path, modules: Sequence[str], kind: str) -> None:
+    """Record in an FMU what it was made from: the user's files."""
+    place = path.resolve()
+    root, folder = place.parent, place if place.is_dir() else place.parent
+    files = modules_of("\n".join(f"import {module}" for module in modules), {}, root)
+    digests = {
+        file.relative_to(folder).as_posix(): digest_at(file) or ""
+        for _, file in sorted({**data_files(root), **files}.items())
+        if folder in file.parents
+    }
+    script = place.name if place.is_file() else "behaviour.py"
+    origin = Origin(fmu.name, kind, script, digests)
+    add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
 
 
 def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:

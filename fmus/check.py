@@ -20,7 +20,7 @@ from fmus.native.language import foreign
 from fmus.native.program import Program, Untranslatable
 from fmus.native.tables import tables
 from fmus.native.translator import translated
-from fmus.script import is_component, script_in, shown, source_of_script, told
+from fmus.script import is_component, no_component, script_in, shown, source_of_script, told
 
 #: Where a line says that it is about.
 _PLACE = re.compile(r"^(.+?:\d+): ")
@@ -39,8 +39,8 @@ def mistakes(path: Path) -> list[str]:
     script = script_in(path)
     if not is_component(script):
         raise ValueError(
-            f"{script}: holds no component, as it has no functions begin and advance; build it, "
-            "and check its FMU"
+            f"{no_component(script)}; if it has a class of PythonFMU, build it and check its FMU: "
+            f"auv-fmu build {script}"
         )
     found: dict[str, str] = {}
     try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -146,20 +147,81 @@ def fingerprint(kind: str) -> str:
     return digest.hexdigest()
 
 
+class Origin(NamedTuple):
+    """What the FMU of a user's script was made from, as it is recorded in the FMU.
+
+    Attributes:
+        fmu: name of the file of the FMU.
+        kind: of the FMU.
+        script: name of the script, or of the first file of its folder.
+        digests: of the files, by their paths from the folder of the script on.
+
+    """
+
+    fmu: str
+    kind: str
+    script: str
+    digests: Mapping[str, str]
+
+    def changed(self, folder: Path) -> list[str]:
+        """The files that are others now, if the script is in a folder; none, if it is not."""
+        if not (folder / self.script).is_file():
+            return []
+        return [name for name, digest in self.digests.items() if digest_at(folder / name) != digest]
+
+
+#: Where an FMU has it.
+ORIGIN = "extra/auv-fmu/origin.json"
+
+
+def origin_of(content: bytes) -> Origin | None:
+    """What a record of an origin says; None: it is none of ours."""
+    try:
+        origin = Origin(**json.loads(content))
+        names = [origin.fmu, origin.script, *origin.digests]
+        is_below = all(
+            not Path(name).is_absolute() and ".." not in Path(name).parts for name in names
+        )
+    except (AttributeError, RecursionError, TypeError, ValueError):
+        return None
+    return origin if is_below else None
+
+
+def digest_at(path: Path) -> str | None:
+    """The SHA-256 of a file, whatever ends its lines; None: there is no such file."""
+    try:
+        content = path.read_bytes() if path.is_file() else None
+    except OSError:
+        return None
+    if content is None:
+        return None
+    return hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+
+
+def add_to_archive(path: Path, name: str, content: bytes) -> None:
+    """Add an entry to an archive, whose bytes still depend only on its entries."""
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(_info(name), content, compresslevel=9)
+
+
 def write_archive(path: Path, entries: dict[str, bytes]) -> None:
     """Write a zip archive whose bytes depend only on its entries, all at once."""
     partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
         with zipfile.ZipFile(partial, "w") as archive:
             for name in sorted(entries):
-                info = zipfile.ZipInfo(name, _EPOCH)
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.create_system = 3
-                info.external_attr = 0o644 << 16
-                archive.writestr(info, entries[name], compresslevel=9)
+                archive.writestr(_info(name), entries[name], compresslevel=9)
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def _info(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, _EPOCH)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system = 3
+    info.external_attr = 0o644 << 16
+    return info
 
 
 def digest_of(contents: Mapping[str, bytes]) -> bytes:

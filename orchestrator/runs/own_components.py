@@ -10,15 +10,17 @@ import re
 import shutil
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from zipfile import BadZipFile, ZipFile
 
-from fmus.discovery import name_of
+from fmus.discovery import ORIGIN, name_of, origin_of
 from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.bundle import run_fmus
+from orchestrator.runs.bundle import BuildFailed, run_fmus
 from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
@@ -152,7 +154,9 @@ def _names(name: str, what: str) -> tuple[str, str]:
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     words = [word for word in module.split("_") if word]
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
-    if keyword.iskeyword(module) or keyword.iskeyword(class_name) or find_spec(module):
+    if keyword.iskeyword(module) or keyword.iskeyword(class_name):
+        raise InputError(f"{name!r}: a word of the language Python; choose another name")
+    if find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name
 
@@ -189,13 +193,32 @@ def build_own(
     options += ["--loader", loader] if loader is not None else []
     options += ["--platforms", platforms] if platforms is not None else []
     with TemporaryDirectory(dir=process_folder()) as temporary:
-        run_fmus("build", Path(temporary), *options, hear=hear)
-        [built] = Path(temporary).glob("*.fmu")
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder
+        try:
+            run_fmus("build", Path(temporary), *options, hear=hear)
+        except BuildFailed as error:
+            removed = [path.name for path in _built_from(script, place)]
+            for name in removed:
+                (place / name).unlink()
+            gone = f"; {', '.join(removed)} of an earlier build is removed" * bool(removed)
+            raise InputError(f"{error}{gone}") from None
+        [built] = Path(temporary).glob("*.fmu")
         with replace_files(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)
     return place / built.name
+
+
+def _built_from(script: Path, folder: Path) -> Iterator[Path]:
+    """The FMUs in a folder that were built from a script, and have the names that they got."""
+    names = [script.name]
+    if script.is_dir():
+        names = [f"{script.resolve().name}.py", "behaviour.py"]
+    for path in folder.glob("*.fmu"):
+        with suppress(OSError, KeyError, BadZipFile), ZipFile(path) as archive:
+            origin = origin_of(archive.read(ORIGIN))
+            if origin and origin.script in names and origin.fmu == path.name:
+                yield path
 
 
 def changes(script: Path) -> Iterator[None]:
