@@ -154,8 +154,9 @@ def _names(name: str, what: str) -> tuple[str, str]:
     module = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
     words = [word for word in module.split("_") if word]
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
-    if keyword.iskeyword(module) or keyword.iskeyword(class_name):
-        raise InputError(f"{name!r}: a word of the language Python; choose another name")
+    for word in (module, class_name):
+        if keyword.iskeyword(word):
+            raise InputError(f"{name!r}: {word} is a word of Python; choose another name")
     if find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name

@@ -101,7 +101,7 @@ def test_its_check_finds_nothing(made: Path, capsys):
     ("name", "why"),
     [
         ("my-law", "'my-law': not a name for a component; use letters, digits and underscores"),
-        ("class", "'class': a word of the language Python; choose another name"),
+        ("class", "'class': class is a word of Python; choose another name"),
         ("json", "'json': json is already a module of Python; choose another name"),
     ],
 )
