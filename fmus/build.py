@@ -109,12 +109,15 @@ def main() -> int:
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     parser.add_argument("--fmi", choices=FMI_VERSIONS, default=FMI_VERSIONS[0])
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
+    parser.add_argument(
+        "--from", dest="home", default=".", help="the script's folder from the FMU's"
+    )
     parser.add_argument("script", nargs="?", type=Path, help="a component; default: all")
     options = parser.parse_args()
     try:
         kind = _kind(options)
         if options.script is not None:
-            return _build_own(options.script, options.out, kind)
+            return _build_own(options.script, options.out, kind, options.home)
         build(options.out, kind)
     except (OSError, ValueError) as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)
@@ -122,7 +125,7 @@ def main() -> int:
     return 0
 
 
-def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind) -> int:
+def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: str) -> int:
     """Build the FMU of the user's component, or say in a line where it has a mistake."""
     try:
         path = script_in(path)
@@ -142,15 +145,17 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind) -> int:
         else:
             assert isinstance(kind, PythonKind)
             fmu = build_script(path, folder, kind.loader)
-        _record_origin(fmu, path, modules, kind.name)
+        script, digests = _origin(path, modules)
+        origin = Origin(fmu.name, kind.name, home, script, digests)
+        add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
     except Exception as error:
         print(told(error, path), file=sys.stderr)
         return FAILED
     return 0
 
 
-def _record_origin(fmu: Path, path: Path, modules: Sequence[str], kind: str) -> None:
-    """Record in an FMU what it was made from: the user's files."""
+def _origin(path: Path, modules: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """The script of an FMU, and the digests of all files of the user's that it was made from."""
     place = path.resolve()
     root, folder = place.parent, place if place.is_dir() else place.parent
     files = modules_of("\n".join(f"import {module}" for module in modules), {}, root)
@@ -159,9 +164,7 @@ def _record_origin(fmu: Path, path: Path, modules: Sequence[str], kind: str) -> 
         for _, file in sorted({**data_files(root), **files}.items())
         if folder in file.parents
     }
-    script = place.name if place.is_file() else "behaviour.py"
-    origin = Origin(fmu.name, kind, script, digests)
-    add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
+    return "" if place.is_dir() else place.name, digests
 
 
 def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -153,21 +154,29 @@ class Origin(NamedTuple):
     Attributes:
         fmu: name of the file of the FMU.
         kind: of the FMU.
-        script: name of the script, or of the first file of its folder.
+        folder: of the script, from that of the FMU on.
+        script: its name; empty: the folder is the component.
         digests: of the files, by their paths from the folder of the script on.
 
     """
 
     fmu: str
     kind: str
+    folder: str
     script: str
     digests: Mapping[str, str]
 
-    def changed(self, folder: Path) -> list[str]:
-        """The files that are others now, if the script is in a folder; none, if it is not."""
-        if not (folder / self.script).is_file():
+    def changed(self, fmu: Path) -> list[Path]:
+        """The files that are others now than when an FMU was built; none, if there is no script."""
+        folder = self.place(fmu)
+        if not (folder / (self.script or "behaviour.py")).is_file():
             return []
-        return [name for name, digest in self.digests.items() if digest_at(folder / name) != digest]
+        paths = {folder / name: digest for name, digest in self.digests.items()}
+        return [path for path, digest in paths.items() if digest_at(path) != digest]
+
+    def place(self, fmu: Path) -> Path:
+        """The folder of the script of an FMU."""
+        return Path(os.path.normpath(fmu.parent / self.folder))
 
 
 #: Where an FMU has it.
@@ -179,12 +188,11 @@ def origin_of(content: bytes) -> Origin | None:
     try:
         origin = Origin(**json.loads(content))
         names = [origin.fmu, origin.script, *origin.digests]
-        is_below = all(
-            not Path(name).is_absolute() and ".." not in Path(name).parts for name in names
-        )
+        is_below = not any(Path(name).is_absolute() or ".." in Path(name).parts for name in names)
+        is_ours = is_below and not Path(origin.folder).is_absolute()
     except (AttributeError, RecursionError, TypeError, ValueError):
         return None
-    return origin if is_below else None
+    return origin if is_ours else None
 
 
 def digest_at(path: Path) -> str | None:

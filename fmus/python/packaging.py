@@ -65,6 +65,9 @@ _DESCRIPTION = "modelDescription.xml"
 _GUID_FILE = "resources/guid.txt"
 _GUID = re.compile(rb'guid="[^"]*"')
 
+#: What PythonFMU writes besides: the time of the build.
+_TIME = re.compile(rb' generationDateAndTime="[^"]*"')
+
 
 def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
     """Lay out a script and the modules it needs the way PythonFMU wants them."""
@@ -170,7 +173,8 @@ def seal(entries: dict[str, bytes], destination: Path) -> None:
 
     """
     entries = dict(entries)
-    entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
+    description = _TIME.sub(b"", entries[_DESCRIPTION], count=1)
+    entries[_DESCRIPTION] = _GUID.sub(b'guid=""', description, count=1)
     digest = digest_of(entries)
     guid = guid_of(digest).encode()
     entries = _renamed(entries, digest.hex()[:12])

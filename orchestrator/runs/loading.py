@@ -117,15 +117,19 @@ def outdated(component: Component) -> str | None:
     """That the FMU of a user's script is older than the script beside it; None: it is not."""
     record = component.folder / ORIGIN
     origin = origin_of(record.read_bytes()) if record.is_file() else None
-    folder = component.fmu.parent
     # Under another name it has been kept, and the script is meant to be newer.
-    if origin is None or component.fmu.name != origin.fmu or not (others := origin.changed(folder)):
+    if origin is None or component.fmu.name != origin.fmu:
         return None
-    script = folder if origin.script == "behaviour.py" else folder / origin.script
-    kind = f" --kind {NATIVE}" * (origin.kind == NATIVE)
+    changed = origin.changed(component.fmu)
+    if not changed:
+        return None
+    command = f"auv-fmu build {origin.place(component.fmu) / origin.script}"
+    command += f" --kind {NATIVE}" * (origin.kind == NATIVE)
+    command += " --fmi 3" * (component.description.fmiMajorVersion == 3)
+    command += f" --out {component.fmu.parent}" * (origin.folder != ".")
     return (
-        f"{component.name}: {folder / others[0]} has changed since {origin.fmu} was built, which "
-        f"still does what it did; build it again: auv-fmu build {script}{kind}"
+        f"{component.name}: {component.fmu} is older than {changed[0]}; build it again ({command}) "
+        "or give it another name"
     )
 
 

@@ -6,10 +6,11 @@
 from __future__ import annotations
 
 import keyword
+import os
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
@@ -197,7 +198,7 @@ def build_own(
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder
         try:
-            run_fmus("build", Path(temporary), *options, hear=hear)
+            run_fmus("build", Path(temporary), *options, *_home(own, place), hear=hear)
         except BuildFailed as error:
             removed = [path.name for path in _built_from(script, place)]
             for name in removed:
@@ -210,11 +211,22 @@ def build_own(
     return place / built.name
 
 
+def _home(script: Path, fmu: Path) -> Sequence[str]:
+    """The option that says where the folder of a script is, seen from that of its FMU.
+
+    It is recorded in the FMU. So it is left out where it would have names of folders that are not
+    of the project, which is the current folder.
+    """
+    here, folders = Path.cwd(), (script.resolve(), fmu.resolve())
+    is_within = all(here in (folder, *folder.parents) for folder in folders)
+    return ["--from", Path(os.path.relpath(*folders)).as_posix()] if is_within else []
+
+
 def _built_from(script: Path, folder: Path) -> Iterator[Path]:
     """The FMUs in a folder that were built from a script, and have the names that they got."""
     names = [script.name]
     if script.is_dir():
-        names = [f"{script.resolve().name}.py", "behaviour.py"]
+        names = [f"{script.resolve().name}.py", ""]
     for path in folder.glob("*.fmu"):
         with suppress(OSError, KeyError, BadZipFile), ZipFile(path) as archive:
             origin = origin_of(archive.read(ORIGIN))

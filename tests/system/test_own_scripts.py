@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from fmus.compilers import machines_compiler
+from fmus.discovery import origin_of
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from support.own import write
@@ -120,6 +121,7 @@ def test_data_of_a_component_are_in_its_fmu(workplace: Path, kind: str):
     Path("start.txt").write_text("3.0")
     assert main(["build", "own_lag.py", "--kind", kind, "--out", "out"]) == 0
     Path("start.txt").unlink()
+    Path("own_lag.py").unlink()
     assert simulate("out/OwnLag.fmu", stop_time=0.1, step=0.1)["OwnLag.x"][0] == 3.0
 
 
@@ -222,9 +224,55 @@ def test_an_fmu_older_than_its_script_is_never_run_in_silence(own: Path, capsys)
         said["simulate"] = in_python(lambda: simulate("own.toml"))
         said["load"] = in_python(lambda: load("Own.fmu"))
         for command, text in said.items():
-            told = mentions(text, f"{culprit} Own.fmu auv-fmu build own.py")
+            told = mentions(text, f"Own.fmu older {culprit} (auv-fmu build own.py)")
             assert told == (culprit is not None), (doing, command, text)
         shutil.copy("Own.fmu", "Kept.fmu")
         assert in_python(lambda: load("Kept.fmu")) == ""
         for path, content in before.items():
             path.write_bytes(content)
+
+
+@pytest.mark.parametrize("options", [["--kind", "python"], ["--kind", "native", "--fmi", "3"]])
+def test_an_fmu_in_another_folder_of_the_project_is_compared_too(workplace: Path, options):
+    if "native" in options and machines_compiler() is None:
+        pytest.skip("there is no C compiler")
+    Path("own_lag").mkdir()
+    write(workplace / "own_lag")
+    build = ["build", "own_lag/own_lag.py", *options, "--out", "out/deep"]
+    assert main(build) == 0
+    before = Path("out/deep/OwnLag.fmu").read_bytes()
+    assert in_python(lambda: load("out/deep/OwnLag.fmu")) == ""
+    change("own_lag/own_lag.py")()
+    [said] = in_python(lambda: load("out/deep/OwnLag.fmu")).splitlines()
+    [command] = re.findall(r"\(auv-fmu (.*?)\)", said)
+    assert main(command.split()) == 0
+    assert in_python(lambda: load("out/deep/OwnLag.fmu")) == ""
+    assert Path("out/deep/OwnLag.fmu").read_bytes() != before
+
+
+def test_strict_refuses_an_fmu_that_is_older_than_its_script(own: Path, capsys):
+    change("own.py")()
+    Path("own.toml").write_text(SCENARIO)
+    assert mentions(said_by(capsys, "run", "own.toml", "--strict"), "Own.fmu older own.py")
+    with pytest.raises(ValueError, match=r"Own\.fmu is older than own\.py"):
+        simulate("own.toml", strict=True)
+
+
+def test_the_same_script_gives_the_same_bytes_anywhere(own: Path, tmp_path_factory):
+    other = tmp_path_factory.mktemp("other")
+    assert main(["build", "own.py", "--out", str(other)]) == 0
+    assert (other / "Own.fmu").read_bytes() == Path("Own.fmu").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        b"", b"[]", b"{}", b"null", b"[" * 100_000, b"\xff",
+        b'{"fmu": "a", "kind": "b", "folder": ".", "script": "../c", "digests": {}}',
+        b'{"fmu": "a", "kind": "b", "folder": ".", "script": "c", "digests": {"/etc/passwd": ""}}',
+        b'{"fmu": "a", "kind": "b", "folder": "/etc", "script": "c", "digests": {}}',
+        b'{"fmu": "a", "kind": "b", "folder": 1, "script": 2, "digests": []}',
+    ],
+)  # fmt: skip
+def test_a_record_that_is_none_of_ours_is_passed_over(content: bytes):
+    assert origin_of(content) is None
