@@ -10,17 +10,37 @@ import argparse
 import hashlib
 import json
 import sys
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 from fmus.compilers import compiler_for
-from fmus.discovery import components, fingerprint, source_of
+from fmus.discovery import (
+    ORIGIN,
+    Origin,
+    add_to_archive,
+    components,
+    digest_at,
+    fingerprint,
+    source_of,
+)
 from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
+from fmus.python.modules import modules_of
 from fmus.python.own import build_script
 from fmus.python.packaging import LOADERS, PythonKind, best_loader
-from fmus.script import is_component, script_in, source_of_script, told
+from fmus.script import (
+    data_files,
+    is_component,
+    no_component,
+    script_in,
+    source_of_script,
+    told,
+)
+
+#: Exit status if the user's script cannot be built; 2 is for what else is wrong.
+FAILED = 1
 
 #: The file that says what a folder of FMUs was built from, and what was built.
 MANIFEST = "build.json"
@@ -89,12 +109,15 @@ def main() -> int:
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     parser.add_argument("--fmi", choices=FMI_VERSIONS, default=FMI_VERSIONS[0])
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
+    parser.add_argument(
+        "--from", dest="home", default=".", help="the script's folder from the FMU's"
+    )
     parser.add_argument("script", nargs="?", type=Path, help="a component; default: all")
     options = parser.parse_args()
     try:
         kind = _kind(options)
         if options.script is not None:
-            return _build_own(options.script, options.out, kind)
+            return _build_own(options.script, options.out, kind, options.home)
         build(options.out, kind)
     except (OSError, ValueError) as error:
         print(f"cannot build the FMUs: {error}", file=sys.stderr)
@@ -102,26 +125,46 @@ def main() -> int:
     return 0
 
 
-def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind) -> int:
+def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: str) -> int:
     """Build the FMU of the user's component, or say in a line where it has a mistake."""
     try:
         path = script_in(path)
+        if not is_component(path) and not isinstance(kind, PythonKind):
+            raise ValueError(f"{no_component(path)}; a class of PythonFMU needs --kind {PYTHON}")
+    except ValueError as error:
+        print(error, file=sys.stderr)
+        return 2
+    modules: Sequence[str] = (path.stem,)
+    try:
         if is_component(path):
             source = source_of_script(path)
             # Before PythonFMU imports a copy, in which mistakes would be elsewhere.
             source.definition  # noqa: B018
-            kind.write(source, folder / f"{source.name}.fmu")
-        elif isinstance(kind, PythonKind):
-            build_script(path, folder, kind.loader)
+            fmu, modules = folder / f"{source.name}.fmu", source.modules
+            kind.write(source, fmu)
         else:
-            raise ValueError(
-                f"{path}: a slave of PythonFMU runs only in Python; use --kind {PYTHON}, or write "
-                "it as a component (auv-fmu new component)"
-            )
+            assert isinstance(kind, PythonKind)
+            fmu = build_script(path, folder, kind.loader)
+        script, digests = _origin(path, modules)
+        origin = Origin(fmu.name, kind.name, home, script, digests)
+        add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
     except Exception as error:
         print(told(error, path), file=sys.stderr)
-        return 2
+        return FAILED
     return 0
+
+
+def _origin(path: Path, modules: Sequence[str]) -> tuple[str, dict[str, str]]:
+    """The script of an FMU, and the digests of all files of the user's that it was made from."""
+    place = path.resolve()
+    root, folder = place.parent, place if place.is_dir() else place.parent
+    files = modules_of("\n".join(f"import {module}" for module in modules), {}, root)
+    digests = {
+        file.relative_to(folder).as_posix(): digest_at(file) or ""
+        for _, file in sorted({**data_files(root), **files}.items())
+        if folder in file.parents
+    }
+    return "" if place.is_dir() else place.name, digests
 
 
 def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:

@@ -25,7 +25,7 @@ from fmus.native.language import foreign
 from fmus.native.packaging import MAIN, fmu_entries
 from fmus.native.program import Program, Untranslatable
 from fmus.python.packaging import PythonKind
-from fmus.script import is_component, script_in, shown, source_of_script, told
+from fmus.script import is_component, no_component, script_in, shown, source_of_script, told
 
 #: Where a line says that it is about.
 _PLACE = re.compile(r"^(.+?:\d+): ")
@@ -45,8 +45,8 @@ def mistakes(path: Path, folder: Path) -> list[str]:
     script = script_in(path)
     if not is_component(script):
         raise ValueError(
-            f"{script}: holds no component, as it has no functions begin and advance; build it, "
-            "and check its FMU"
+            f"{no_component(script)}; if it has a class of PythonFMU, build it and check its FMU: "
+            f"auv-fmu build {script}"
         )
     found: dict[str, str] = {}
     try:

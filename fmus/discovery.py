@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import hashlib
+import json
+import os
 import uuid
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -154,20 +156,88 @@ def fingerprint(kind: str) -> str:
     return digest.hexdigest()
 
 
+class Origin(NamedTuple):
+    """What the FMU of a user's script was made from, as it is recorded in the FMU.
+
+    Attributes:
+        fmu: name of the file of the FMU.
+        kind: of the FMU.
+        folder: of the script, from that of the FMU on.
+        script: its name; empty: the folder is the component.
+        digests: of the files, by their paths from the folder of the script on.
+
+    """
+
+    fmu: str
+    kind: str
+    folder: str
+    script: str
+    digests: Mapping[str, str]
+
+    def changed(self, fmu: Path) -> list[Path]:
+        """The files that are others now than when an FMU was built; none, if there is no script."""
+        folder = self.place(fmu)
+        if not (folder / (self.script or "behaviour.py")).is_file():
+            return []
+        paths = {folder / name: digest for name, digest in self.digests.items()}
+        return [path for path, digest in paths.items() if digest_at(path) != digest]
+
+    def place(self, fmu: Path) -> Path:
+        """The folder of the script of an FMU."""
+        return Path(os.path.normpath(fmu.parent / self.folder))
+
+
+#: Where an FMU has it.
+ORIGIN = "extra/auv-fmu/origin.json"
+
+
+def origin_of(content: bytes) -> Origin | None:
+    """What a record of an origin says; None: it is none of ours."""
+    try:
+        origin = Origin(**json.loads(content))
+        names = [origin.fmu, origin.script, *origin.digests]
+        is_below = not any(Path(name).is_absolute() or ".." in Path(name).parts for name in names)
+        is_ours = is_below and not Path(origin.folder).is_absolute()
+    except (AttributeError, RecursionError, TypeError, ValueError):
+        return None
+    return origin if is_ours else None
+
+
+def digest_at(path: Path) -> str | None:
+    """The SHA-256 of a file, whatever ends its lines; None: there is no such file."""
+    try:
+        content = path.read_bytes() if path.is_file() else None
+    except OSError:
+        return None
+    if content is None:
+        return None
+    return hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+
+
+def add_to_archive(path: Path, name: str, content: bytes) -> None:
+    """Add an entry to an archive, whose bytes still depend only on its entries."""
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(_info(name), content, compresslevel=9)
+
+
 def write_archive(path: Path, entries: dict[str, bytes]) -> None:
     """Write a zip archive whose bytes depend only on its entries, all at once."""
     partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
         with zipfile.ZipFile(partial, "w") as archive:
             for name in sorted(entries):
-                info = zipfile.ZipInfo(name, _EPOCH)
-                info.compress_type = zipfile.ZIP_DEFLATED
-                info.create_system = 3
-                info.external_attr = 0o644 << 16
-                archive.writestr(info, entries[name], compresslevel=9)
+                archive.writestr(_info(name), entries[name], compresslevel=9)
         partial.replace(path)
     finally:
         partial.unlink(missing_ok=True)
+
+
+def _info(name: str) -> zipfile.ZipInfo:
+    info = zipfile.ZipInfo(name, _EPOCH)
+    info.compress_type = zipfile.ZIP_DEFLATED
+    info.create_system = 3
+    info.external_attr = 0o644 << 16
+    return info
 
 
 def digest_of(contents: Mapping[str, bytes]) -> bytes:

@@ -12,6 +12,7 @@ import os
 import sys
 import traceback
 from collections.abc import Iterator
+from contextlib import suppress
 from importlib.machinery import (
     EXTENSION_SUFFIXES,
     SOURCE_SUFFIXES,
@@ -71,6 +72,11 @@ def is_component(path: Path) -> bool:
     return not names.isdisjoint(_FUNCTIONS)
 
 
+def no_component(path: Path) -> str:
+    """What is said of a script that is no component."""
+    return f"{path}: not a component, which has functions begin() and advance() (see `auv-fmu new`)"
+
+
 def _defined(node: ast.stmt) -> Iterator[str]:
     if isinstance(node, ast.FunctionDef):
         yield node.name
@@ -102,6 +108,7 @@ def source_of_script(path: Path) -> Source:
     if stem in sys.stdlib_module_names or is_other:
         raise ValueError(f"{path}: {stem} is already a module of Python; choose another name")
     import_from(root)
+    watch(root)
     if place.is_dir():
         modules = tuple(f"{stem}.{module}" for module in _MODULES)
         return Source(name_of(stem), modules, place, root)
@@ -138,6 +145,72 @@ def _is_of(module: object, place: Path) -> bool:
     """Whether a module, or one below it, is that of a place."""
     file, folders = getattr(module, "__file__", None), getattr(module, "__path__", ())
     return str(place) in map(str, (file, *folders))
+
+
+# Data files
+
+#: The files that were read in folders of scripts, by their paths from there.
+_read: dict[Path, dict[str, Path]] = {}
+
+#: Endings of what is no data: modules, and what is made of them.
+_NO_DATA = (".py", ".pyc", ".pyi", ".fmu")
+
+
+def watch(root: Path) -> None:
+    """Remember from now on which data files are read in the folder of a script, and below it."""
+    if not _read:
+        sys.addaudithook(_see)
+    _read.setdefault(root, {})
+
+
+def data_files(root: Path) -> dict[str, Path]:
+    """The data files that modules in a folder have read there, by their paths from there."""
+    return {name: path for name, path in _read.get(root, {}).items() if path.is_file()}
+
+
+def _see(event: str, arguments: tuple[object, ...]) -> None:
+    """Take note of a file that Python opens.
+
+    Raises:
+        ValueError: its path begins in the current folder, which is another one in a host.
+
+    """
+    if event != "open" or not isinstance(arguments[0], (str, bytes, os.PathLike)):
+        return
+    name, flags = Path(os.fsdecode(arguments[0])), arguments[2]
+    if isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR):
+        return
+    with suppress(OSError, ValueError):
+        path = Path(os.path.normpath(Path.cwd() / name))
+        for root, found in _read.items():
+            if root in path.parents and _is_data(path, root) and _is_open_in(root):
+                found[path.relative_to(root).as_posix()] = path
+                is_relative = not name.is_absolute() and path.is_file()
+                break
+        else:
+            return
+    if is_relative:
+        raise ValueError(
+            f"{name} is read from the current folder, which is another one where the FMU runs: "
+            f"write Path(__file__).with_name({name.name!r})"
+        )
+
+
+def _is_open_in(root: Path) -> bool:
+    """Whether a module in a folder is being run, from which others may be called."""
+    return any(
+        lies_in(root, Path(frame.f_code.co_filename), str(frame.f_globals.get("__name__")))
+        for frame, _ in traceback.walk_stack(None)
+    )
+
+
+def _is_data(path: Path, root: Path) -> bool:
+    """Whether a file below a folder is neither a module nor a file of an installed package."""
+    parts = path.relative_to(root).parts
+    if path.suffix in _NO_DATA or any(part.startswith((".", "__pycache__")) for part in parts):
+        return False
+    others = {Path(folder) for folder in sys.path} - {root}
+    return others.isdisjoint(path.parents[: len(parts)])
 
 
 # Mistakes

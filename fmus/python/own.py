@@ -1,8 +1,9 @@
 """A slave of PythonFMU as an FMU, from the user's own script.
 
 The script holds a class, plain or on the base of this package. Its FMU is sealed like the ones of
-the bundle: built again after a change, it runs the changed code in the same process, and modules
-that lie beside the script are in it.
+the bundle: built again after a change, it runs the changed code in the same process. Modules that
+lie beside the script are in it, and data files that were read while the script was imported and
+its slave was made.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from pathlib import Path
 from pythonfmu.builder import get_model_class
 
 from fmus.python.packaging import best_loader, fmu_entries, seal
-from fmus.script import import_from
+from fmus.script import import_from, no_component, watch
 
 #: The script of the FMU, with a slave that may raise.
 _SCRIPT = """\
@@ -37,7 +38,13 @@ def build_script(script: Path, destination: Path, loader: str | None = None) -> 
     """
     own = script.resolve().parent
     import_from(own)
-    component = get_model_class(script).__name__
+    watch(own)
+    try:
+        component = get_model_class(script).__name__
+    except ValueError as error:
+        if str(error).startswith("No child class of Fmi2Slave"):
+            raise ValueError(f"{no_component(script)}, and has no class of PythonFMU") from None
+        raise
     text = _SCRIPT.format(module=script.stem, component=component)
     path = destination / f"{component}.fmu"
     seal(fmu_entries(component, text, loader or best_loader(), own), path)

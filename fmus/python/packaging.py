@@ -8,7 +8,6 @@ import sys
 import zipfile
 from dataclasses import dataclass
 from functools import cache
-from modulefinder import ModuleFinder
 from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
@@ -21,11 +20,12 @@ from fmus.discovery import (
     digest_of,
     guid_of,
     licences,
-    lies_in,
     package_folder,
     write_archive,
 )
 from fmus.kinds import PYTHON
+from fmus.python.modules import modules_of, with_other_imports
+from fmus.script import data_files
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
@@ -65,26 +65,16 @@ _DESCRIPTION = "modelDescription.xml"
 _GUID_FILE = "resources/guid.txt"
 _GUID = re.compile(rb'guid="[^"]*"')
 
-#: `import`, and the modules after it.
-_IMPORT = re.compile(r"^(\s*import\s+)([\w., \t]*\w)", re.MULTILINE)
+#: What PythonFMU writes besides: the time of the build.
+_TIME = re.compile(rb' generationDateAndTime="[^"]*"')
 
 
 def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
     """Lay out a script and the modules it needs the way PythonFMU wants them."""
     path = stage / f"{script}.py"
     path.write_text(text, encoding="utf-8")
-    roots = [folder.parent for folder in _FOLDERS.values()]
-    finder = ModuleFinder(path=[str(root) for root in (*roots, *([own] if own else []))])
-    finder.run_script(str(path))
-    for name, found in finder.modules.items():
-        source, top = getattr(found, "__file__", None), name.split(".")[0]
-        if top in _FOLDERS and source is not None:
-            root = _FOLDERS[top].parent
-        elif own is not None and source is not None and lies_in(own, Path(source), name):
-            root = own
-        else:
-            continue
-        target = stage / Path(source).relative_to(root)
+    for place, source in modules_of(text, _FOLDERS, own).items():
+        target = stage / place
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(source, target)
     return path
@@ -97,7 +87,8 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
         name: of the FMU.
         text: of the script, which settles a slave (:mod:`fmus.python.loading`).
         loader: `native` or `plain`.
-        own: folder of modules that go into the FMU beside this package's; None: none.
+        own: folder of modules that go into the FMU beside this package's, with the data files that
+            they have read; None: none.
 
     Raises:
         OSError: the loader cannot be compiled.
@@ -113,6 +104,9 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
         )
         with zipfile.ZipFile(raw) as archive:
             entries = {entry: archive.read(entry) for entry in archive.namelist()}
+    if own is not None:
+        data = {f"{_RESOURCES}{name}": file.read_bytes() for name, file in data_files(own).items()}
+        entries = {**data, **entries}
     entries["model.png"] = documentation.ICON.read_bytes()
     entries["documentation/licenses/license.txt"] = licences(PYTHON).encode()
     return _with_loader(entries) if loader == "native" else entries
@@ -179,7 +173,8 @@ def seal(entries: dict[str, bytes], destination: Path) -> None:
 
     """
     entries = dict(entries)
-    entries[_DESCRIPTION] = _GUID.sub(b'guid=""', entries[_DESCRIPTION], count=1)
+    description = _TIME.sub(b"", entries[_DESCRIPTION], count=1)
+    entries[_DESCRIPTION] = _GUID.sub(b'guid=""', description, count=1)
     digest = digest_of(entries)
     guid = guid_of(digest).encode()
     entries = _renamed(entries, digest.hex()[:12])
@@ -195,36 +190,15 @@ def _renamed(entries: dict[str, bytes], suffix: str) -> dict[str, bytes]:
         if name.startswith(_RESOURCES) and name.endswith(".py")
     }
     alternatives = "|".join(sorted(map(re.escape, modules)))
-    from_module = re.compile(rf"^(\s*from\s+(?:{alternatives}))\b", re.MULTILINE)
-    imported = re.compile(rf"^({alternatives})((?:\.\w+)*)(\s+as\s+\w+)?$")
-
-    def import_statement(found: re.Match[str]) -> str:
-        """The same modules, and the names that the script has for them."""
-        wanted = [
-            imported.sub(lambda one: _under_its_name(one, suffix), name.strip())
-            for name in found[2].split(",")
-        ]
-        return found[1] + ", ".join(wanted)
-
     resource = re.compile(rf"^({_RESOURCES}(?:{alternatives}))(?=/|\.py$)")
     renamed = {}
     for name, content in entries.items():
         if name.startswith(_RESOURCES) and name.endswith(".py"):
-            text = from_module.sub(rf"\1_{suffix}", content.decode("utf-8"))
-            content = _IMPORT.sub(import_statement, text).encode()
+            content = with_other_imports(content, modules, f"_{suffix}")
         elif name == _SLAVE_MODULE:
             content = content.strip() + f"_{suffix}".encode()
         renamed[resource.sub(rf"\1_{suffix}", name)] = content
     return renamed
-
-
-def _under_its_name(imported: re.Match[str], suffix: str) -> str:
-    """One module of an import statement, so that it is still found under its own name."""
-    top, below, other_name = imported.groups(default="")
-    sealed = f"{top}_{suffix}"
-    if other_name:
-        return f"{sealed}{below}{other_name}"
-    return f"{sealed}{below}, {sealed} as {top}" if below else f"{sealed} as {top}"
 
 
 @dataclass(frozen=True)

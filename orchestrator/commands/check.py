@@ -17,7 +17,7 @@ from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
 from orchestrator.master.fmi.binary import binary_of, check_binary
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.loading import load_scenario, outdated
 from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
@@ -124,6 +124,8 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
     component = examine(Path(options.file), findings)
     if component is None:
         return []
+    if text := outdated(component):
+        findings.note(text)
     return _binary(component, findings) + list(surprises(component))
 
 

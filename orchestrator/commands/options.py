@@ -102,6 +102,7 @@ def read_system(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tupl
     """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
     found = load_scenario(options.scenario, options.kind, fmi, options.variant, findings)
+    findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")
     return found

@@ -46,6 +46,10 @@ _LICENCES = {ZIG: ("MIT", "ZPL-2.1")}
 CATEGORY = "fmus"
 
 
+class BuildFailed(InputError):
+    """The FMU of a user's script cannot be built."""
+
+
 def build_bundle(
     folder: Path,
     loader: str | None = None,
@@ -190,7 +194,8 @@ def run_fmus(
         These lines.
 
     Raises:
-        InputError: it failed.
+        BuildFailed: it failed for what is in a user's script.
+        InputError: it failed for anything else.
 
     """
     try:
@@ -198,7 +203,8 @@ def run_fmus(
     except OSError as error:
         raise InputError(f"the FMUs cannot be built: {reason(error)}") from error
     if process.returncode != 0:
-        raise InputError(last_line(process.stderr))
+        failure = BuildFailed if process.returncode == 1 else InputError
+        raise failure(last_line(process.stderr))
     return process.stdout.splitlines()
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
+from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
 from orchestrator.figures.run_figures import check_figure
 from orchestrator.formats.osp_and_container import OSP_STRUCTURE, read_osp
@@ -20,8 +21,8 @@ from orchestrator.machine.user_files import is_folder
 from orchestrator.master.experiment import step_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import Scenario, names, read_scenario, scenario_of
-from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import read_component
+from orchestrator.runs.wiring import check_built, closed_loop
+from orchestrator.system.component import Component, read_component
 from orchestrator.system.graph import unfed_inputs
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -95,12 +96,50 @@ def load_scenario(
             they are.
         fmi: their version of FMI, `2` or `3`; the Python kind has only the first.
         variant: which of the descriptions in an SSP; None: the default.
-        findings: takes what is wrong with it; None: harmless flaws are ignored.
+        findings: takes what is wrong with it; None: harmless flaws are ignored, and an FMU that is
+            older than its script gives a warning.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
 
     """
+    scenario, system = _loaded(name, kind, fmi, variant, findings)
+    for component in system.components.values():
+        if text := outdated(component):
+            if findings is None:
+                warnings.warn(text, stacklevel=2)
+            else:
+                findings.note(text)
+    return scenario, system
+
+
+def outdated(component: Component) -> str | None:
+    """That the FMU of a user's script is older than the script beside it; None: it is not."""
+    record = component.folder / ORIGIN
+    origin = origin_of(record.read_bytes()) if record.is_file() else None
+    # Under another name it has been kept, and the script is meant to be newer.
+    if origin is None or component.fmu.name != origin.fmu:
+        return None
+    changed = origin.changed(component.fmu)
+    if not changed:
+        return None
+    command = f"auv-fmu build {origin.place(component.fmu) / origin.script}"
+    command += f" --kind {NATIVE}" * (origin.kind == NATIVE)
+    command += " --fmi 3" * (component.description.fmiMajorVersion == 3)
+    command += f" --out {component.fmu.parent}" * (origin.folder != ".")
+    return (
+        f"{component.name}: {component.fmu} is older than {changed[0]}; build it again ({command}) "
+        "or give it another name"
+    )
+
+
+def _loaded(
+    name: str | Path | Mapping[str, Any],
+    kind: str,
+    fmi: str,
+    variant: str | None,
+    findings: Findings | None,
+) -> tuple[Scenario, System]:
     if isinstance(name, Mapping):
         if variant is not None:
             raise InputError("a dictionary has no variants; only an SSP can have them")
@@ -133,6 +172,7 @@ def read_fmu(path: Path, findings: Findings | None = None) -> System:
 
     """
     name = re.sub(r"\W", "_", path.stem)
+    check_built(path)
     component = read_component(name, path, findings=findings)
     return System(
         name=path.stem,

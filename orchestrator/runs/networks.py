@@ -6,9 +6,11 @@ and `activations`, one name a layer; without these, hidden layers have tanh and 
 
 from __future__ import annotations
 
+import math
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from itertools import pairwise
 from keyword import iskeyword
 from pathlib import Path
@@ -17,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmus.ports.port import FAULT, H_MAX, TIME
-from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.errors import InputError, escape_unprintable, reason
 
 #: What a layer may do with each of its sums, by the names in files.
 ACTIVATIONS = ("none", "tanh", "relu", "sigmoid")
@@ -25,11 +27,20 @@ ACTIVATIONS = ("none", "tanh", "relu", "sigmoid")
 #: More numbers than the text of a component should hold.
 MOST_WEIGHTS = 100_000
 
+#: More than the language of equations takes in a matrix.
+MOST_OF_A_LAYER = 65_536
+
+#: More numbers in a row than a graph is evaluated for.
+MOST_NEURONS = 4096
+
 #: What ONNX calls them.
 _OF_ONNX = {"Tanh": "tanh", "Relu": "relu", "Sigmoid": "sigmoid"}
 
-#: What changes nothing of a row of numbers.
-_PASSES = frozenset(("Identity", "Flatten", "Dropout", "Cast", "Reshape", "Squeeze", "Unsqueeze"))
+#: The types that it has numbers of, by its own numbers of them.
+_FLOATS = {1: np.float32, 11: np.float64}
+
+#: Earlier ones have other operators by the same names.
+_OLDEST_OPSET = 7
 
 #: Ports that every component has, or any may have.
 _PORTS_OF_ALL = (FAULT.name, H_MAX.name, TIME.name)
@@ -105,6 +116,10 @@ def _check(network: Network) -> None:
                 f"{other.W.shape[1]}"
             )
     for i, layer in enumerate(network.layers, start=1):
+        if layer.W.size > MOST_OF_A_LAYER:
+            raise InputError(
+                f"layer {i} has {layer.W.size} weights; a layer may have {MOST_OF_A_LAYER}"
+            )
         if layer.b.shape != layer.W.shape[:1]:
             raise InputError(f"layer {i} has {layer.W.shape[0]} neurons and {layer.b.size} biases")
         if layer.activation not in ACTIVATIONS:
@@ -149,54 +164,269 @@ def _from_onnx(path: Path) -> Network:
         raise InputError(
             "reading it needs the package onnx: pip install 'auv-fmu[networks]'"
         ) from None
-    graph = onnx.load(str(path)).graph
-    known = {tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in graph.initializer}
-    inputs = [value.name for value in graph.input if value.name not in known]
-    if len(inputs) != 1 or len(graph.output) != 1:
+    model = onnx.load(str(path))
+    # It refuses shapes and types that do not fit.
+    onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True)
+    versions = {entry.domain: entry.version for entry in model.opset_import}
+    if versions.get("", 0) < _OLDEST_OPSET:
+        raise InputError(f"it has no opset of ONNX from {_OLDEST_OPSET} on")
+    to_array, graph = onnx.numpy_helper.to_array, model.graph
+    constants = {tensor.name: to_array(tensor) for tensor in graph.initializer}
+    given = [value for value in graph.input if value.name not in constants]
+    if len(given) != 1 or len(graph.output) != 1:
         raise InputError(
-            f"it has {len(inputs)} inputs and {len(graph.output)} outputs; one each is wanted"
+            f"it has {len(given)} inputs and {len(graph.output)} outputs; one each is wanted"
         )
-    layers: list[Dense] = []
-    value = inputs[0]
+    layers = _Layers(given[0].name, _input_shape(given[0], onnx.TensorProto), constants)
     for node in graph.node:
         attributes = {a.name: onnx.helper.get_attribute_value(a) for a in node.attribute}
-        if node.op_type == "Constant":
-            known[node.output[0]] = onnx.numpy_helper.to_array(attributes["value"])
-            continue
-        given = [known[name] for name in node.input if name in known]
-        if value not in node.input:
-            raise InputError(f"{node.op_type} does not follow the layer before: it has branches")
-        _append(layers, node.op_type, attributes, given, at_left=node.input[0] == value)
-        value = node.output[0]
-    if not layers or value != graph.output[0].name:
-        raise InputError("it has no dense layers, or its output is not the last of them")
-    return Network(layers, inputs[0], graph.output[0].name)
+        if "value" in attributes:
+            attributes["value"] = to_array(attributes["value"])
+        try:
+            if node.domain not in ("", "ai.onnx"):
+                raise InputError(f"{node.domain} is not supported")
+            layers.evaluate(node.op_type, node.input, node.output[0], attributes)
+        except (InputError, ValueError, TypeError, IndexError) as error:
+            raise InputError(f"operator {node.op_type}: {reason(error)}") from None
+    outputs = graph.output[0].name
+    return Network(layers.up_to(outputs), given[0].name, outputs)
 
 
-def _append(
-    layers: list[Dense],
-    operator: str,
-    attributes: dict[str, Any],
-    given: Sequence[Any],
+def _input_shape(given: Any, types: Any) -> tuple[int, ...]:
+    """The shape of the input of a graph: one row, where it has several dimensions."""
+    declared = given.type.tensor_type
+    if declared.elem_type not in (types.FLOAT, types.DOUBLE):
+        raise InputError(f"its input {given.name} is not of the type float or double")
+    sizes = [dimension.dim_value for dimension in declared.shape.dim]
+    batch, *others = sizes if len(sizes) > 1 else (1, *sizes)
+    if batch > 1 or not others or min(others) < 1:
+        shown = ", ".join(str(size) if size > 0 else "?" for size in sizes)
+        raise InputError(
+            f"its input {given.name} has the shape [{shown}]; export it for one row of n numbers: "
+            "[1, n]"
+        )
+    return (1, *others) if len(sizes) > 1 else (*others,)
+
+
+class _Value(NamedTuple):
+    """What a name in a graph stands for: a constant, or an affine function of a layer."""
+
+    offset: Any  #: array: the constant, or the value where the layer gives zeros
+    slopes: Any = None  #: arrays: how each number of the layer changes it; None: a constant
+    layer: int = 0  #: how many layers are before it
+    is_sum: bool = False  #: whether it has been multiplied by a matrix
+
+
+class _Layers:
+    """The layers of a graph, found by evaluating it.
+
+    Operators are functions of arrays. An affine function is its offset and its slopes, so an
+    operator that keeps it affine is evaluated at each of them. An activation ends a layer.
+    """
+
+    def __init__(self, inputs: str, shape: tuple[int, ...], constants: Mapping[str, Any]) -> None:
+        self._layers: list[Dense] = []
+        self._known = {name: _Value(_numbers(array)) for name, array in constants.items()}
+        self._known[inputs] = self._begun(shape)
+
+    def up_to(self, name: str) -> list[Dense]:
+        """All layers up to a value."""
+        rest = self._ended(self._variable(name), "none")
+        if not np.array_equal(rest.W, np.eye(*rest.W.shape)) or rest.b.any():
+            return [*self._layers, rest]
+        if not self._layers:
+            raise InputError("it has no dense layers")
+        return self._layers
+
+    def evaluate(
+        self, name: str, inputs: Sequence[str], output: str, attributes: Mapping[str, Any]
+    ) -> None:
+        """Find what an operator gives.
+
+        Raises:
+            InputError: it is not supported, or not with these inputs.
+            IndexError, TypeError, ValueError: its inputs or attributes do not fit.
+
+        """
+        if name in _OF_ONNX:
+            self._known[output] = self._closed(inputs[0], _OF_ONNX[name])
+            return
+        if name not in _OPERATORS:
+            supported = ", ".join((*_OPERATORS, *_OF_ONNX))
+            raise InputError(f"not supported; layers may consist of {supported}")
+        operator = _OPERATORS[name]
+        function = partial(operator.function, **attributes)
+        for missing in {*inputs} - {*self._known, ""}:
+            raise InputError(f"its input {missing!r} is not supported")
+        places = [i for i, one in enumerate(inputs) if one and self._is_variable(one)]
+        factors = [i for i in places if i in operator.factors]
+        if len(factors) > 1 or not {*places} <= {*operator.factors, *operator.terms}:
+            raise InputError("more than one of its inputs depends on the network's")
+        for i in factors if operator.is_sum else ():
+            if self._known[inputs[i]].is_sum:
+                # The product of the weights of two layers may be many more numbers.
+                self._known[inputs[i]] = self._closed(inputs[i], "none")
+        values = [self._known[one] if one else None for one in inputs]
+        offset = _numbers(function(*(value and value.offset for value in values)))
+        if not places:
+            self._known[output] = _Value(offset)
+            return
+        variable = [self._variable(inputs[i]) for i in places]
+        if (size := offset.size * len(variable[0].slopes)) > MOST_NEURONS**2:
+            raise InputError(f"{size} weights are too many")
+        # A sum of constants has no slope, and neither has a constant product in it.
+        without = {*operator.terms, *(() if factors else operator.factors)}
+        still = [
+            value and (np.zeros_like(value.offset) if i in without else value.offset)
+            for i, value in enumerate(values)
+        ]
+        slopes = []
+        for each in zip(*(value.slopes for value in variable), strict=True):
+            for i, slope in zip(places, each, strict=True):
+                still[i] = slope
+            slopes.append(function(*still))
+        is_sum = any(value.is_sum for value in variable) or bool(factors and operator.is_sum)
+        self._known[output] = _Value(
+            offset, np.stack(slopes).astype(float), len(self._layers), is_sum
+        )
+
+    def _is_variable(self, name: str) -> bool:
+        return self._known[name].slopes is not None
+
+    def _variable(self, name: str) -> _Value:
+        """An affine function of the last layer."""
+        value = self._known.get(name)
+        if value is None or value.slopes is None:
+            raise InputError(f"{name} does not depend on the network's input")
+        if value.layer != len(self._layers):
+            raise InputError(f"{name} comes from an earlier layer: the network has branches")
+        return value
+
+    def _ended(self, value: _Value, activation: str) -> Dense:
+        return Dense(
+            value.slopes.reshape(len(value.slopes), -1).T, value.offset.ravel(), activation
+        )
+
+    def _closed(self, name: str, activation: str) -> _Value:
+        """End a layer; what it gives has the shape of its sums."""
+        value = self._variable(name)
+        self._layers.append(self._ended(value, activation))
+        return self._begun(value.offset.shape)
+
+    def _begun(self, shape: tuple[int, ...]) -> _Value:
+        """The numbers that the last layer gives, or the inputs."""
+        n = math.prod(shape)
+        if n > MOST_NEURONS:
+            raise InputError(f"a row has {n} numbers; it may have {MOST_NEURONS}")
+        return _Value(np.zeros(shape), np.eye(n).reshape(n, *shape), len(self._layers))
+
+
+def _numbers(array: Any) -> Any:
+    """Numbers of single precision in double precision; integers as they are."""
+    array = np.asarray(array)
+    if array.dtype.kind not in "biu" and array.dtype not in (np.float32, np.float64):
+        raise InputError(f"constants of the type {array.dtype} are not supported")
+    return array.astype(float) if array.dtype.kind == "f" else array
+
+
+# What operators of ONNX make of arrays: inputs have places, attributes have names. Some inputs were
+# attributes in older opsets.
+
+
+def _constant(**content: Any) -> Any:
+    [(name, value)] = content.items()
+    if name not in ("value", "value_float", "value_floats", "value_int", "value_ints"):
+        raise InputError(f"{name} is not supported")
+    is_integer = name.startswith("value_int")
+    return value if name == "value" else np.array(value, dtype=np.int64 if is_integer else float)
+
+
+def _gemm(
+    a: Any,
+    b: Any,
+    c: Any = None,
     *,
-    at_left: bool,
-) -> None:
-    """Add an operator of ONNX to the layers, of which numbers come as rows."""
-    if operator == "Gemm":
-        W = attributes.get("alpha", 1.0) * (given[0] if attributes.get("transB") else given[0].T)
-        b = attributes.get("beta", 1.0) * given[1] if len(given) > 1 else np.zeros(len(W))
-        layers.append(Dense(W.astype(float), np.ravel(b).astype(float), "none"))
-    elif operator == "MatMul" and at_left:
-        W = given[0].T.astype(float)
-        layers.append(Dense(W, np.zeros(len(W)), "none"))
-    elif operator == "Add" and layers and layers[-1].activation == "none":
-        b = np.broadcast_to(np.ravel(given[0]), layers[-1].b.shape).astype(float)
-        layers[-1] = layers[-1]._replace(b=layers[-1].b + b)
-    elif operator in _OF_ONNX and layers and layers[-1].activation == "none":
-        layers[-1] = layers[-1]._replace(activation=_OF_ONNX[operator])
-    elif operator not in _PASSES:
-        known = ", ".join(("Gemm", "MatMul", "Add", *_OF_ONNX))
-        raise InputError(f"it has the operator {operator} here; dense layers consist of {known}")
+    alpha: float = 1.0,
+    beta: float = 1.0,
+    transA: int = 0,
+    transB: int = 0,
+) -> Any:
+    if a.ndim != 2 or b.ndim != 2:
+        raise InputError("its factors are not matrices")
+    product = alpha * ((a.T if transA else a) @ (b.T if transB else b))
+    return product if c is None else product + np.broadcast_to(beta * c, product.shape)
+
+
+def _divide(a: Any, b: Any) -> Any:
+    if a.dtype.kind != "f":
+        raise InputError("a division of integers is not supported")
+    return a / b
+
+
+def _cast(x: Any, *, to: int, saturate: int = 1, round_mode: str = "") -> Any:
+    """To single or double precision, for which the other two attributes have no meaning."""
+    if to not in _FLOATS:
+        raise InputError("only a cast to float or double is supported")
+    return x.astype(_FLOATS[to])
+
+
+def _dropout(x: Any, ratio: Any = None, training_mode: Any = None, *, seed: int = 0) -> Any:
+    if training_mode is not None and training_mode.any():
+        raise InputError("training_mode is not supported")
+    return x
+
+
+def _flatten(x: Any, *, axis: int = 1) -> Any:
+    return x.reshape(math.prod(x.shape[:axis]), -1)
+
+
+def _reshape(x: Any, shape: Any, *, allowzero: int = 0) -> Any:
+    copied = [n or (0 if allowzero else x.shape[i]) for i, n in enumerate(shape)]
+    return x.reshape(copied)
+
+
+def _squeeze(x: Any, axes: Any = None) -> Any:
+    return np.squeeze(x, None if axes is None else tuple(axes))
+
+
+def _unsqueeze(x: Any, axes: Any) -> Any:
+    return np.expand_dims(x, tuple(axes))
+
+
+def _transpose(x: Any, *, perm: Any = None) -> Any:
+    return np.transpose(x, perm)
+
+
+def _identity(x: Any) -> Any:
+    return x
+
+
+class _Operator(NamedTuple):
+    """An operator, and where its inputs may depend on those of the network."""
+
+    function: Callable[..., Any]
+    factors: Sequence[int] = ()  #: places of inputs of which one may depend on them
+    terms: Sequence[int] = ()  #: places of inputs that are added
+    is_sum: bool = False  #: whether it multiplies matrices
+
+
+_OPERATORS = {
+    "Gemm": _Operator(_gemm, (0, 1), (2,), is_sum=True),
+    "MatMul": _Operator(np.matmul, (0, 1), is_sum=True),
+    "Add": _Operator(np.add, terms=(0, 1)),
+    "Sub": _Operator(np.subtract, terms=(0, 1)),
+    "Mul": _Operator(np.multiply, (0, 1)),
+    "Div": _Operator(_divide, (0,)),
+    "Constant": _Operator(_constant),
+    "Cast": _Operator(_cast, (0,)),
+    "Dropout": _Operator(_dropout, (0,)),
+    "Flatten": _Operator(_flatten, (0,)),
+    "Identity": _Operator(_identity, (0,)),
+    "Reshape": _Operator(_reshape, (0,)),
+    "Squeeze": _Operator(_squeeze, (0,)),
+    "Transpose": _Operator(_transpose, (0,)),
+    "Unsqueeze": _Operator(_unsqueeze, (0,)),
+}
 
 
 def component_text(name: str, network: Network, source: str) -> str:
@@ -214,7 +444,8 @@ def component_text(name: str, network: Network, source: str) -> str:
     imports = [f"from math import {', '.join(names)}"] if names else []
     head = [
         f'"""{name}: a neural network of dense layers, {" - ".join(map(str, sizes))}.\n\n'
-        f"Made from {source} by `auv-fmu new component --from`, with its weights written out.\n"
+        f"Made from `{_in_docstring(source)}` by `auv-fmu new component --from`, with its weights "
+        "written out.\n"
         '"""',
         "from __future__ import annotations",
         "\n".join([*imports, "from typing import Annotated, NamedTuple"]),
@@ -233,6 +464,12 @@ def component_text(name: str, network: Network, source: str) -> str:
         _forward(network),
     ]
     return "\n\n\n".join(["\n\n".join(head), *body]) + "\n"
+
+
+def _in_docstring(name: str) -> str:
+    """The name of a file in a docstring, in backticks."""
+    shown = escape_unprintable(name).replace("`", "'")
+    return shown.replace("\\", r"\\").replace('"', r"\"")
 
 
 def _port(name: str, otherwise: str) -> str:

@@ -6,19 +6,22 @@
 from __future__ import annotations
 
 import keyword
+import os
 import re
 import shutil
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from zipfile import BadZipFile, ZipFile
 
-from fmus.discovery import name_of
+from fmus.discovery import ORIGIN, name_of, origin_of
 from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.bundle import run_fmus
+from orchestrator.runs.bundle import BuildFailed, run_fmus
 from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
@@ -192,13 +195,43 @@ def build_own(
     options += ["--loader", loader] if loader is not None else []
     options += ["--platforms", platforms] if platforms is not None else []
     with TemporaryDirectory(dir=process_folder()) as temporary:
-        run_fmus("build", Path(temporary), *options, hear=hear)
-        [built] = Path(temporary).glob("*.fmu")
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder
+        try:
+            run_fmus("build", Path(temporary), *options, *_home(own, place), hear=hear)
+        except BuildFailed as error:
+            removed = [path.name for path in _built_from(script, place)]
+            for name in removed:
+                (place / name).unlink()
+            gone = f"; {', '.join(removed)} of an earlier build is removed" * bool(removed)
+            raise InputError(f"{error}{gone}") from None
+        [built] = Path(temporary).glob("*.fmu")
         with replace_files(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)
     return place / built.name
+
+
+def _home(script: Path, fmu: Path) -> Sequence[str]:
+    """The option that says where the folder of a script is, seen from that of its FMU.
+
+    It is recorded in the FMU. So it is left out where it would have names of folders that are not
+    of the project, which is the current folder.
+    """
+    here, folders = Path.cwd(), (script.resolve(), fmu.resolve())
+    is_within = all(here in (folder, *folder.parents) for folder in folders)
+    return ["--from", Path(os.path.relpath(*folders)).as_posix()] if is_within else []
+
+
+def _built_from(script: Path, folder: Path) -> Iterator[Path]:
+    """The FMUs in a folder that were built from a script, and have the names that they got."""
+    names = [script.name]
+    if script.is_dir():
+        names = [f"{script.resolve().name}.py", ""]
+    for path in folder.glob("*.fmu"):
+        with suppress(OSError, KeyError, BadZipFile), ZipFile(path) as archive:
+            origin = origin_of(archive.read(ORIGIN))
+            if origin and origin.script in names and origin.fmu == path.name:
+                yield path
 
 
 def changes(script: Path) -> Iterator[None]:

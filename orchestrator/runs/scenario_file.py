@@ -140,7 +140,9 @@ class ScenarioFile(TomlTable):
     only: list[Name] = entry(
         "The components to keep; wires to the others are removed too.", "all of them"
     )
-    remark: str = entry("What the report says below the figure, in Markdown without pictures.", "none")
+    remark: str = entry(
+        "What the report says below the figure, in Markdown without pictures.", "none"
+    )
     vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = entry(
         "How many vehicles there are, `auv1`, `auv2` and so on, each with the closed loop: see "
         "[several vehicles](../how-to/vehicles.md).",

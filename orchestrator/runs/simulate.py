@@ -149,6 +149,7 @@ def simulate(
     else:
         with notes_as_warnings(strict) as findings:
             scenario, system = load_scenario(system, kind, variant=variant, findings=findings)
+            findings.refuse()
     if not isinstance(parameters, Mapping | None):
         raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
     request = Request(

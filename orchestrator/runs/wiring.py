@@ -8,7 +8,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from fmus.discovery import name_of
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, vehicle_names
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.connection import Connection
@@ -57,8 +59,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
     components = {}
     for name, fmu in chosen.items():
         with findings.collecting():
-            path = Path(fmu) if fmu.endswith(".fmu") else folder / f"{fmu}.fmu"
-            components[name] = read_component(name, path)
+            components[name] = read_component(name, _file_of(name, fmu, folder))
     findings.refuse()
     connections: list[Connection] = []
     for target, source in wires.items():
@@ -87,6 +88,33 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
             values[port] = value
     findings.refuse()
     return system.with_parameters(values)
+
+
+def _file_of(name: str, fmu: str, folder: Path) -> Path:
+    """The file of a component: a name of an FMU of the bundle, or a path."""
+    if fmu.endswith(".fmu"):
+        check_built(Path(fmu))
+        return Path(fmu)
+    path = folder / f"{fmu}.fmu"
+    if not path.is_file():
+        known = sorted(path.stem for path in folder.glob("*.fmu"))
+        hint = did_you_mean(fmu, known) or f"; there are {', '.join(known)}"
+        raise InputError(f"{name}: the bundle has no FMU {fmu!r}{hint}")
+    return path
+
+
+def check_built(fmu: Path) -> None:
+    """Check that an FMU is there if there is a script for it.
+
+    Raises:
+        InputError: it has to be built.
+
+    """
+    if fmu.is_file() or not is_folder(fmu.parent):
+        return
+    for script in sorted(fmu.parent.glob("*.py")):
+        if name_of(script.stem).lower() == fmu.stem.lower():
+            raise InputError(f"{fmu}: no such file; build it: auv-fmu build {script}")
 
 
 def _left_open(chosen: Mapping[str, str], wiring: Mapping[str, Any]) -> Iterator[str]:

@@ -165,7 +165,9 @@ class StudyFile(TomlTable):
         '"fig5"',
     )
     title: str = entry("Heading of the figures.", "none")
-    remark: str = entry("What the report says below the figures, in Markdown without pictures.", "none")
+    remark: str = entry(
+        "What the report says below the figures, in Markdown without pictures.", "none"
+    )
     engine: Annotated[str, OneOf(ENGINES)] = entry(
         "What makes the runs: the FMUs, or the compiled equations, which cover only the closed "
         "loop of one vehicle and give the same numbers.",

@@ -92,8 +92,9 @@ def test_what_is_no_component_is_refused(tmp_path):
     assert mistakes(path) == (
         2,
         [
-            f"{path}: holds no component, as it has no functions begin and advance; build it, and "
-            "check its FMU"
+            f"{path}: not a component, which has functions begin() and advance() (see "
+            "`auv-fmu new`); if it has a class of PythonFMU, build it and check its FMU: "
+            f"auv-fmu build {path}"
         ],
     )
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.build import main
+from fmus.build import FAILED, main
 from fmus.compilers import machines_compiler
 from fmus.discovery import source_of
 from fmus.script import is_component, script_in, source_of_script
@@ -118,7 +118,7 @@ def test_mistakes_are_told_with_file_and_line(tmp_path, monkeypatch, mistake):
     write(tmp_path, change)
     monkeypatch.chdir(tmp_path)
     status, said = built("own_lag.py", "--out", tmp_path)
-    assert status == 2
+    assert status == FAILED
     assert said.startswith(why)
     assert "\n" not in said
 
@@ -127,7 +127,10 @@ def test_a_mistake_in_a_module_beside_is_told_with_its_line(tmp_path):
     path = write(tmp_path, ("from math import expm1", "from beside import expm1"))
     (tmp_path / "beside.py").write_text("from math import expm1\n\n1 / 0\n")
     status, said = built(path, "--out", tmp_path)
-    assert (status, said) == (2, f"{tmp_path}/beside.py:3: ZeroDivisionError: division by zero")
+    assert (status, said) == (
+        FAILED,
+        f"{tmp_path}/beside.py:3: ZeroDivisionError: division by zero",
+    )
 
 
 def test_what_is_outside_the_language_is_told_when_it_is_to_become_c(tmp_path, monkeypatch):
@@ -135,7 +138,7 @@ def test_what_is_outside_the_language_is_told_when_it_is_to_become_c(tmp_path, m
     monkeypatch.chdir(tmp_path)
     status, said = built("own_lag.py", "--kind", "native", "--out", tmp_path)
     why = "own_lag.py:57: ** with other than a whole constant is not in the language of equations"
-    assert (status, said[: len(why)]) == (2, why)
+    assert (status, said[: len(why)]) == (FAILED, why)
     assert built("own_lag.py", "--out", tmp_path) == (0, "")
 
 
@@ -145,8 +148,8 @@ def test_a_slave_of_pythonfmu_runs_only_in_python(tmp_path, options):
     path.write_text(SLAVE)
     assert built(path, "--kind", "native", *options, "--out", tmp_path) == (
         2,
-        f"{path}: a slave of PythonFMU runs only in Python; use --kind python, or write it as a "
-        "component (auv-fmu new component)",
+        f"{path}: not a component, which has functions begin() and advance() (see `auv-fmu new`); "
+        "a class of PythonFMU needs --kind python",
     )
 
 

@@ -101,6 +101,7 @@ def test_its_check_finds_nothing(made: Path, capsys):
     ("name", "why"),
     [
         ("my-law", "'my-law': not a name for a component; use letters, digits and underscores"),
+        ("class", "'class': class is a word of Python; choose another name"),
         ("json", "'json': json is already a module of Python; choose another name"),
     ],
 )
@@ -164,7 +165,7 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
         ),
         (
             ["build", "slave.py", "--kind", "native"],
-            "use --kind python, or write it as",
+            "slave.py: not a component, which has functions begin() and advance()",
         ),
     ],
 )

@@ -127,7 +127,14 @@ def test_dictionary_is_a_scenario_like_its_file(tmp_path):
         ({1: 1.0}, "scenario: 1: write names of entries as texts"),
         ({"events": [{"at": 0.5, 2: 1}]}, "event 1: 2: write names of entries as texts"),
         ({"components": {"controller": 3}}, "controller': 3}: write a table of names"),
-        ({"components": {"controller": "Nope"}}, "Nope.fmu: no such file"),
+        (
+            {"components": {"controller": "Nope"}},
+            "controller: the bundle has no FMU 'Nope'; there are AcousticLink, .*Sea$",
+        ),
+        (
+            {"components": {"controller": "PDController"}},
+            "controller: the bundle has no FMU 'PDController'; did you mean PdController?",
+        ),
         ({"parameters": {"plant.eta0": [1.0]}}, "plant.eta0: takes 6 values, not 1"),
     ],
 )

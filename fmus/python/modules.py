@@ -1,0 +1,175 @@
+"""The modules that an FMU holds: where they are, and their imports under other names."""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import sys
+import tokenize
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import lru_cache
+from importlib.machinery import SOURCE_SUFFIXES, PathFinder
+from importlib.util import decode_source
+from pathlib import Path
+from typing import NamedTuple
+
+
+def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dict[str, Path]:
+    """Find the modules that a script needs: those it imports, those that these import and so on.
+
+    Modules in other places, such as installed packages, are left out: the host has them.
+
+    Args:
+        text: of the script.
+        packages: that may be among them, and the folders that they are in.
+        own: folder that its other modules are in, which is on `sys.path`; None: there are none.
+
+    Returns:
+        The files, by their places below the folder that the script is in.
+
+    Raises:
+        SyntaxError: one of them is no Python.
+
+    """
+    return _Search(packages, own).files(text)
+
+
+class _Search:
+    """A search for modules."""
+
+    def __init__(self, packages: Mapping[str, Path], own: Path | None) -> None:
+        self._packages, self._own = packages, own
+        #: The folders that the modules in each are found in; none, if it is no package.
+        self._places: dict[str, Sequence[str]] = {}
+        self._files: dict[str, Path] = {}
+
+    def files(self, text: str) -> dict[str, Path]:
+        wanted = [*_imported(ast.parse(text), "")]
+        while wanted:
+            name = wanted.pop()
+            if name.endswith(".*"):
+                wanted += self._within(name[:-2])
+            elif name not in self._places:
+                wanted += self._imported_by(name)
+        return self._files
+
+    def _imported_by(self, name: str) -> Iterator[str]:
+        """The names that a module imports; it and the packages that it is in are needed."""
+        parent, _, last = name.rpartition(".")
+        if parent and parent not in self._places:
+            yield from self._imported_by(parent)
+        root = self._root(name.partition(".")[0])
+        within = self._places.get(parent, () if parent or root is None else [str(root)])
+        # By the last part: Python would look up the packages before it, which are not imported.
+        found = PathFinder.find_spec(last, [*within])
+        self._places[name] = [*((found and found.submodule_search_locations) or ())]
+        file = Path(found.origin) if found and found.origin else None
+        if root is None or file is None or root not in file.parents:
+            return
+        self._files[file.relative_to(root).as_posix()] = file
+        if file.suffix in SOURCE_SUFFIXES:
+            tree = ast.parse(decode_source(file.read_bytes()), filename=str(file))
+            yield from _imported(tree, name if self._places[name] else parent)
+
+    def _root(self, top: str) -> Path | None:
+        """The folder that a top-level module lies in; None: it is not to be followed."""
+        if top in self._packages:
+            return self._packages[top].parent
+        if self._own is None or top in sys.builtin_module_names:
+            return None
+        # A folder that is no package gives way to a package elsewhere.
+        found = PathFinder.find_spec(top)
+        places = [*(found.submodule_search_locations or (found.origin,))] if found else []
+        return (
+            self._own
+            if any(place and Path(place).parent == self._own for place in places)
+            else None
+        )
+
+    def _within(self, package: str) -> Iterator[str]:
+        """All modules of a package, of which any may be meant by a star."""
+        for place in self._places.get(package, ()):
+            yield from (f"{package}.{path.stem}" for path in sorted(Path(place).glob("*.py")))
+
+
+def _imported(tree: ast.AST, package: str) -> Iterator[str]:
+    """The names that may be of modules in the imports of a module; a star is one of them."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parts = package.split(".")[: len(package.split(".")) - node.level + 1]
+            base = ".".join(
+                [*(parts if node.level else ()), *([node.module] if node.module else [])]
+            )
+            # Last in, first out: the package before what is in it.
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+            yield base
+
+
+# Other names
+
+
+class _Import(NamedTuple):
+    """Where a module is imported, in bytes of UTF-8."""
+
+    top: str  #: the first part of its name
+    end: int  #: of the first part
+    bound: bytes = b""  #: the name that it has from then on, if that is the first part
+    is_within: bool = False  #: whether there are more parts
+    whole_end: int = 0  #: of all parts
+
+
+def with_other_imports(content: bytes, names: Collection[str], suffix: str) -> bytes:
+    """The text of a module that imports others under longer names, and has them under their own.
+
+    Args:
+        content: as it is in the file.
+        names: of top-level modules that have other names.
+        suffix: what is added to their names.
+
+    Raises:
+        SyntaxError: it is no Python.
+
+    """
+    text, added = decode_source(content).encode(), suffix.encode()
+    changed = text
+    for one in reversed(_imports(text)):
+        if one.top not in names:
+            continue
+        if one.bound and one.is_within:
+            more = b", " + one.bound + added + b" as " + one.bound
+            changed = changed[: one.whole_end] + more + changed[one.whole_end :]
+        name = added + (b" as " + one.bound if one.bound and not one.is_within else b"")
+        changed = changed[: one.end] + name + changed[one.end :]
+    if changed == text:
+        return content
+    encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
+    return changed.decode().encode(encoding)
+
+
+_FROM, _NAME = re.compile(rb"from[\s\\]+"), re.compile(rb"[\w\x80-\xff]+")
+
+
+@lru_cache(maxsize=512)
+def _imports(text: bytes) -> list[_Import]:
+    """The imports of modules by absolute names, in their order."""
+    begins = [0]
+    for line in text.split(b"\n"):
+        begins.append(begins[-1] + len(line) + 1)
+    found = []
+    for node in ast.walk(ast.parse(text.decode())):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            keyword = _FROM.match(text, begins[node.lineno - 1] + node.col_offset)
+            name = keyword and _NAME.match(text, keyword.end())
+            assert name
+            found.append(_Import(node.module.partition(".")[0], name.end()))
+        for alias in node.names if isinstance(node, ast.Import) else ():
+            name = _NAME.match(text, begins[alias.lineno - 1] + alias.col_offset)
+            assert name and alias.end_lineno is not None and alias.end_col_offset is not None
+            top, _, others = alias.name.partition(".")
+            end = begins[alias.end_lineno - 1] + alias.end_col_offset
+            bound = b"" if alias.asname else name[0]
+            found.append(_Import(top, name.end(), bound, bool(others), end))
+    return sorted(found, key=lambda one: one.end)
