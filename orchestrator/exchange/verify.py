@@ -295,8 +295,12 @@ def _certificate(
     if system.stop_time is not None and times[-1] < system.stop_time:
         yield f"not compared: the time up to the system's stop time of {system.stop_time:g} s"
     if table.others:
-        what = "columns that are not outputs, or hold texts"
-        yield f"not compared: {what}: {enumerated(table.others, verbose)}"
+        ports = chain(*(component.having("output") for component in system.components.values()))
+        texts = ", or hold texts" * any(type_of(port) == "String" for port in ports)
+        yield (
+            f"not compared: columns that are not outputs{texts}: "
+            f"{enumerated(table.others, verbose)}"
+        )
     if absent := [name for name in outputs if name not in table.columns]:
         yield f"not in the table: {enumerated(absent, verbose)}"
 
