@@ -326,7 +326,7 @@ def test_own_run_that_fails_certifies_nothing(system: System):
         ("time,depth\n0,1\n1,2\n", "column output"),
         ("clock,plant.eta.x\n0,1\n1,2\n", "column time"),
         ("time plant.eta.x\n0 1\n1 2\n", "column time"),
-        ("time,Time,plant.eta.x\n0,0,1\n1,1,2\n", "2 time"),
+        ("time,Time,plant.eta.x\n0,0,1\n1,1.5,2\n", "line 3 time 1 1.5"),
         ("time,plant.eta.x\n0,1\n0,2\n", "row 0"),
         ("time,plant.eta.x\n0,1\n2,2\n1,2\n", "4: 1 2"),
         ("time,plant.eta.x\n-1,1\n1,2\n", "2: -1"),
