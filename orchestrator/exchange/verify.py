@@ -115,6 +115,8 @@ def verify(
         for variable in component.having("output")
         if type_of(variable) != "String"
     }
+    if not outputs:
+        raise InputError(f"{system.name}: has no numeric output to compare")
     known = {
         str(PortName(component.name, variable))
         for component in system.components.values()

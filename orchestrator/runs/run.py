@@ -46,7 +46,13 @@ from orchestrator.runs.record import (
 from orchestrator.runs.request import Files
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import cautions, cautions_after, cautions_beside, watched_columns
+from orchestrator.vehicle.cautions import (
+    cautions,
+    cautions_after,
+    cautions_beside,
+    values_of,
+    watched_columns,
+)
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import Loop, suffixes
@@ -127,7 +133,8 @@ def run_into(
         unfinished = _Unfinished(path, folder, done, command, clock, say)
         try:
             for prepared, below, columns, checkpoints in zip_longest(runs, folders, tables, kept):
-                before = cautions(prepared.system, prepared.experiment, prepared.loops)
+                step, loops = prepared.experiment.step, prepared.loops
+                before = cautions(values_of(prepared.system), step, loops)
                 unfinished.caution(prepared, (caution.text for caution in before))
                 target = unfinished.begin(below)
                 run = _Running(target, prepared, files, columns, checkpoints)

@@ -37,7 +37,7 @@ from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
-from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen
+from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen, values_of
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
@@ -63,6 +63,7 @@ class _Loop(NamedTuple):
         columns: of the rows, after the time.
         there: which of these it has.
         without: names of the indices that it has no columns or parameters for.
+        known: ports and values of parameters by their names, once they were asked for.
 
     """
 
@@ -71,6 +72,7 @@ class _Loop(NamedTuple):
     columns: tuple[str, ...]
     there: Sequence[bool]
     without: frozenset[str]
+    known: dict[str, tuple[PortName, Value | None]]
 
 
 def _loop(system: System) -> _Loop:
@@ -83,7 +85,7 @@ def _loop(system: System) -> _Loop:
         for needed in index.needs(names)
         if not all(system.has(port_name(name)) for name in needed)
     )
-    return _Loop(system, names, of_rows, there, without)
+    return _Loop(system, names, of_rows, there, without, {})
 
 
 class BatchEngine:
@@ -368,19 +370,16 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
 
 def _cautions(job: _Job, found: np.void, made: int) -> str | None:
     """What to be wary of in a run of some steps."""
-    system, loop = job.system, job.loop.names
+    loop, step, given = job.loop.names, job.experiment.step, job.system.parameters
 
     def value(name: str) -> Value | None:
-        parameter = port_name(name)
-        return system.value(parameter) if system.has(parameter) else None
+        if name not in job.loop.known:
+            job.loop.known[name] = port_name(name), values_of(job.loop.system)(name)
+        port, otherwise = job.loop.known[name]
+        return given.get(port, otherwise)
 
     seen = Seen(float(found["rho_hat"]), float(found["vertical"])) if made else Seen()
-    return kinds_of(
-        [
-            *cautions(system, job.experiment, [loop]),
-            *cautions_seen(seen, loop, value, job.experiment.step),
-        ]
-    )
+    return kinds_of([*cautions(value, step, [loop]), *cautions_seen(seen, loop, value, step)])
 
 
 @np.errstate(all="ignore")

@@ -20,7 +20,7 @@ from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
 from orchestrator.master.plan import code_of, make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.system.names import port_name
-from orchestrator.vehicle.cautions import Caution, Watch, cautions
+from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
 from orchestrator.vehicle.signals import loops_of
 
@@ -151,7 +151,7 @@ class FmuEngine:
         ending = replace(prepared, plan=plan, stepping=stepping).run([indices, watch])
         if ending.interrupts:
             raise KeyboardInterrupt
-        wary = kinds_of([*cautions(system, experiment, loops), *watch.found()])
+        wary = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
         if ending.failure is not None:
             return Outcome(point.number, {}, ending.failure, wary)
         return Outcome(point.number, indices.values(), None, wary)

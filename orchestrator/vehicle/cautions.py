@@ -15,7 +15,6 @@ import numpy as np
 from auv_fmu.observer import EXACT, FORMS, exact_gain
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from auv_fmu.vehicle import Vehicle
-from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching
@@ -35,6 +34,9 @@ _SAME = 1e-6
 
 #: h p beyond which a mode of Euler's scheme changes its sign in every step, and grows.
 _REVERSES, _GROWS = 1.0, 2.0
+
+#: Gives the value of a parameter by its name `component.name`; None: there is none.
+ValueOf = Callable[[str], Value | None]
 
 #: Units of a velocity at a port.
 _VELOCITY_UNITS = {"m/s", "rad/s"}
@@ -81,24 +83,33 @@ def watched_columns(loop: Loop) -> tuple[str, str]:
     return loop.theta_hat[0], loop.attitude[1]
 
 
-def gain_of_a_step(system: System, h: float, controller: str = STANDARD.controller) -> float:
+def values_of(system: System) -> ValueOf:
+    """The values of the parameters of a system."""
+
+    def value(name: str) -> Value | None:
+        port = port_name(name)
+        return system.value(port) if system.has(port) else None
+
+    return value
+
+
+def gain_of_a_step(value: ValueOf, h: float, controller: str = STANDARD.controller) -> float:
     """k_d as a step of h seconds takes it [1/s]: the form of the observer may change it."""
-    form = port_name(f"{controller}.observer")
-    k_d = float(system.value(port_name(f"{controller}.k_d")) or 0.0)
-    is_exact = system.has(form) and FORMS.get(str(system.value(form))) == EXACT
+    k_d = float(value(f"{controller}.k_d") or 0.0)
+    is_exact = FORMS.get(str(value(f"{controller}.observer"))) == EXACT
     return exact_gain(k_d, h) if is_exact else k_d
 
 
-def cautions(system: System, experiment: Experiment, loops: Sequence[Loop]) -> list[Caution]:
-    """What can be said before a run."""
+def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution]:
+    """What can be said before a run in steps of a length [s]."""
     found = []
     for controller in dict.fromkeys(loop.controller for loop in loops):
-        names = [port_name(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
-        if not all(map(system.has, names)):
+        values = [value(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
+        if None in values:
             continue
-        k_d, lambda_, h_max = (float(system.value(name) or 0.0) for name in names)
-        h = min(experiment.step, h_max)
-        h_p = h * observer_rate(lambda_, gain_of_a_step(system, h, controller))
+        k_d, lambda_, h_max = (float(one or 0.0) for one in values)
+        h = min(step, h_max)
+        h_p = h * observer_rate(lambda_, gain_of_a_step(value, h, controller))
         if h_p > _GROWS:
             text = (
                 f"{controller}.k_d = {k_d:g} 1/s is unstable with internal steps of {h:g} s: the "
@@ -203,18 +214,8 @@ def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[Ca
     return watch.found()
 
 
-def cautions_seen(
-    seen: Seen, loop: Loop, value: Callable[[str], Value | None], step: float
-) -> Iterator[Caution]:
-    """What a run has shown.
-
-    Args:
-        seen: of its rows.
-        loop: that is meant.
-        value: of a parameter by its name `component.name`; None: there is none.
-        step: of the run [s].
-
-    """
+def cautions_seen(seen: Seen, loop: Loop, value: ValueOf, step: float) -> Iterator[Caution]:
+    """What a run in steps of a length [s] has shown of a loop."""
     roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
     needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
     known = map(value, needed) if seen.rho_hat > 0.0 else ()

@@ -26,7 +26,7 @@ from orchestrator.master.observers.observer import Ending, Header, every
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import gain_of_a_step
+from orchestrator.vehicle.cautions import gain_of_a_step, values_of
 from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,
@@ -155,7 +155,7 @@ def _sampling(system: System, loop: Loop) -> list[str]:
         float(system.value(port_name(f"{loop.controller}.{name}")) or 0.0)
         for name in ("lambda", "h_max")
     )
-    rate = observer_rate(lambda_, gain_of_a_step(system, h, loop.controller))
+    rate = observer_rate(lambda_, gain_of_a_step(values_of(system), h, loop.controller))
     return [
         f"Euler's scheme with internal steps of {h:g} s: the observer's fastest mode has the rate "
         f"{rate:.4g} 1/s,",
