@@ -180,15 +180,13 @@ def _see(event: str, arguments: tuple[object, ...]) -> None:
     name, flags = Path(os.fsdecode(arguments[0])), arguments[2]
     if isinstance(flags, int) and flags & (os.O_WRONLY | os.O_RDWR):
         return
+    is_relative = False
     with suppress(OSError, ValueError):
         path = Path(os.path.normpath(Path.cwd() / name))
         for root, found in _read.items():
             if root in path.parents and _is_data(path, root) and _is_open_in(root):
                 found[path.relative_to(root).as_posix()] = path
                 is_relative = not name.is_absolute() and path.is_file()
-                break
-        else:
-            return
     if is_relative:
         raise ValueError(
             f"{name} is read from the current folder, which is another one where the FMU runs: "

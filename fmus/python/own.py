@@ -43,7 +43,8 @@ def build_script(script: Path, destination: Path, loader: str | None = None) -> 
         component = get_model_class(script).__name__
     except ValueError as error:
         if str(error).startswith("No child class of Fmi2Slave"):
-            raise ValueError(f"{no_component(script)}, and has no class of PythonFMU") from None
+            why = f"{no_component(script)}, and has no class of PythonFMU (Fmi2Slave)"
+            raise ValueError(why) from None
         raise
     text = _SCRIPT.format(module=script.stem, component=component)
     path = destination / f"{component}.fmu"

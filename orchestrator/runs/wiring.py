@@ -110,10 +110,9 @@ def check_built(fmu: Path) -> None:
         InputError: it has to be built.
 
     """
-    if fmu.is_file() or not is_folder(fmu.parent):
-        return
-    for script in sorted(fmu.parent.glob("*.py")):
-        if name_of(script.stem).lower() == fmu.stem.lower():
+    there = [*fmu.parent.iterdir()] if is_folder(fmu.parent) else []
+    for script in () if fmu in there else sorted(there):
+        if script.suffix == ".py" and name_of(script.stem).lower() == fmu.stem.lower():
             raise InputError(f"{fmu}: no such file; build it: auv-fmu build {script}")
 
 
