@@ -23,7 +23,7 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
     Args:
         text: of the script.
         packages: that may be among them, and the folders that they are in.
-        own: folder that its other modules are in, which is on `sys.path`; None: there are none.
+        own: folder that its other modules are in; None: there are none.
 
     Returns:
         The files, by their places below the folder that the script is in.
@@ -79,7 +79,7 @@ class _Search:
         if self._own is None or top in sys.builtin_module_names:
             return None
         # A folder that is no package gives way to a package elsewhere.
-        found = PathFinder.find_spec(top)
+        found = PathFinder.find_spec(top, [str(self._own), *sys.path])
         places = [*(found.submodule_search_locations or (found.origin,))] if found else []
         return (
             self._own
