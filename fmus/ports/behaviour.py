@@ -8,8 +8,10 @@ because the C kind runs its translation.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from inspect import signature
+from string import Formatter
 from types import FunctionType, ModuleType
 from typing import Any, NamedTuple, Protocol, get_args, get_origin, get_type_hints
 
@@ -38,7 +40,7 @@ class Hooks(Protocol):
     #: ports, in their order.
     Outputs: type
 
-    #: What is logged, once an instance, when `restarted` is called; `{t:g}` is the time.
+    #: What is logged, once an instance, when `restarted` is called; `{t}` or `{t:g}` is the time.
     RESTARTED: str
 
     @staticmethod
@@ -135,6 +137,9 @@ class Hooks(Protocol):
         """
 
 
+#: How a number in a text may be written: as C writes it, too.
+NUMBER_FORMAT = re.compile(r"[+ ]?(?:[1-9][0-9]{0,2})?(?:\.[0-9]{1,3})?[efgEG]")
+
 #: Arguments of each hook, by its name.
 HOOKS: Mapping[str, tuple[str, ...]] = {
     name: tuple(signature(hook.__func__).parameters)
@@ -156,7 +161,7 @@ class Behaviour(NamedTuple):
         is_stateless: whether `begin` and `advance` give only outputs.
         noisy: the group of outputs that `measured` gives; empty: there is none.
         draws: how many numbers it takes.
-        restarted: the text `RESTARTED`.
+        restarted: the text `RESTARTED`, as `str.format` takes it.
 
     """
 
@@ -237,8 +242,24 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         is_stateless,
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
-        said.get("RESTARTED", ""),
+        _message(where, said.get("RESTARTED", "")),
     )
+
+
+def _message(where: str, text: Any) -> str:
+    """The text `RESTARTED`, if both kinds can write it."""
+    try:
+        fields = [found[1:] for found in Formatter().parse(text) if found[1] is not None]
+        good = [
+            name == "t" and conversion is None and (not form or NUMBER_FORMAT.fullmatch(form))
+            for name, form, conversion in fields
+        ]
+    except (TypeError, ValueError):
+        good = [False]
+    if len(good) > 1 or not all(good):
+        why = "is not a text with the time at most once, as {t} or {t:g}, and other braces doubled"
+        raise Misdeclared(f"{where}.RESTARTED {why}", "RESTARTED")
+    return str(text)
 
 
 def _types(where: str, hook: FunctionType) -> dict[str, Any]:
