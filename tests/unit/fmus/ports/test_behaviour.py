@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 from fmus.discovery import package_folder
-from fmus.ports.behaviour import HOOKS, read_behaviour
+from fmus.ports.behaviour import HOOKS, _message, read_behaviour
 from fmus.ports.groups import Nothing
+from fmus.ports.port import Misdeclared
 
 GOOD = """\
 from __future__ import annotations
@@ -108,6 +109,12 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
 def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
     with pytest.raises(TypeError, match=f"^own_behaviour.*{why}"):
         behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
+
+
+@pytest.mark.parametrize("text", ["{t:>9}", "{t!r}", "{x}", "{t} {t}", "{", "{t:.2d}", "{}", 7])
+def test_messages_that_only_python_could_write_are_refused(text):
+    with pytest.raises(Misdeclared, match=r"own\.RESTARTED .*{t:g}"):
+        _message("own", text)
 
 
 @pytest.mark.parametrize("path", ["native/translator.py", "python/slave.py"])
