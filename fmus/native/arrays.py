@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from auv_fmu.arrays import Matrix, Vector
 from fmus.native.program import Function, Program
-from fmus.native.shapes import BOOLEAN, DOUBLE, INTEGER, Shape, Structure, matrix, vector
+from fmus.native.shapes import BOOLEAN, DOUBLE, INTEGER, Scalar, Shape, Structure, matrix, vector
 
 _NUMBERS = (DOUBLE, INTEGER, BOOLEAN)
 
@@ -19,20 +19,40 @@ def is_array(shape: Shape | None) -> bool:
 
 
 class Operation(NamedTuple):
-    """A function for an operator, and whether its operands are swapped for it."""
+    """A function for an operator, and what it takes for its operands.
+
+    Attributes:
+        function: that computes the result.
+        swapped: whether it takes the right one first.
+        by_address: whether it takes the address of the left one.
+
+    """
 
     function: Function
     swapped: bool = False
+    by_address: bool = False
 
 
-def binary(program: Program, operator: ast.operator, left: Shape, right: Shape) -> Operation | None:
-    """What computes a sum, a difference, a product or a quotient; None: Python has none either."""
+def binary(
+    program: Program, operator: ast.operator, left: Shape, right: Shape, is_stored: bool
+) -> Operation | None:
+    """What computes a sum, a difference, a product or a quotient; None: Python has none either.
+
+    Args:
+        program: that gets the function.
+        operator: between two operands.
+        left: shape of the first one.
+        right: of the other.
+        is_stored: whether the first one has an address. A large matrix is not copied then.
+
+    """
     if isinstance(operator, (ast.Add, ast.Sub)) and left == right and is_array(left):
         word, sign = ("plus", "+") if isinstance(operator, ast.Add) else ("minus", "-")
         return Operation(_each(program, left, word, f"a@ {sign} b@", {"b": left}))
     if isinstance(operator, ast.MatMult):
-        function = _product(program, left, right)
-        return Operation(function) if function else None
+        by_address = is_stored and is_array(left) and len(sizes(left)) == 2
+        function = _product(program, left, right, by_address)
+        return Operation(function, by_address=by_address) if function else None
     if isinstance(operator, ast.Mult):
         array, number = (left, right) if is_array(left) else (right, left)
         if is_array(array) and number in _NUMBERS:
@@ -70,12 +90,14 @@ def _each(
     return program.helper(name, {"a": shape, **others}, shape, body)
 
 
-def _product(program: Program, left: Shape, right: Shape) -> Function | None:
+def _product(program: Program, left: Shape, right: Shape, by_address: bool) -> Function | None:
     if not (is_array(left) and is_array(right)) or sizes(left)[-1] != sizes(right)[0]:
         return None
     n = sizes(left)[-1]
-    given: dict[str, Shape] = {"a": left, "b": right}
-    name = f"{left.name}_product_{right.name}"
+    address = Scalar(f"const {left.name} *", left.word)
+    given: dict[str, Shape] = {"a": address if by_address else left, "b": right}
+    name = f"{left.name}{'_at' * by_address}_product_{right.name}"
+    a = "a->" if by_address else "a."
     if len(sizes(left)) == 1:
         if len(sizes(right)) == 2:
             return None  # a row vector is no Vector
@@ -84,12 +106,12 @@ def _product(program: Program, left: Shape, right: Shape) -> Function | None:
     returns: Structure
     if len(sizes(right)) == 1:
         returns, inner, element = vector(rows), [f"i < {rows}; i++"], "c.v[i]"
-        term = "a.v[i].v[k] * b.v[k]"
+        term = f"{a}v[i].v[k] * b.v[k]"
     else:
         columns = sizes(right)[1]
         returns = matrix(rows, columns)
         inner, element = [f"i < {rows}; i++", f"j < {columns}; j++"], "c.v[i].v[j]"
-        term = "a.v[i].v[k] * b.v[k].v[j]"
+        term = f"{a}v[i].v[k] * b.v[k].v[j]"
     lines, indent = [f"    {returns.name} c;"], "    "
     for loop in inner:
         lines.append(f"{indent}for (int {loop[0]} = 0; {loop}) {{")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import inspect
-import re
 from collections import Counter
 from collections.abc import Iterator
 from functools import cache
@@ -40,10 +39,8 @@ from fmus.native.variables import (
     names_in,
     stored_names,
 )
+from fmus.ports.behaviour import NUMBER_FORMAT
 from fmus.ports.port import Refusal
-
-#: How values in the text of a refusal may be written: as C writes them, too.
-_FORMAT = re.compile(r"[+ ]?(?:[1-9]\d*)?(?:\.\d+)?[efgEG]")
 
 
 @cache
@@ -383,7 +380,7 @@ class _Translation:
         return f"raise_error({', '.join(['error', quoted(form), *arguments])});"
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[str, str]:
-        """A value in a text: its directive for printf, and the argument."""
+        """A value in a text: its directive in C, and the argument."""
         code = self._in_c.code(part.value)
         if part.conversion not in (-1, ord("s")):
             raise self._in_c.fail(part.value, f"!{chr(part.conversion)} in a text: leave it out")
@@ -396,9 +393,9 @@ class _Translation:
             return "%s", f'{code.within(OR)} ? "True" : "False"'
         if code.shape in WHOLE and how in ("", "d"):
             return "%d", code.text
-        if code.shape in (DOUBLE, *WHOLE) and _FORMAT.fullmatch(how):
+        if code.shape in (DOUBLE, *WHOLE) and NUMBER_FORMAT.fullmatch(how):
             number = code.text if code.shape == DOUBLE else f"(double)({code.text})"
-            return f"%{how}", f"shown({number})"
+            return f"%{how}", number
         name = ast.unparse(part.value)
         raise self._in_c.fail(part.value, f"{{{name}}} in a text: write {{{name}:g}}")
 

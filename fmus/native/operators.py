@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Sequence
 
 from fmus.native import arrays
@@ -31,6 +32,9 @@ _COMPARE = {
     ast.Lt: ("<", RELATION), ast.LtE: ("<=", RELATION), ast.Gt: (">", RELATION),
     ast.GtE: (">=", RELATION), ast.Eq: ("==", EQUALITY), ast.NotEq: ("!=", EQUALITY),
 }  # fmt: skip
+
+#: What has an address in C: a variable, or a member of one.
+_STORED = re.compile(r"[\w.]+")
 
 #: Functions of arithmetic.h for operators of integers, which may exceed 32 bits.
 _OF_INTEGERS = {ast.Add: "ADD", ast.Sub: "SUB", ast.Mult: "MUL"}
@@ -94,12 +98,15 @@ class Operators(Expressions):
         return Code(f"RAISED({number.argument}, {number_in_c(float(exponent))})", DOUBLE)
 
     def _of_arrays(self, node: ast.BinOp, left: Code, right: Code) -> Code:
-        operation = arrays.binary(self.program, node.op, left.shape, right.shape)
+        is_stored = _STORED.fullmatch(left.text) is not None
+        operation = arrays.binary(self.program, node.op, left.shape, right.shape, is_stored)
         if operation is None:
             sign = _sign_of(node.op)
             raise self.fail(node, f"{left.shape.word} {sign} {right.shape.word} is not defined")
         operands = [self.number(x, c).text if c.shape in NUMBERS else c.text
                     for x, c in ((node.left, left), (node.right, right))]  # fmt: skip
+        if operation.by_address:
+            operands[0] = f"&{operands[0]}"
         return self.calling(operation.function, operands[::-1] if operation.swapped else operands)
 
     def alike(self, left: ast.expr, right: ast.expr) -> tuple[Code, Code]:

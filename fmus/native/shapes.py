@@ -43,7 +43,7 @@ _TAKEN = frozenset(
         # what functions call or are given
         "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
         "cosh", "error", "exp", "expm1", "fabs", "floor", "fmod", "isfinite", "isinf", "isnan",
-        "log", "log10", "log1p", "log2", "pow", "shown", "sin", "sinh", "sqrt", "tan", "tanh",
+        "log", "log10", "log1p", "log2", "pow", "sin", "sinh", "sqrt", "tan", "tanh",
         "trunc",
     )
 )  # fmt: skip

@@ -5,13 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from functools import cache
+from string import Formatter
 from textwrap import wrap
 
 from fmus.native.flat import Passage, count, passage
 from fmus.native.functions import function_in_c
 from fmus.native.layout import LINE_WIDTH, laid_out, quoted
 from fmus.native.program import Function, Program, Untranslatable
-from fmus.native.shapes import Shape, Structure, closed, in_c, shape_of
+from fmus.native.shapes import Shape, Structure, closed, in_c
+from fmus.native.stack import NUMBER, deepest
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 
@@ -24,8 +26,9 @@ _HEAD = """\
 #include "arithmetic.h"
 """
 
-#: Some ten copies of a state lie on the stack in a step, which has 1 MB in Windows.
-_MOST_IN_STATE = 5_000
+#: Bytes that the equations may take of a thread's stack, of which macOS gives 512 kB: the host and
+#: the runtime take some, too.
+_MOST_ON_STACK = 384 * 1024
 
 _P, _S, _I = (
     "const model_parameters *parameters",
@@ -53,14 +56,19 @@ def translated(definition: Definition) -> str:
         *(function.text for function in program.functions.values()),
         glue,
     ]
-    return "\n\n".join(sections) + "\n"
+    text = "\n\n".join(sections) + "\n"
+    bytes_on_stack, name = deepest(text)
+    if bytes_on_stack > _MOST_ON_STACK:
+        raise Untranslatable(
+            f"{name.removeprefix('model_')} and the functions that it calls hold "
+            f"{bytes_on_stack // NUMBER} numbers at once; C takes at most "
+            f"{_MOST_ON_STACK // NUMBER}, which lie on a thread's stack"
+        )
+    return text
 
 
 def _glue(program: Program, said: Behaviour) -> str:
     """The functions `model_...`, in which the component finds all hooks, also those it has not."""
-    numbers = count(shape_of(said.state))
-    if numbers > _MOST_IN_STATE:
-        raise Untranslatable(f"a state of {numbers} numbers; C takes at most {_MOST_IN_STATE}")
     functions = {name: program.function(hook) for name, hook in said.hooks.items() if hook}
     passages = {
         what: passage(program, what, program.shape(hint), what == "state")
@@ -91,10 +99,9 @@ def _glue(program: Program, said: Behaviour) -> str:
         expected = [outputs.put("*expected", "expected", calls["expected"])]
     # A negative seed is the number 2^32 above it.
     seed = [f"return (unsigned int){calls.get('seed', 0)};"]
-    restarted = quoted(said.restarted.replace("%", "%%").replace("{t:g}", "%g"))
     parts = [
         f"enum {{ MODEL_EXPECTS = {int('expected' in calls)}, MODEL_DRAWS = {said.draws} }};\n"
-        f"#define MODEL_RESTARTED {restarted}",
+        f"#define MODEL_RESTARTED {quoted(_directives(said.restarted))}",
         _defined(
             "void begin",
             f"{_P}, {_I}, double t, {_S}, {_O}, {_E}",
@@ -129,6 +136,14 @@ def _glue(program: Program, said: Behaviour) -> str:
     ]
     head = ["/* What the component calls. */", _types(program, said, passages), *moving]
     return "\n\n".join([*head, text])
+
+
+def _directives(text: str) -> str:
+    """A text for `str.format` that names the time, as one for `compose`."""
+    return "".join(
+        before.replace("%", "%%") + ("" if name is None else f"%{form or 'r'}")
+        for before, name, form, _ in Formatter().parse(text)
+    )
 
 
 def _types(program: Program, said: Behaviour, passages: dict[str, Passage]) -> str:

@@ -12,6 +12,7 @@ module                   what it states
 :mod:`.behaviour`        what a component's behaviour may say: the hooks of both kinds
 :mod:`.vehicle`          parameters of (2) and (3), and the reference
 :mod:`.controllers`      what the controllers have in common
+:mod:`.tail`             ports of the REMUS 100's tail and of what moves it
 :mod:`.description`      modelDescription.xml of FMI 2.0, and what all versions share
 :mod:`.description_fmi3` what a host reads of FMI 3.0: description, build, terminals
 ======================== =================================================================

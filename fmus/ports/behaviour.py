@@ -7,8 +7,10 @@ equations (language.md), because the C kind runs its translation.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from inspect import signature
+from string import Formatter
 from types import CodeType, FunctionType, GenericAlias, ModuleType
 from typing import Any, NamedTuple, Protocol, get_args
 
@@ -46,7 +48,7 @@ class Hooks(Protocol):
     #: ports, in their order.
     Outputs: type
 
-    #: What is logged, once an instance, when `restarted` is called; `{t:g}` is the time.
+    #: What is logged, once an instance, when `restarted` is called; `{t}` or `{t:g}` is the time.
     RESTARTED: str
 
     @staticmethod
@@ -145,6 +147,9 @@ class Hooks(Protocol):
         """
 
 
+#: How a number in a text may be written: as C writes it, too.
+NUMBER_FORMAT = re.compile(r"[+ ]?(?:[1-9][0-9]{0,2})?(?:\.[0-9]{1,3})?[efgEG]")
+
 #: Arguments of each hook, by its name.
 HOOKS: Mapping[str, tuple[str, ...]] = {
     name: tuple(signature(hook.__func__).parameters)
@@ -166,7 +171,7 @@ class Behaviour(NamedTuple):
         is_stateless: whether `begin` and `advance` give only outputs.
         noisy: the group of outputs that `measured` gives; empty: there is none.
         draws: how many numbers it takes.
-        restarted: the text `RESTARTED`.
+        restarted: the text `RESTARTED`, as `str.format` takes it.
 
     """
 
@@ -244,7 +249,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         is_stateless,
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
-        said.get("RESTARTED", ""),
+        _message(where, said.get("RESTARTED", "")),
     )
 
 
@@ -261,8 +266,6 @@ def _hooks(module: ModuleType) -> dict[str, FunctionType]:
         missing = [name for name in together if name not in said]
         if there and missing:
             raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
-    if not isinstance(said.get("RESTARTED", ""), str):
-        raise Misdeclared(f"{where}.RESTARTED is no text")
     for name, value in said.items():
         if name in HOOKS and not isinstance(value, FunctionType):
             raise Misdeclared(f"{where}.{name} is no function, but has the name of a hook", name)
@@ -345,6 +348,22 @@ def _names_in(code: CodeType) -> Iterator[str]:
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
             yield from _names_in(constant)
+
+
+def _message(where: str, text: Any) -> str:
+    """The text `RESTARTED`, if both kinds can write it."""
+    try:
+        fields = [found[1:] for found in Formatter().parse(text) if found[1] is not None]
+        good = [
+            name == "t" and conversion is None and (not form or NUMBER_FORMAT.fullmatch(form))
+            for name, form, conversion in fields
+        ]
+    except (TypeError, ValueError):
+        good = [False]
+    if len(good) > 1 or not all(good):
+        why = "is not a text with the time at most once, as {t} or {t:g}, and other braces doubled"
+        raise Misdeclared(f"{where}.RESTARTED {why}", "RESTARTED")
+    return str(text)
 
 
 def _types(where: str, hook: FunctionType) -> dict[str, Any]:

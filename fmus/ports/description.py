@@ -48,7 +48,8 @@ def _literal(value: Value) -> str:
     """A value as XML writes it."""
     if isinstance(value, bool):
         return str(value).lower()
-    return f"{value:.16g}" if isinstance(value, float) else str(value)
+    # What is read back has the same bits. numpy's numbers have a repr of their own.
+    return repr(float(value)).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
 def root_of(version: str, definition: Definition, **identity: str) -> Element:

@@ -39,8 +39,14 @@ _CAPABILITIES = {**CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFM
 #: The file of a component's sources that includes all others, and what it is written in.
 SOURCE, _LANGUAGE = "fmi3.c", "C99"
 
-#: Platforms where mathematics is in a library apart from the C library.
-_LIBM_APART = ("x86_64-linux", "aarch64-linux")
+#: What is linked besides the C library, by platform: mathematics may be apart from it.
+_LIBRARIES = {
+    "x86_64-linux": ("m",),
+    "aarch64-linux": ("m",),
+    "x86_64-windows": (),
+    "x86_64-darwin": (),
+    "aarch64-darwin": (),
+}
 
 
 def fmi3_description(definition: Definition, token: str) -> bytes:
@@ -71,18 +77,13 @@ def fmi3_description(definition: Definition, token: str) -> bytes:
 def fmi3_build_description(name: str) -> bytes:
     """What an importer has to compile: one file, with any compiler and no options."""
     root = Element("fmiBuildDescription", fmiVersion=_VERSION)
-    _configuration(root, modelIdentifier=name)
-    for platform in _LIBM_APART:
-        linked = _configuration(root, modelIdentifier=name, platform=platform)
-        SubElement(linked, "Library", name="m", external="true")
+    for platform, libraries in _LIBRARIES.items():
+        built = SubElement(root, "BuildConfiguration", modelIdentifier=name, platform=platform)
+        sources = SubElement(built, "SourceFileSet", language=_LANGUAGE)
+        SubElement(sources, "SourceFile", name=SOURCE)
+        for library in libraries:
+            SubElement(built, "Library", name=library, external="true")
     return text(root)
-
-
-def _configuration(root: Element, **attributes: str) -> Element:
-    configuration = SubElement(root, "BuildConfiguration", attributes)
-    sources = SubElement(configuration, "SourceFileSet", language=_LANGUAGE)
-    SubElement(sources, "SourceFile", name=SOURCE)
-    return configuration
 
 
 def _type_definitions(units: Sequence[str]) -> Element:

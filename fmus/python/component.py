@@ -94,6 +94,9 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
         """
         return ()
 
+    def unsample(self) -> None:
+        """Take back what the last :meth:`sample` changed besides the outputs."""
+
     def expected(self, parameters: Parameters, state: State, outputs: Outputs) -> Outputs | None:
         """The outputs that belong to a state that is restored; None: that cannot be told.
 
@@ -243,19 +246,31 @@ class Component(Callbacks, Generic[State, Inputs, Outputs, Parameters]):
             # What is finite may still be too large to be added up.
             for reference, value in zip(self._store.output_references, values):
                 self._store.ports[reference].sound(value)
-        if self._samples and not isfinite(sum(self.sample(values))):
-            raise Refusal("a sampled output is not finite")
+        if self._samples:
+            self._measure(values)
         self._state, self._derived, self._store.outputs = state, self._next, values
+
+    def _measure(self, values: list[Any]) -> None:
+        """Sample outputs; a refusal takes nothing of what the samples are made from."""
+        try:
+            samples = self.sample(values)
+            if not isfinite(sum(samples)) and not all(map(isfinite, samples)):
+                raise Refusal("a sampled output is not finite")
+        except BaseException:
+            self.unsample()
+            raise
 
     def _internal_steps(self, current_time: float, step_size: float) -> int:
         if not isfinite(current_time) or not isfinite(step_size):
             raise Refusal(f"time {current_time} and step {step_size} must be finite")
         if step_size < 0.0:
             raise Refusal(f"step {step_size:g} s is negative")
-        n = internal_steps(step_size, self._longest_step)
-        if n > MOST_INTERNAL_STEPS:
-            raise Refusal(f"step {step_size:g} s needs {n} internal steps; raise h_max")
-        return n
+        if step_size / self._longest_step > MOST_INTERNAL_STEPS:
+            raise Refusal(
+                f"step {step_size:g} s needs more than {MOST_INTERNAL_STEPS} internal steps; "
+                "take shorter ones, or raise h_max"
+            )
+        return internal_steps(step_size, self._longest_step)
 
     # State
 

@@ -35,11 +35,30 @@ from fmus.ports.port import Port, Refusal
 from fmus.ports.quantities import group_name
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
 
+#: Numbers that are drawn between two notes of a generator's state.
+_MOST_DRAWN = 1_000
+
 
 class Noisy(Component[State, Inputs, Outputs, Parameters]):
-    """A component one of whose outputs has noise, which Python's generator makes."""
+    """A component one of whose outputs has noise, which Python's generator makes.
 
+    To note the generator's state takes as long as a step. So it is noted once in many steps, and
+    what was drawn since then is counted, to be drawn again where a step is refused.
+    """
+
+    _draws: int  #: in each sample
     _random: Random
+    _noted: Any  #: of its state
+    _drawn: int  #: since then
+
+    def _use(self, generator: Random) -> None:
+        self._random, self._noted, self._drawn = generator, generator.getstate(), 0
+
+    def unsample(self) -> None:
+        self._drawn -= self._draws
+        self._random.setstate(self._noted)
+        for _ in range(self._drawn):
+            self._random.gauss(0.0, 1.0)
 
     def hidden_state(self) -> Any:
         return self._random.getstate() if self._state is not None else None
@@ -53,7 +72,7 @@ class Noisy(Component[State, Inputs, Outputs, Parameters]):
             raise Refusal("its noise generator has an invalid state")
         if not isfinite(following or 0.0):
             raise Refusal("its noise is not finite")
-        self._random = generator
+        self._use(generator)
 
 
 @cache
@@ -79,6 +98,7 @@ def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, A
         "ports": definition.ports,
         "parameter_set": definition.parameters,
         "group_of": definition.group_of,
+        "_draws": said.draws,
     }
     scope: dict[str, Any] = {
         **SCOPE,
@@ -108,7 +128,7 @@ def _steps(said: Behaviour) -> Iterator[str]:
     begin, advance = ["def begin(self, inputs, t):"], ["def advance(self, state, inputs, t, h, n):"]
     if said.noisy:
         # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
-        begin += [f"    self._random = Random({_call(said, 'seed')} % 2**32)"]
+        begin += [f"    self._use(Random({_call(said, 'seed')} % 2**32))"]
     derives = said.hooks["derive"] is not None
     if derives:
         advance += ["    derived = self._derived"]
@@ -156,7 +176,9 @@ def _noise(said: Behaviour, outputs: Sequence[Port], scope: dict[str, Any]) -> I
     flat = ", ".join(text for text, _ in scattered(hint, "noisy"))
     after = "noisy" if flat == "*noisy" else f"({flat},)"
     yield (
-        "def sample(self, values):\n    gauss = self._random.gauss\n"
+        "def sample(self, values):\n"
+        f"    if self._drawn >= {_MOST_DRAWN}:\n        self._use(self._random)\n"
+        f"    self._drawn += {said.draws}\n    gauss = self._random.gauss\n"
         f"    noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}\n"
         f"    {', '.join(values)}, = noisy = {after}\n    return noisy"
     )

@@ -213,7 +213,10 @@ def _job(loop: _Loop, point: Point) -> _Job:
     full, stop = experiment.full_steps, experiment.stop_time
     parts = splits(setting, experiment.step)
     if max(parts) > MOST_INTERNAL_STEPS:
-        why = f"step {setting.h:g} s needs {max(parts)} internal steps; raise h_max"
+        why = (
+            f"step {setting.h:g} s needs more than {MOST_INTERNAL_STEPS} internal steps; "
+            "take shorter ones, or raise h_max"
+        )
         raise InputError(f"stopped at t = 0 s: {why}")
     # Where there is none it has no length, and is no step.
     last_parts = (

@@ -20,8 +20,8 @@ ROUNDING = 1e-9
 #: inputs is always finite: one wild sample must not be the end of a run.
 LARGEST_STATE = 1e100
 
-#: More internal steps than this in one step are taken for a mistake.
-MOST_INTERNAL_STEPS = 1_000_000
+#: More internal steps than this in one step are taken for a mistake: in Python they take seconds.
+MOST_INTERNAL_STEPS = 100_000
 
 
 def longest_step(h_max: float) -> float:

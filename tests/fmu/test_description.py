@@ -18,7 +18,8 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from fmus.discovery import components, package_folder, source_of
+from fmus.discovery import components, package_folder, ports_of, source_of
+from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
@@ -27,6 +28,7 @@ from fmus.ports.description_fmi3 import (
 )
 from fmus.ports.port import TIME
 from fmus.ports.quantities import group_name
+from support.raw import Library, Status, instance
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
 
@@ -221,3 +223,25 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
         for port in declared(name).PORTS
         if port.causality == "input" and f"{component}.{group_name(port.name)}" in wires
     }
+
+
+@pytest.mark.parametrize("name", components())
+def test_starts_and_bounds_are_the_declared_ones_and_can_be_set(
+    dist: Path, native: Path, tmp_path: Path, name: str
+):
+    """Each to the bit, and at its bounds, where a text with fewer digits may lie beyond."""
+    ports = {port.name: port for port in ports_of(name)}
+    for kind, fmus in ((PYTHON, dist), (NATIVE, native)):
+        library = Library(Path(fmpy.extract(str(fmus / f"{name}.fmu"), tmp_path / kind)))
+        with instance(library) as host:
+            for variable in library.description.variables:
+                port = ports.get(variable.name)
+                if port is None or variable.type != "Real" or variable.causality == "output":
+                    continue
+                assert variable.start.hex() == float(port.start or 0.0).hex()
+                for read, said in (
+                    (variable.minimum, port.minimum), (variable.maximum, port.maximum),
+                ):  # fmt: skip
+                    assert read == said
+                    if read is not None:
+                        assert host.set("Real", [variable.reference], [read]) == Status.OK

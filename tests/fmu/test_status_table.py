@@ -47,7 +47,13 @@ OF_BOTH_VERSIONS = {
 }
 
 #: Cells that PythonFMU's own library has a part in, and no guard of ours.
-UNGUARDED = ("fmi2FreeFMUstate", CREATION, WITHOUT_AN_INSTANCE, *MODEL_EXCHANGE_FUNCTIONS)
+UNGUARDED = (
+    "fmi2FreeFMUstate",
+    "fmi2GetBooleanStatus",
+    CREATION,
+    WITHOUT_AN_INSTANCE,
+    *MODEL_EXCHANGE_FUNCTIONS,
+)
 
 #: Cells that hold without the native loader.
 OF_THE_SLAVE = {

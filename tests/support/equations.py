@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Sequence
-from ctypes import CDLL, Array, Structure, byref, c_char, c_char_p, c_double, c_int
+from ctypes import CDLL, Array, Structure, byref, c_char, c_char_p, c_double, c_int, c_size_t
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -42,14 +42,17 @@ OUT const char *restarted(void) { return MODEL_RESTARTED; }
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-function")
 
-#: Bytes of what is said of an error, as in arithmetic.h.
-WHY = 512
+
+class Message(Structure):
+    """The message of text.c."""
+
+    _fields_ = (("characters", c_int), ("length", c_size_t), ("text", c_char * 2001))
 
 
 class Error(Structure):
     """The Error of arithmetic.h."""
 
-    _fields_ = (("raised", c_int), ("why", c_char * WHY))
+    _fields_ = (("raised", c_int), ("why", Message))
 
 
 def is_series(kind: Any) -> bool:
@@ -150,7 +153,7 @@ class Equations:
         """Call a function with structures and numbers; what it raised."""
         error = Error()
         getattr(self.library, name)(*_passed(arguments), byref(error))
-        return error.why.decode() if error.raised else ""
+        return error.why.text.decode() if error.raised else ""
 
     def python(self, name: str, **given: Any) -> Any:
         """Call the function of the same name with those arguments that it has."""

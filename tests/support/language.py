@@ -41,7 +41,8 @@ from fmus.ports.port import Refusal
 
 """
 
-_WHY = 512
+#: Bytes of a message, as in text.c.
+_WHY = 2001
 
 #: What is said of an integer that C cannot hold.
 TOO_LARGE = "OverflowError: an integer exceeds 32 bits"
@@ -162,7 +163,7 @@ def _shim(name: str, function: Function) -> str:
     lines.append(f"const {function.returns.name} result = {call};")
     leaves = _leaves(function.returns, "result")
     lines += [f"out[{i}] = {leaf};" for i, (leaf, _) in enumerate(leaves)]
-    lines += [f"memcpy(why, error->why, {_WHY});", "(void)in; return error->raised;"]
+    lines += [f"memcpy(why, error->why.text, {_WHY});", "(void)in; return error->raised;"]
     body = "\n".join(f"    {line}" for line in lines)
     head = f"int call_{name}(const double in[], double out[], char why[])"
     return f"{head};\n{head} {{\n{body}\n}}"

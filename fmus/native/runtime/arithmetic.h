@@ -19,29 +19,25 @@
 #include <limits.h>
 #include <math.h>
 #include <stdarg.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Bytes of the text of an error. */
-enum { WHY = 512 };
+#include "text.c"
 
 typedef struct {
     int raised;
-    char why[WHY]; /* the exception's class and text, or only the text of a refusal */
+    message why; /* the exception's class and text, or only the text of a refusal */
 } Error;
 
-static void raise_error(Error *error, const char *format, ...) {
+/* Notes an error; the format is one of `compose`. */
+static void raise_error(Error *error, string format, ...) {
     va_list arguments;
     if (error->raised) return;
     error->raised = 1;
     va_start(arguments, format);
-    vsnprintf(error->why, sizeof error->why, format, arguments);
+    compose_from(&error->why, format, arguments);
     va_end(arguments);
 }
-
-/* A number for a text: Python's NaN has no sign. */
-static inline double shown(double x) { return isnan(x) ? fabs(x) : x; }
 
 static void raise_domain_error(Error *error) { raise_error(error, "ValueError: math domain error"); }
 

@@ -6,11 +6,9 @@
 #include "instance.h"
 #include "ports.h"
 
-#include "utf8.c"
 #include "arguments.c"
 #include "listener.c"
 
-#include "text.c"
 #include "handles.c"
 #include "messages.c"
 #include "noise.c"

@@ -18,8 +18,8 @@
 
 enum { CO_SIMULATION = 1 };
 
-/* Kinds of fmi2GetRealStatus and fmi2GetBooleanStatus. */
-enum { LAST_SUCCESSFUL_TIME = 2, HAS_TERMINATED = 3 };
+/* A kind of fmi2GetRealStatus. */
+enum { LAST_SUCCESSFUL_TIME = 2 };
 
 typedef void (*fmi2_logger)(void *, string, int, string, string, ...);
 
@@ -193,10 +193,9 @@ ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double 
     }
 })
 
+/* No answer: with "true" hosts would end the run as a success, and with "false" FMPy would repeat a
+ * refused step without end. */
 ANSWER(fmi2GetBooleanStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, int *v), {
-    if (kind == HAS_TERMINATED) {
-        *v = this.instance->wants_to_terminate;
-    } else {
-        this.status = not_supported(&this, FMI_DISCARD);
-    }
+    *v = 0;
+    this.status = FMI_DISCARD;
 })

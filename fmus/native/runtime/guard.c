@@ -1,5 +1,4 @@
 /* Making and freeing instances, and what every call begins and ends with. */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -117,7 +116,6 @@ static void *instantiate(string function, string wrong, string name, string toke
     }
     if (can_be_made(wrong, name, token, &why)) {
         renew(it);
-        it->last_successful_time = NAN;
         handle = new_handle(INSTANCE, it, NULL);
         if (handle == NULL) compose(&why, "out of memory");
     }

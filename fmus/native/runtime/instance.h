@@ -1,6 +1,5 @@
 /* What the parts of the component know of each other.
  *
- * text.c       texts of messages, with numbers as Python writes them
  * handles.c    tells what is alive from what is not
  * messages.c   what an instance says, and when the host is told
  * noise.c      Python's random numbers
@@ -16,17 +15,6 @@
 #define INSTANCE_H
 
 #include "component.h"
-
-/* Text */
-
-/* Some hosts have a buffer of 1 or 2 kB for a message. No character has more than four bytes. */
-enum { MOST_CHARACTERS = 500, MOST_TEXT = 4 * MOST_CHARACTERS };
-
-typedef struct {
-    int characters;
-    size_t length; /* in bytes */
-    char text[MOST_TEXT + 1];
-} message;
 
 /* Different messages that an instance logs: a host may step on after a refusal for ever. */
 enum { MOST_MESSAGES = 100 };
@@ -93,10 +81,10 @@ enum { GENERATOR_WORDS = 624 };
 
 /* Python's random.Random. */
 typedef struct {
-    uint32_t words[GENERATOR_WORDS];
     uint32_t place; /* of the next word; GENERATOR_WORDS: all are used up */
     int has_next;
     double next; /* normal numbers come in pairs */
+    uint32_t words[GENERATOR_WORDS];
 } generator;
 
 typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
@@ -140,8 +128,10 @@ struct instance {
     int stale; /* whether a value has changed that state and outputs at the start time depend on */
     size_t n_said;
     uint64_t said[MOST_MESSAGES];
-    double last_successful_time;
-    int wants_to_terminate;
+    double last_successful_time; /* the end of the last step that was taken */
+    /* What a call sets, until all of it is found good. */
+    parameter_values set_parameters;
+    input_values set_inputs;
 };
 
 #endif

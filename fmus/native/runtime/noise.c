@@ -4,6 +4,7 @@
  * seeded as Python seeds it with an integer of one word.
  */
 #include <math.h>
+#include <string.h>
 
 enum { SHIFT = 397 };
 
@@ -25,6 +26,15 @@ static void seed_generator(generator *it, uint32_t seed) {
     it->place = GENERATOR_WORDS;
     it->has_next = 0;
     it->next = 0.0;
+}
+
+/* Copies what drawing n normal numbers may change: two words each, one pair ahead. The words
+ * themselves change only once all are used up. */
+static inline void copy_for(generator *copy, const generator *it, uint32_t n) {
+    copy->place = it->place;
+    copy->has_next = it->has_next;
+    copy->next = it->next;
+    if (it->place + 2 * (n + 1) > GENERATOR_WORDS) memcpy(copy->words, it->words, sizeof it->words);
 }
 
 static void renew_words(uint32_t x[]) {

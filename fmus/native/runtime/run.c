@@ -9,31 +9,32 @@
 /* Longest step of a component that has no internal steps [s]. */
 static const double NO_LIMIT = 1e300;
 
-/* A run as it is after instantiation. */
-static run new_run(void) {
-    run it = {.parameters.h_max = NO_LIMIT};
+/* Makes a run what it is after instantiation. */
+static void renew_run(run *it) {
+    memset(it, 0, sizeof *it);
+    it->parameters.h_max = NO_LIMIT;
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER) {
-            put_parameter(&it.parameters, &ports[i], ports[i].start);
+            put_parameter(&it->parameters, &ports[i], ports[i].start);
         } else if (ports[i].causality == INPUT) {
-            it.inputs.values[ports[i].place] = ports[i].start;
+            it->inputs.values[ports[i].place] = ports[i].start;
         }
     }
-    return it;
 }
 
 /* Makes everything what it is after instantiation. */
 static void renew(instance *it) {
-    it->run = new_run();
+    renew_run(&it->run);
     it->stale = 0;
     it->in_error = 0;
     it->n_said = 0;
+    it->last_successful_time = 0.0;
 }
 
 static int adopt(instance *it, const parameter_values *values, message *why) {
     Error error = {0};
     model_check(&values->model, &error);
-    if (error.raised) return compose(why, "%s", error.why);
+    if (error.raised) return compose(why, "%s", error.why.text);
     it->meant = *values;
     it->longest_step = values->h_max * (1.0 + ROUNDING);
     it->underived = 1;
@@ -49,7 +50,7 @@ static int bounded(const state_values *state) {
 /* Whether a number of the state is one that its enumeration has, if it is of one. */
 static int is_member(const numbers *of, double number, message *why) {
     return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
-           compose(why, "%f is not of type %s", number, of->name);
+           compose(why, "%.0f is not of type %s", number, of->name);
 }
 
 static int has_members(const double values[], message *why) {
@@ -61,13 +62,23 @@ static int has_members(const double values[], message *why) {
     return 1;
 }
 
+/* Gives outputs their noise. */
+static int measure(instance *it, output_values *outputs, message *why) {
+    double draws[AT_LEAST_ONE(MODEL_DRAWS)];
+    Error error;
+    for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&it->run.noise);
+    error.raised = 0;
+    model_measure(&it->meant.model, draws, &outputs->groups, &error);
+    if (error.raised) return compose(why, "%s", error.why.text);
+    return all_finite(outputs->values, MODEL_OUTPUTS) ||
+           compose(why, "a sampled output is not finite");
+}
+
 /* Takes over what was computed for the next moment, if no number of it is out of bounds. */
 static int accept(instance *it, const Error *error, message *why) {
     run *run = &it->run;
     moment *next = &run->moments[!run->now];
-    double draws[AT_LEAST_ONE(MODEL_DRAWS)];
-    Error unmeasured;
-    if (error->raised) return compose(why, "%s", error->why);
+    if (error->raised) return compose(why, "%s", error->why.text);
     if (!has_members(next->state.values, why)) return 0;
     if (!bounded(&next->state)) {
         return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
@@ -78,12 +89,11 @@ static int accept(instance *it, const Error *error, message *why) {
         }
     }
     if (MODEL_DRAWS > 0) {
-        for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&run->noise);
-        unmeasured.raised = 0;
-        model_measure(&it->meant.model, draws, &next->outputs.groups, &unmeasured);
-        if (unmeasured.raised) return compose(why, "%s", unmeasured.why);
-        if (!all_finite(next->outputs.values, MODEL_OUTPUTS)) {
-            return compose(why, "a sampled output is not finite");
+        generator before;
+        copy_for(&before, &run->noise, MODEL_DRAWS);
+        if (!measure(it, &next->outputs, why)) {
+            copy_for(&run->noise, &before, MODEL_DRAWS);
+            return 0;
         }
     }
     run->now = !run->now;
@@ -136,7 +146,7 @@ static void set_experiment(call *this, double start) {
     message why;
     if (!follows(this, INSTANTIATED)) return;
     if (isfinite(start)) {
-        run->start_time = run->time = start;
+        run->start_time = run->time = this->instance->last_successful_time = start;
     } else {
         compose(&why, "start time %r: must be finite", start);
         fail(this, &why);
@@ -167,17 +177,16 @@ static void reset(call *this) { renew(this->instance); }
 
 /* The number of internal steps that a step is split into; -1: it is refused. */
 static int internal_steps(double time, double step, double longest, message *why) {
-    double n = ceil(step / longest);
     if (!isfinite(time) || !isfinite(step)) {
         compose(why, "time %r and step %r must be finite", time, step);
     } else if (step < 0.0) {
         compose(why, "step %g s is negative", step);
-    } else if (isinf(n)) {
-        compose(why, "OverflowError: cannot convert float infinity to integer");
-    } else if (n > MOST_INTERNAL_STEPS) {
-        compose(why, "step %g s needs %f internal steps; raise h_max", step, n);
+    } else if (step / longest > MOST_INTERNAL_STEPS) {
+        compose(why,
+                "step %g s needs more than %.0f internal steps; take shorter ones, or raise h_max",
+                step, MOST_INTERNAL_STEPS);
     } else {
-        return (int)n;
+        return (int)ceil(step / longest);
     }
     return -1;
 }
@@ -200,7 +209,7 @@ static int advance(instance *it, double time, double step, message *why) {
     int credible = model_credible(parameters, &now->state.groups, inputs, &error);
     if (!credible && !error.raised) {
         compose(&said, MODEL_RESTARTED, time);
-        say(it, &said, FMI_WARNING, "observer restarted");
+        say(it, &said, FMI_WARNING, MODEL_RESTARTED);
         model_restart(parameters, &next->state.groups, inputs, &error);
     } else if (it->underived) {
         model_derive(parameters, &next->state.groups, &error);
@@ -215,12 +224,11 @@ static int advance(instance *it, double time, double step, message *why) {
 static void take_step(call *this, double time, double step) {
     instance *it = this->instance;
     message why, said;
-    int can_step = follows(this, STEPPING);
-    int taken = can_step && advance(it, time, step, &why);
-    it->last_successful_time = taken ? time + step : time;
-    if (taken) return;
-    it->wants_to_terminate = 1;
-    if (!can_step) return;
-    compose(&said, "step refused at t = %g s: %s", time, why.text);
-    discard(this, &said, why.text);
+    if (!follows(this, STEPPING)) return;
+    if (advance(it, time, step, &why)) {
+        it->last_successful_time = time + step;
+    } else {
+        compose(&said, "step refused at t = %g s: %s", time, why.text);
+        discard(this, &said, why.text);
+    }
 }

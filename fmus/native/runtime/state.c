@@ -115,7 +115,7 @@ static int take_parameter(reader *from, parameter_values *values, const port *po
 static int good_number(const numbers *of, double number, message *why) {
     if (of->type == REAL) return isfinite(number) || compose(why, "a value is not finite");
     if (of->type == BOOLEAN && !is_truth(number)) {
-        return compose(why, "%f is not of type bool", number);
+        return compose(why, "%.0f is not of type bool", number);
     }
     return is_member(of, number, why);
 }
@@ -206,30 +206,32 @@ static int nearly_equal(const double one[], const double other[]) {
 static int can_be_reached(run *it, message *why) {
     const model_parameters *parameters = &it->parameters.model;
     moment *now = &it->moments[it->now];
-    output_values expected;
+    output_values *expected = &it->moments[!it->now].outputs;
     Error error = {0};
     model_check(parameters, &error);
     if (!error.raised && !bounded(&now->state)) return compose(why, "it exceeds %g", LARGEST_STATE);
-    model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected.groups, &error);
-    if (error.raised) return compose(why, "%s", error.why);
-    if (MODEL_EXPECTS && !nearly_equal(expected.values, now->outputs.values)) {
+    model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected->groups, &error);
+    if (error.raised) return compose(why, "%s", error.why.text);
+    if (MODEL_EXPECTS && !nearly_equal(expected->values, now->outputs.values)) {
         return compose(why, "its outputs do not match its state");
     }
     return 1;
 }
 
-static size_t largest_size(void) {
-    run it = new_run();
+/* How many bytes a state has at most; `it` is a new run. */
+static size_t largest_size(run *it) {
     writer to = {NULL, CHECKSUM_SIZE};
-    it.begun = 1;
-    put_run(&to, &it);
+    it->begun = 1;
+    put_run(&to, it);
+    it->begun = 0;
     return to.size;
 }
 
+/* Makes a new run what was saved. */
 static int can_be_restored(const saved *state, run *it, message *why) {
     reader from = {.bytes = state->bytes, .left = content_size(state)};
     if (!take_this(&from, MAGIC)) return compose(why, "the bytes are not a state");
-    if (state->size > largest_size()) return compose(why, "it has missing or unknown parts");
+    if (state->size > largest_size(it)) return compose(why, "it has missing or unknown parts");
     if (state->sealed && !has_its_checksum(state)) {
         return compose(why, "the bytes were changed since they were written");
     }
@@ -238,13 +240,18 @@ static int can_be_restored(const saved *state, run *it, message *why) {
 }
 
 static int restore(instance *it, const saved *state, message *why) {
-    run wanted = new_run();
-    if (!can_be_restored(state, &wanted, why)) return 0;
-    if (wanted.begun && !adopt(it, &wanted.parameters, why)) return 0;
-    it->run = wanted;
-    /* Before the first step all follows from parameters and inputs, and is computed once more. */
-    it->stale = it->run.mode == INITIALISING;
-    return 1;
+    run *wanted = malloc(sizeof *wanted);
+    if (wanted == NULL) return compose(why, "out of memory");
+    renew_run(wanted);
+    int good = can_be_restored(state, wanted, why) &&
+               (!wanted->begun || adopt(it, &wanted->parameters, why));
+    if (good) {
+        it->run = *wanted;
+        /* Before the first step all follows from parameters and inputs: it is computed again. */
+        it->stale = it->run.mode == INITIALISING;
+    }
+    free(wanted);
+    return good;
 }
 
 /* What the host does with states */

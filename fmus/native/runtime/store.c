@@ -66,10 +66,10 @@ static int is_finite(const port *port, double number, message *why) {
 static int in_range(const port *port, double number, message *why) {
     if (!is_finite(port, number, why)) return 0;
     if (port->n_choices > 0 && text_of(port, number) == NULL) {
-        compose(why, "%s = %f: use one of ", port->name, number);
+        compose(why, "%s = %.0f: use one of ", port->name, number);
         for (size_t i = 0; i < port->n_choices; i++) {
             message one;
-            compose(&one, i > 0 ? ", %f" : "%f", (double)port->choices[i].number);
+            compose(&one, i > 0 ? ", %.0f" : "%.0f", (double)port->choices[i].number);
             append_text(why, one.text);
         }
     } else if (number < port->minimum) {
@@ -182,13 +182,11 @@ static int can_set(call *this) {
     return this->instance->run.mode != TERMINATED || follows(this, STEPPING);
 }
 
-/* The values of a call, until all of them are found good. */
+/* The values of a call, which the instance keeps until all of them are found good. */
 struct setting {
     call *call;
     int good;
     int tunes; /* whether there are parameters among them */
-    parameter_values parameters;
-    input_values inputs;
 };
 
 static void set_unknown(call *this, string type, const uint32_t references[], size_t n) {
@@ -199,11 +197,8 @@ static void set_unknown(call *this, string type, const uint32_t references[], si
 }
 
 static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n) {
-    const run *run = &this->instance->run;
-    setting it;
-    it.call = this;
-    it.good = can_set(this);
-    it.tunes = 0;
+    instance *instance = this->instance;
+    setting it = {this, can_set(this), 0};
     for (size_t i = 0; i < n && it.good; i++) {
         const port *port = port_of(references[i], type);
         if (port != NULL) {
@@ -213,8 +208,8 @@ static setting begin_setting(call *this, fmi_type type, const uint32_t reference
             it.good = 0;
         }
     }
-    if (it.tunes) it.parameters = run->parameters;
-    it.inputs = run->inputs;
+    if (it.tunes) instance->set_parameters = instance->run.parameters;
+    instance->set_inputs = instance->run.inputs;
     return it;
 }
 
@@ -224,7 +219,8 @@ static int is_the_same(const run *run, const port *port, double number, string t
 }
 
 static int take_value(setting *it, const port *port, double number, string text, message *why) {
-    const run *run = &it->call->instance->run;
+    instance *instance = it->call->instance;
+    const run *run = &instance->run;
     if (port->causality == OUTPUT) {
         return compose(why, "%s is an output and cannot be set", port->name);
     }
@@ -236,9 +232,9 @@ static int take_value(setting *it, const port *port, double number, string text,
         return 0;
     }
     if (port->causality == INPUT) {
-        it->inputs.values[port->place] = number;
+        instance->set_inputs.values[port->place] = number;
     } else {
-        put_parameter(&it->parameters, port, number);
+        put_parameter(&instance->set_parameters, port, number);
     }
     return 1;
 }
@@ -264,12 +260,12 @@ static void end_setting(setting *it) {
     run *run = &instance->run;
     message why;
     if (!it->good) return;
-    if (it->tunes && run->mode == STEPPING && !adopt(instance, &it->parameters, &why)) {
+    if (it->tunes && run->mode == STEPPING && !adopt(instance, &instance->set_parameters, &why)) {
         give_up(it, &why);
         return;
     }
-    if (it->tunes) run->parameters = it->parameters;
-    run->inputs = it->inputs;
+    if (it->tunes) run->parameters = instance->set_parameters;
+    run->inputs = instance->set_inputs;
     if (run->mode == INITIALISING) instance->stale = 1;
 }
 

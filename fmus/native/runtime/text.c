@@ -1,4 +1,7 @@
 /* Texts of messages: of bounded length, with numbers as Python writes them in any locale. */
+#ifndef TEXT_C
+#define TEXT_C
+
 #include <ctype.h>
 #include <float.h>
 #include <math.h>
@@ -7,16 +10,32 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* Adds a text, which is UTF-8, as far as it has room. */
-static void append_text(message *it, string text) {
-    while (*text != '\0' && it->characters < MOST_CHARACTERS) {
+#include "host.h"
+
+#include "utf8.c"
+
+/* Some hosts have a buffer of 1 or 2 kB for a message. No character has more than four bytes. */
+enum { MOST_CHARACTERS = 500, MOST_TEXT = 4 * MOST_CHARACTERS };
+
+typedef struct {
+    int characters;
+    size_t length; /* in bytes */
+    char text[MOST_TEXT + 1];
+} message;
+
+/* Adds some bytes, which are UTF-8, as far as it has room. */
+static void append_bytes(message *it, string bytes, size_t n) {
+    string end = bytes + n;
+    while (bytes < end && it->characters < MOST_CHARACTERS) {
         do {
-            it->text[it->length++] = *text++;
-        } while (((unsigned char)*text & 0xc0) == 0x80);
+            it->text[it->length++] = *bytes++;
+        } while (bytes < end && ((unsigned char)*bytes & 0xc0) == 0x80);
         it->characters++;
     }
     it->text[it->length] = '\0';
 }
+
+static void append_text(message *it, string text) { append_bytes(it, text, strlen(text)); }
 
 static void clear(message *it) {
     it->characters = 0;
@@ -26,9 +45,8 @@ static void clear(message *it) {
 
 /* Numbers */
 
-/* Digits that tell any number from all others, that %g gives, and the exponents from which Python
- * and %g write an exponent. */
-enum { ALL_DIGITS = 17, SHORT_DIGITS = 6, REPR_EXPONENT = 16, SMALLEST_EXPONENT = -4 };
+/* Digits that tell any number from all others, and exponents beyond which Python writes one. */
+enum { ALL_DIGITS = 17, SMALLEST_EXPONENT = -4, LARGEST_EXPONENT = 15 };
 
 /* A number as 0.digits * 10^point. */
 typedef struct {
@@ -80,17 +98,18 @@ static decimal shortest(double magnitude) {
     }
 }
 
-static void append_number(message *it, double number, int exactly) {
+/* A number as Python's repr shows it. */
+static void append_exactly(message *it, double number) {
     char text[ALL_DIGITS + 16] = "", *end = text;
     if (isnan(number) || isinf(number)) {
         append_text(it, isnan(number) ? "nan" : number > 0.0 ? "inf" : "-inf");
         return;
     }
-    decimal said = exactly ? shortest(fabs(number)) : rounded(fabs(number), SHORT_DIGITS);
+    decimal said = shortest(fabs(number));
     int n = (int)strlen(said.digits), exponent = said.point - 1;
     while (n > 1 && said.digits[n - 1] == '0') n--;
     if (signbit(number)) *end++ = '-';
-    if (exponent < SMALLEST_EXPONENT || exponent >= (exactly ? REPR_EXPONENT : SHORT_DIGITS)) {
+    if (exponent < SMALLEST_EXPONENT || exponent > LARGEST_EXPONENT) {
         snprintf(end, sizeof text - 1, "%c%s%.*se%c%02d", said.digits[0], n > 1 ? "." : "", n - 1,
                  said.digits + 1, exponent < 0 ? '-' : '+', abs(exponent));
     } else {
@@ -99,8 +118,24 @@ static void append_number(message *it, double number, int exactly) {
             *end++ = i < 0 || i >= n ? '0' : said.digits[i];
             if (i == exponent && i + 1 < n) *end++ = '.';
         }
-        if (exactly && n <= exponent + 1) memcpy(end, ".0", sizeof ".0");
+        if (n <= exponent + 1) memcpy(end, ".0", sizeof ".0");
     }
+    append_text(it, text);
+}
+
+/* A number as a directive of printf writes it. Python's NaN has no sign. */
+static void append_number(message *it, string directive, double number) {
+    char text[MOST_TEXT + 1], *end = text;
+    snprintf(text, sizeof text, directive, isnan(number) ? fabs(number) : number);
+    for (string next = text; *next != '\0'; next++) {
+        if (strchr("+- ", *next) != NULL || isalnum((unsigned char)*next)) {
+            *end++ = *next;
+        } else if (end[-1] != '.') {
+            /* Between the digits is what the locale puts there. */
+            *end++ = '.';
+        }
+    }
+    *end = '\0';
     append_text(it, text);
 }
 
@@ -130,34 +165,50 @@ static void append_quoted(message *it, string text) {
     append_text(it, ends);
 }
 
-/* Writes a text: %s is a text; %q a text in quotes; %g a number in short; %r a number exactly; %f a
- * number without a fraction; %u a reference. Gives 0, with which a function fails. */
-static int compose(message *it, string format, ...) {
-    va_list arguments;
-    va_start(arguments, format);
+/* What a directive may have between its % and its letter, and how long it is with both. */
+static const char MODIFIERS[] = "+ .0123456789";
+enum { LONGEST_DIRECTIVE = 16 };
+
+/* Writes a text: %s is a text; %q a text in quotes; %r a number exactly; %d an integer; %u a
+ * reference; %% a percent sign; all else a number as printf writes it, such as %g or %+.2f. */
+static void compose_from(message *it, string format, va_list arguments) {
     clear(it);
-    for (char one[2] = ""; *format != '\0'; format++) {
-        char number[DBL_MAX_10_EXP + 4];
-        if (*format != '%') {
-            one[0] = *format;
-            append_text(it, one);
-            continue;
-        }
-        switch (*++format) {
+    while (*format != '\0') {
+        size_t plain = strcspn(format, "%");
+        append_bytes(it, format, plain);
+        format += plain;
+        if (*format == '\0') break;
+        char directive[LONGEST_DIRECTIVE] = "", number[16];
+        size_t length = 2 + strspn(format + 1, MODIFIERS);
+        char letter = format[length - 1];
+        switch (letter) {
+            case '%': append_text(it, "%"); break;
             case 's': append_text(it, va_arg(arguments, string)); break;
             case 'q': append_quoted(it, va_arg(arguments, string)); break;
-            case 'g': append_number(it, va_arg(arguments, double), 0); break;
-            case 'r': append_number(it, va_arg(arguments, double), 1); break;
-            case 'f':
-                snprintf(number, sizeof number, "%.0f", va_arg(arguments, double));
+            case 'r': append_exactly(it, va_arg(arguments, double)); break;
+            case 'd':
+                snprintf(number, sizeof number, "%d", va_arg(arguments, int));
                 append_text(it, number);
                 break;
             case 'u':
                 snprintf(number, sizeof number, "%lu", (unsigned long)va_arg(arguments, uint32_t));
                 append_text(it, number);
                 break;
+            default:
+                memcpy(directive, format, length);
+                append_number(it, directive, va_arg(arguments, double));
         }
+        format += length;
     }
+}
+
+/* The same; gives 0, with which a function fails. */
+static int compose(message *it, string format, ...) {
+    va_list arguments;
+    va_start(arguments, format);
+    compose_from(it, format, arguments);
     va_end(arguments);
     return 0;
 }
+
+#endif

@@ -18,6 +18,9 @@
 #include "handles.c"
 #include "guard.c"
 
+/* A kind of fmi2GetRealStatus. */
+enum { LAST_SUCCESSFUL_TIME = 2 };
+
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
 
@@ -142,7 +145,10 @@ EXPORT int fmi2Reset(component c) {
     call this = begin(c, "fmi2Reset", ALWAYS);
     if (GOES_ON(this, NULL)) {
         TO_PYTHONFMU(this, fmi2Reset, (component), (this.instance->slave));
-        if (this.status == FMI_OK) this.instance->condition = SOUND;
+        if (this.status == FMI_OK) {
+            this.instance->condition = SOUND;
+            this.instance->last_successful_time = 0.0;
+        }
     }
     return end(&this);
 }
@@ -158,14 +164,28 @@ EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names
 
 /* Modes and steps */
 
-FORWARD(fmi2SetupExperiment, NOT_AFTER_ERROR, NULL,
-        (component c, int has_tolerance, double tolerance, double start, int has_stop, double stop),
-        (c, has_tolerance, tolerance, start, has_stop, stop))
+/* A function that is forwarded, and after which steps have come to a time. */
+#define FORWARD_TO(time_after, name, parameters, arguments)                                      \
+    EXPORT int name parameters {                                                                 \
+        call this = begin(c, #name, NOT_AFTER_ERROR);                                            \
+        if (GOES_ON(this, NULL)) {                                                               \
+            c = this.instance->slave;                                                            \
+            TO_PYTHONFMU(this, name, parameters, arguments);                                     \
+            take_answer(&this, 1);                                                               \
+            if (this.status == FMI_OK) this.instance->last_successful_time = time_after;         \
+        }                                                                                        \
+        return end(&this);                                                                       \
+    }
+
+FORWARD_TO(start, fmi2SetupExperiment,
+           (component c, int has_tolerance, double tolerance, double start, int has_stop,
+            double stop),
+           (c, has_tolerance, tolerance, start, has_stop, stop))
 FORWARD(fmi2EnterInitializationMode, NOT_AFTER_ERROR, NULL, (component c), (c))
 FORWARD(fmi2ExitInitializationMode, NOT_AFTER_ERROR, NULL, (component c), (c))
 FORWARD(fmi2Terminate, NOT_AFTER_ERROR, NULL, (component c), (c))
-FORWARD(fmi2DoStep, NOT_AFTER_ERROR, NULL, (component c, double time, double step, int no_set),
-        (c, time, step, no_set))
+FORWARD_TO(time + step, fmi2DoStep, (component c, double time, double step, int no_set),
+           (c, time, step, no_set))
 FORWARD(fmi2CancelStep, NOT_AFTER_ERROR, NULL, (component c), (c))
 
 /* Values */
@@ -303,10 +323,34 @@ FORWARD(fmi2GetRealOutputDerivatives, ALWAYS, NULL,
     FORWARD(name, ALWAYS, v == NULL ? "NULL" : NULL, (component c, int kind, type *v), (c, kind, v))
 
 STATUS(fmi2GetStatus, int)
-STATUS(fmi2GetRealStatus, double)
 STATUS(fmi2GetIntegerStatus, int)
-STATUS(fmi2GetBooleanStatus, int)
 STATUS(fmi2GetStringStatus, string)
+
+/* PythonFMU's time is also that of a step that was refused, and of the run before a reset. */
+EXPORT int fmi2GetRealStatus(component c, int kind, double *v) {
+    call this = begin(c, "fmi2GetRealStatus", ALWAYS);
+    if (GOES_ON(this, v == NULL ? "NULL" : NULL)) {
+        if (kind == LAST_SUCCESSFUL_TIME) {
+            *v = this.instance->last_successful_time;
+        } else {
+            TO_PYTHONFMU(this, fmi2GetRealStatus, (component, int, double *),
+                         (this.instance->slave, kind, v));
+        }
+    }
+    return end(&this);
+}
+
+/* No answer: PythonFMU's own is "true" after each refused step, and hosts would end the run as a
+ * success; with "false" FMPy would repeat the step without end. */
+EXPORT int fmi2GetBooleanStatus(component c, int kind, int *v) {
+    call this = begin(c, "fmi2GetBooleanStatus", ALWAYS);
+    (void)kind;
+    if (GOES_ON(this, v == NULL ? "NULL" : NULL)) {
+        *v = 0;
+        this.status = FMI_DISCARD;
+    }
+    return end(&this);
+}
 
 static int not_supported(component c, string function) {
     call this = begin(c, function, NOT_AFTER_ERROR);

@@ -129,6 +129,7 @@ typedef struct {
     callbacks heard; /* what PythonFMU gets for callbacks */
     component slave; /* PythonFMU's own instance */
     int answer;      /* the status that the slave has for the call */
+    double last_successful_time;
     enum { SOUND, IN_ERROR, LOST } condition;
     int busy;
     pthread_t thread; /* that is in a call */

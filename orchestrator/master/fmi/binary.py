@@ -66,7 +66,7 @@ class Library:
             call, also for the others, even to free them.
         runs_python: whether PythonFMU has made it.
         is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
-            instance, and of each step that it refuses it says that it wants to terminate.
+            instance.
         users: how many there are.
 
     """

@@ -291,7 +291,10 @@ class LoadedInstance:
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
         """What to raise after a call that has ended with a status."""
         restore_mode()
-        if (function, status) == (DO_STEP, fmi2Discard) and not self._library.is_akin:
+        # First of all: what an FMU is asked now may make it complain of the question.
+        failure = self._failed(FMICallException(function=function, status=status))
+        # PythonFMU says that it wants to terminate of each step that it refuses.
+        if (function, status) == (DO_STEP, fmi2Discard) and not self._library.runs_python:
             with suppress(FMICallException):
                 if (time := self._fmu.ended_at()) is not None:
                     text = f"{self.name} has ended the simulation, at {time:.12g} s"
@@ -308,7 +311,7 @@ class LoadedInstance:
                 f"{self.name}: its step continues after {function}, although its description does "
                 "not say so (canRunAsynchronuously)"
             )
-        return self._failed(FMICallException(function=function, status=status))
+        return failure
 
     def _failed(self, error: FMICallException) -> ComponentFailed:
         fatal = error.status == fmi2Fatal

@@ -245,7 +245,7 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
         return Moved(function, c_types.get(fmi_type, TYPES[fmi_type].c_type))
 
     def _instantiate(self, environment: int) -> None:
-        callbacks = fmi2CallbackFunctions.from_buffer_copy(_SHARED)
+        callbacks = _callbacks()
         callbacks.componentEnvironment = environment
         self.instantiate(callbacks=callbacks, loggingOn=True)
 
@@ -380,8 +380,12 @@ def _bearing(name: bytes | None) -> Hearer | None:
     return next((found for found in _hearers.values() if found.name == text), None)
 
 
-def _shared_callbacks() -> fmi2CallbackFunctions:
-    """Callbacks of all instances: fmpy's proxy, which formats messages, knows one logger only."""
+def _callbacks() -> fmi2CallbackFunctions:
+    """Callbacks of an instance.
+
+    fmpy's proxy, which formats messages, knows one logger only: the last one that it was given. It
+    may be another one after a run of fmpy's own.
+    """
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = _log
     # The functions of C themselves: made into callbacks of Python, they would cost an FMU that
@@ -390,6 +394,3 @@ def _shared_callbacks() -> fmi2CallbackFunctions:
     callbacks.freeMemory = ctypes.cast(fmpy.free, fmi2CallbackFreeMemoryTYPE)
     addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
-
-
-_SHARED = _shared_callbacks()

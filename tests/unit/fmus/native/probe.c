@@ -12,7 +12,11 @@ static int with_comma(char *text, size_t size, const char *format, ...) {
     va_start(arguments, format);
     int length = vsnprintf(text, size, format, arguments);
     va_end(arguments);
-    if (strstr(format, "%.*e") != NULL && strchr(text, '.') != NULL) *strchr(text, '.') = ',';
+    /* Of a number: the first directive of a text is another. */
+    if (strspn(format + 1, "+ .*0123456789") == strcspn(format + 1, "eEfgG") &&
+        strchr(text, '.') != NULL) {
+        *strchr(text, '.') = ',';
+    }
     return length;
 }
 #define snprintf with_comma
@@ -23,6 +27,12 @@ static int with_comma(char *text, size_t size, const char *format, ...) {
 EXPORT void show_number(double number, int exactly, char *text) {
     message it;
     compose(&it, exactly ? "%r" : "%g", number);
+    strcpy(text, it.text);
+}
+
+EXPORT void show_in(string format, double number, char *text) {
+    message it;
+    compose(&it, format, number);
     strcpy(text, it.text);
 }
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import struct
 import subprocess
+import sys
 from binascii import crc32
 from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_uint32, create_string_buffer
 from math import inf, ldexp, nan
@@ -17,6 +19,10 @@ from hypothesis import strategies as st
 
 from fmus.discovery import components, source_of
 from fmus.native.packaging import MAIN, sources
+from fmus.native.translator import _directives
+from fmus.ports.behaviour import NUMBER_FORMAT
+from fmus.python.callbacks import LONGEST_MESSAGE
+from support.language import HEAD, Twins, module_of
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 
@@ -57,11 +63,18 @@ class Runtime:
     """The functions of probe.c."""
 
     def __init__(self, library: Path) -> None:
-        self._library = CDLL(str(library))
+        self.path, self._library = library, CDLL(str(library))
 
     def shown(self, number: float, exactly: bool) -> str:
         text = create_string_buffer(ROOM)
         self._library.show_number(c_double(number), c_int(exactly), text)
+        return text.value.decode()
+
+    def shown_in(self, form: str, number: float) -> str:
+        """A text for `str.format` that names the time, as both kinds log it."""
+        text = create_string_buffer(ROOM)
+        directives = _directives(form).encode()
+        self._library.show_in(c_char_p(directives), c_double(number), text)
         return text.value.decode()
 
     def quoted(self, said: str) -> str:
@@ -130,6 +143,97 @@ def test_decimal_comma_of_the_host_is_not_seen(comma: Runtime):
     for number in (0.1, -1234.5678, 5e-324, 1.7976931348623157e308, 1e23, 12.5):
         assert comma.shown(number, exactly=True) == repr(number)
         assert comma.shown(number, exactly=False) == f"{number:g}"
+
+
+#: Texts for `str.format`, with the time at most once.
+PIECE = st.sampled_from(["%", "{{", "}}", "d", "s", " ", "ü", "€", "𝜃", "t", "ü" * 498, "𝜃" * 600])
+LITERAL = st.lists(PIECE, max_size=6).map("".join)
+FIELD = st.sampled_from(["", "{t}", "{t:+.2f}", "{t: 12.3e}", "{t:200.150f}"]) | st.from_regex(
+    NUMBER_FORMAT, fullmatch=True
+).map(lambda form: f"{{t:{form}}}")
+FORM = st.builds("{}{}{}".format, LITERAL, FIELD, LITERAL)
+
+
+@given(form=FORM, number=every_double | usual_double.map(float))
+@example(form="100 % at {t:g}", number=2.5)
+@example(form="{t:10.3f}", number=inf)
+@example(form="{t:+E}", number=-nan)
+def test_messages_are_formatted_as_python_formats_them(
+    runtime: Runtime, comma: Runtime, form: str, number: float
+):
+    """Whole, or cut between two characters; in any locale."""
+    expected = form.format(t=number)[:MOST_CHARACTERS]
+    assert runtime.shown_in(form, number) == expected
+    assert comma.shown_in(form, number) == expected
+
+
+#: What is shown in the locale of a process of its own.
+_IN_GERMAN = """\
+import locale, sys
+from ctypes import CDLL, c_char_p, c_double, create_string_buffer
+locale.setlocale(locale.LC_ALL, "de_DE.UTF-8")
+assert locale.localeconv()["decimal_point"] == ","
+library, text = CDLL(sys.argv[1]), create_string_buffer(2001)
+library.show_in(c_char_p(b"%g, %%, "), c_double(2.5), text)
+print(text.value.decode())
+for form in sys.argv[2:]:
+    library.show_in(c_char_p(form.encode()), c_double(-1234.5), text)
+    print(text.value.decode())
+"""
+
+
+@pytest.mark.skipif(
+    not shutil.which("localedef") or not Path("/usr/share/i18n/locales/de_DE").is_file(),
+    reason="there is no German locale",
+)
+def test_german_locale_of_the_host_is_not_seen(runtime: Runtime, tmp_path: Path):
+    made = ["localedef", "-i", "de_DE", "-f", "UTF-8", tmp_path / "de_DE.UTF-8"]
+    subprocess.run(made, check=True, capture_output=True)
+    command = [sys.executable, "-c", _IN_GERMAN, runtime.path, "%g", "%r", "%.3f", "%+12.2e"]
+    environment = {**os.environ, "LOCPATH": str(tmp_path)}
+    process = subprocess.run(
+        command, env=environment, capture_output=True, encoding="utf-8", check=True
+    )
+    assert process.stdout.splitlines() == [
+        "2.5, %, ", "-1234.5", "-1234.5", "-1234.500", "   -1.23e+03",
+    ]  # fmt: skip
+
+
+#: How many texts there are.
+TEXTS = 60
+
+#: What is between the numbers of a text.
+PIECES = ("100 % ", "%%", "%d", "%n ", "ü" * 90, "𝜃" * 200, "{{", "}}", "\\\\", "\\'", " ist ", "€")
+FIELDS = ("{x:g}", "{x:.3f}", "{x:+.2e}", "{y: 9.1f}", "{k}", "{k:d}", "{k:.1f}", "{on}", "{y:G}")
+
+NUMBERS = (0.0, -0.0, 2.5, -1234.56789, 1e-5, 1e17, 1e308, 5e-324, inf, -inf, nan)
+
+
+def texts(random: Random) -> list[str]:
+    return [
+        "".join(random.choice((random.choice(PIECES), random.choice(FIELDS))) for _ in range(8))
+        for _ in range(TEXTS)
+    ]
+
+
+def test_refusals_say_the_same_in_both_languages(tmp_path: Path):
+    random = Random(0)
+    functions = "\n\n".join(
+        f"def f{i}(x: float, y: float, k: int, on: bool) -> float:\n"
+        f"    if k > -10:\n        raise Refusal(f'{text}')\n    return x\n"
+        for i, text in enumerate(texts(random))
+    )
+    twins = Twins(module_of(HEAD + functions, tmp_path), tmp_path)
+    for i in range(TEXTS):
+        for _ in range(4):
+            given = [
+                random.choice(NUMBERS),
+                random.choice(NUMBERS),
+                random.randrange(-9, 99),
+                i % 2,
+            ]
+            expected = twins.python(f"f{i}", given).error[:LONGEST_MESSAGE]
+            assert twins.c(f"f{i}", given).error == expected
 
 
 #: What Python can show as it is, without a look into Unicode's tables.

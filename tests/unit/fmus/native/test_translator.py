@@ -31,12 +31,11 @@ from fmus.native.tables import tables
 from fmus.native.translator import _drawn, translated
 from fmus.ports.groups import class_of, count_values, hints_of, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
-from fmus.python.callbacks import describe_error
+from fmus.python.callbacks import LONGEST_MESSAGE, describe_error
 from support.equations import (
     FLAGS,
     ROOT,
     RUNTIME,
-    WHY,
     Error,
     bits,
     equations,
@@ -284,7 +283,7 @@ def raised(call: Any) -> tuple[str, list[str]]:
     try:
         return outcome(call())
     except Exception as error:
-        return describe_error(error)[: WHY - 1], []
+        return describe_error(error)[:LONGEST_MESSAGE], []
 
 
 @every

@@ -11,7 +11,7 @@ from types import ModuleType
 import pytest
 
 from fmus.discovery import package_folder
-from fmus.ports.behaviour import HOOKS, read_behaviour
+from fmus.ports.behaviour import HOOKS, _message, read_behaviour
 from fmus.ports.groups import Nothing
 from fmus.ports.port import Misdeclared
 
@@ -137,6 +137,12 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
 def test_mistakes_are_named(tmp_path, monkeypatch, old, new, why):
     with pytest.raises(TypeError, match=f"^(own_behaviour.*)?{why}"):
         behaviour(tmp_path, monkeypatch, GOOD.replace(old, new))
+
+
+@pytest.mark.parametrize("text", ["{t:>9}", "{t!r}", "{x}", "{t} {t}", "{", "{t:.2d}", "{}", 7])
+def test_messages_that_only_python_could_write_are_refused(text):
+    with pytest.raises(Misdeclared, match=r"own\.RESTARTED .*{t:g}"):
+        _message("own", text)
 
 
 # Every argument and every result of every hook, with every type but its own

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from math import pi
 from xml.etree import ElementTree
+
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from fmus.ports.description import complete, dependencies, value_attributes
 from fmus.ports.port import FAULT, Port, inputs, outputs, parameter
@@ -103,3 +107,15 @@ def test_integers_and_truth_values_depend_as_reals_do():
     assert [
         [value_attributes(port).get(name) for name in said] for port in ports[:2]
     ] == [["3", "-5", None, None], ["true", None, None, None]]  # fmt: skip
+
+
+@given(
+    low=st.floats(allow_nan=False, allow_infinity=False),
+    start=st.floats(allow_nan=False, allow_infinity=False),
+    high=st.floats(allow_nan=False, allow_infinity=False),
+)
+@example(low=-0.0, start=0.1 + 0.2, high=pi / 2)
+def test_numbers_are_read_back_bit_for_bit(low: float, start: float, high: float):
+    said = value_attributes(parameter("k", start, "1", "Gain", low, high))
+    read = [float(said[name]).hex() for name in ("min", "start", "max")]
+    assert read == [low.hex(), start.hex(), high.hex()]

@@ -6,6 +6,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from auv_fmu import __version__
+from fmus.kinds import TARGETS
 from fmus.ports.definition import Definition
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
@@ -83,9 +84,6 @@ control of autonomous underwater vehicles with limited torque and without veloci
 
 BUILD = """
 <fmiBuildDescription fmiVersion="3.0">
-  <BuildConfiguration modelIdentifier="It">
-    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
-  </BuildConfiguration>
   <BuildConfiguration modelIdentifier="It" platform="x86_64-linux">
     <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
     <Library name="m" external="true"/>
@@ -93,6 +91,15 @@ BUILD = """
   <BuildConfiguration modelIdentifier="It" platform="aarch64-linux">
     <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
     <Library name="m" external="true"/>
+  </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="x86_64-windows">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+  </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="x86_64-darwin">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
+  </BuildConfiguration>
+  <BuildConfiguration modelIdentifier="It" platform="aarch64-darwin">
+    <SourceFileSet language="C99"><SourceFile name="fmi3.c"/></SourceFileSet>
   </BuildConfiguration>
 </fmiBuildDescription>
 """
@@ -111,6 +118,8 @@ def test_description_says_what_the_ports_are():
 
 def test_build_description_names_the_one_file():
     assert canonical(fmi3_build_description("It")) == canonical(BUILD)
+    named = [one.get("platform") for one in ElementTree.fromstring(BUILD)]
+    assert named == [*TARGETS], "each machine that libraries are built for, once"
 
 
 GROUPS = (
