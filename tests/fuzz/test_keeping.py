@@ -14,6 +14,7 @@ import os
 import re
 import shutil
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
@@ -144,6 +145,12 @@ folders = st.builds(
 )
 
 
+@pytest.fixture(autouse=True)
+def _no_module_of_that_name() -> None:
+    """Other tests have one, for which `new` would refuse the name."""
+    sys.modules.pop("own", None)
+
+
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What commands read: a result, a study, a script, and scenarios of odd names."""
@@ -153,6 +160,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "study.toml").write_text(STUDY)
     for name in COMPANIONS:
         (folder / f"{name}.toml").write_text("stop_time = 0.06\n")
+    sys.modules.pop("own", None)
     assert main(["new", "controller", "Own", str(folder / "own")]) == 0
     shutil.copy(folder / "own" / "own.py", folder)
     return folder

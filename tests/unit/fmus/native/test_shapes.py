@@ -35,7 +35,7 @@ static double use_{i}(double {name}, Error *error) {{
     const struct {{ double {name}; }} it_{i} = {{.{name} = {name}}};
     const double y_{i} = ABS((int){name}) + SQRT({name}) + POW({name}, 2.0) + MOD({name}, 3.0);
     if (isfinite({name}) != 0 && isnan({name}) == 0 && isinf({name}) == 0) return INFINITY;
-    for (int i_{i} = 0; i_{i} < 2; i_{i}++) raise_error(error, "%g", shown({name}));
+    for (int i_{i} = 0; i_{i} < 2; i_{i}++) raise_error(error, "%g", {name});
     return y_{i} + it_{i}.{name} + fabs({name}) + INT_OF(trunc({name})) + ADD(1, PLACE(2, 3)) + NAN;
 }}
 """
