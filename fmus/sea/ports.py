@@ -29,7 +29,7 @@ PARAMETERS = ParameterSet(
         Hs=parameter("waves.Hs", _WAVES.Hs, "m", "Significant wave height", 0.0),
         Tp=parameter("waves.Tp", _WAVES.Tp, "s", "Period of the peak of the spectrum", POSITIVE),
         gamma=parameter(
-            "waves.gamma", _WAVES.gamma, "1", "How much JONSWAP raises the peak", 1.0, 10.0
+            "waves.gamma", _WAVES.gamma, "1", "JONSWAP peak enhancement factor", 1.0, 10.0
         ),
         highest=parameter(
             "waves.highest",
@@ -49,7 +49,7 @@ PARAMETERS = ParameterSet(
             "waves.s",
             _WAVES.s,
             "1",
-            "Exponent s of the spreading cos^2s(angle/2); 0: all waves go in one direction",
+            "Spreading exponent s of cos^2s(angle/2); 0: long-crested",
             0.0,
             _NARROWEST,
         ),

@@ -26,7 +26,7 @@ SAID = {
     ("formation-change", False): {ERROR_FROM_25: (0.39, 0.38, 0.39)},
     ("formation-change", True): {ERROR_FROM_25: (0.56, 0.56, 0.56)},
     ("formation-lost-link", False): {
-        ERROR_FROM_25: (1.75, 1.69, 1.80),
+        ERROR_FROM_25: (1.75, 1.68, 1.80),
         "error from 100 s to 120 s [m]": (0.12, 0.10, 0.20),
         "peak command u [N]": (406, 392, 448),
         "steps beyond the limits, u [%]": (9.6, 9.1, 10.3),

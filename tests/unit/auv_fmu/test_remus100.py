@@ -35,7 +35,7 @@ def test_every_row_is_the_one_of_python_vehicle_simulator(name):
     for row, later in pairwise(all_rows):
         assert_equal(state, row)
         command = to_si(row.command)
-        state = steps(PARAMETERS, state, command, manoeuvre.water, STEP, manoeuvre.hold)
+        state = steps(PARAMETERS, state, command, manoeuvre.water, STILL, STEP, manoeuvre.hold)
         assert later.t == pytest.approx(row.t + manoeuvre.hold * STEP)
     assert_equal(state, all_rows[-1])
 
@@ -48,18 +48,18 @@ def test_every_step_is_the_one_of_python_vehicle_simulator(name):
     state = begin(PARAMETERS, manoeuvre.water)
     for row in rows(manoeuvre):
         assert_equal(state, row)
-        state = steps(PARAMETERS, state, to_si(row.command), manoeuvre.water, STEP, 1)
+        state = steps(PARAMETERS, state, to_si(row.command), manoeuvre.water, STILL, STEP, 1)
 
 
 def test_it_runs_as_fast_as_is_published():
     """2.5 m/s at 1525 rev/min without current (the docstring of the simulator); here 2 % more."""
-    state = steps(PARAMETERS, begin(PARAMETERS, STILL), FULL_AHEAD, STILL, STEP, 5000)
+    state = steps(PARAMETERS, begin(PARAMETERS, STILL), FULL_AHEAD, STILL, STILL, STEP, 5000)
     assert state.nu[0] == pytest.approx(2.5, rel=0.03)
 
 
 def test_propeller_heels_the_vehicle_as_far_as_the_righting_moment_lets_it():
     """At the end m g z sin(phi) is a tenth of the torque of the propeller at that speed."""
-    state = steps(PARAMETERS, begin(PARAMETERS, STILL), FULL_AHEAD, STILL, STEP, 6000)
+    state = steps(PARAMETERS, begin(PARAMETERS, STILL), FULL_AHEAD, STILL, STILL, STEP, 6000)
     n, u = 1525 / 60, state.nu[0]
     slope = (0.0312 - 0.07) / 0.6632
     torque = 0.1 * 1026 * 0.14**5 * (0.07 * n * n + slope * 0.944 * u / 0.14 * n)
@@ -72,7 +72,7 @@ def test_propeller_heels_the_vehicle_as_far_as_the_righting_moment_lets_it():
 def test_a_level_vehicle_that_drifts_with_the_water_keeps_drifting(psi, x, y):
     nu = (cos(psi) * x + sin(psi) * y, cos(psi) * y - sin(psi) * x, 0.0, 0.0, 0.0, 0.0)
     drifting = Parameters(eta0=(0.0, 0.0, 0.0, 0.0, 0.0, psi), nu0=nu)
-    state = steps(drifting, begin(drifting, (x, y, 0.0)), AMIDSHIPS, (x, y, 0.0), STEP, 100)
+    state = steps(drifting, begin(drifting, (x, y, 0.0)), AMIDSHIPS, (x, y, 0.0), STILL, STEP, 100)
     assert state.nu == pytest.approx(nu, abs=1e-12)
     assert state.position == pytest.approx((2.0 * x, 2.0 * y, 0.0), abs=1e-12)
 
@@ -81,7 +81,7 @@ def test_a_level_vehicle_that_drifts_with_the_water_keeps_drifting(psi, x, y):
 def test_a_step_of_no_time_changes_nothing(nu, command):
     moving = Parameters(nu0=nu)
     state = begin(moving, STILL)
-    assert steps(moving, state, command, (0.3, 0.0, 0.0), 0.0, 0) is state
+    assert steps(moving, state, command, (0.3, 0.0, 0.0), STILL, 0.0, 0) is state
 
 
 @given(nu=velocities)
@@ -89,7 +89,7 @@ def test_nothing_commanded_and_nothing_flowing_it_slows_down(nu):
     """The energy of the motion and of the weight falls."""
     moving = Parameters(nu0=nu)
     before = begin(moving, STILL)
-    after = steps(moving, before, AMIDSHIPS, STILL, 1e-4, 1)
+    after = steps(moving, before, AMIDSHIPS, STILL, STILL, 1e-4, 1)
     assert energy(after) <= energy(before) + 1e-6 * energy(before)
 
 
@@ -104,24 +104,24 @@ def energy(state: RemusState) -> float:
 def test_an_actuator_faster_than_the_step_follows_at_once(h):
     quick = Parameters(T_delta=0.0, T_n=0.0)
     command = (0.1, -0.1, 50.0)
-    state = steps(quick, begin(quick, STILL), command, STILL, h, 1)
+    state = steps(quick, begin(quick, STILL), command, STILL, STILL, h, 1)
     assert state.actuator == command
 
 
 def test_a_motion_beyond_the_model_is_refused_and_what_follows_is_fine():
     state = begin(PARAMETERS, STILL)
     with pytest.raises(TooFast, match=r"1e\+30 m/s"):
-        steps(PARAMETERS, state, AMIDSHIPS, (1e30, 0.0, 0.0), STEP, 1)
+        steps(PARAMETERS, state, AMIDSHIPS, (1e30, 0.0, 0.0), STILL, STEP, 1)
     with pytest.raises(TooFast):
         begin(PARAMETERS, (0.0, 11.0, 0.0))
-    steps(PARAMETERS, state, AMIDSHIPS, STILL, STEP, 1)
+    steps(PARAMETERS, state, AMIDSHIPS, STILL, STILL, STEP, 1)
 
 
 @given(nu=st.tuples(*(st.floats(-5.7, 5.7),) * 6))
 def test_from_any_motion_within_the_model_steps_go_on(nu):
     """5.7 of each of three makes 9.9."""
     moving = Parameters(nu0=nu, eta0=(0.0, 0.0, 0.0, 0.5, 1.2, 0.0))
-    state = steps(moving, begin(moving, STILL), AMIDSHIPS, STILL, STEP, 25)
+    state = steps(moving, begin(moving, STILL), AMIDSHIPS, STILL, STILL, STEP, 25)
     assert sqrt(sum(x * x for x in state.nu[:3])) < 10.0
 
 
