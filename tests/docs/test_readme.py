@@ -113,7 +113,7 @@ SAID = (
         None,
     ),
     Said(
-        "With noise of 1 mm up to 0.11 % of the steps pass a limit, 98 % with PD",
+        "With measurement noise of 1 mm up to 0.11 % of the steps pass a limit, with PD up to 98 %",
         None,
         lambda seed: (
             largest_share(*PROPOSED, seed=seed) < 0.115
