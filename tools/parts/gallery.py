@@ -10,6 +10,7 @@ from orchestrator.figures.study_values import Values
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import LABELS, FigureTable, read_study
+from orchestrator.system.names import flatten
 
 #: The pictures of the scenarios and, below it, of the studies, in docs/.
 PICTURES = "images"
@@ -66,7 +67,7 @@ def seen(study: Study, figure: str) -> str:
         "front": f"{words(y)} against {words(x)}, and the runs that no other run beats in both",
         "influence": f"how much {words(x)} move {words(show)}",
     }[declared.kind]
-    only = "".join(f", {words(key)} {value}" for key, value in (declared.where or {}).items())
+    only = "".join(f", {words(key)} {value}" for key, value in flatten(declared.where or {}))
     return f"{study.title}: {text}{only}"
 
 
