@@ -8,12 +8,15 @@ from pathlib import Path
 
 import pytest
 
+import auv_fmu
 from fmus.discovery import components
 from fmus.native.language import INSTEAD, MATHEMATICS, OUTSIDE, foreign
 
 ROOT = Path(__file__).parents[2]
+#: Where the package was installed: what stands outside the language is told by that place.
+PACKAGE = Path(str(auv_fmu.__file__)).parent
 EQUATIONS = [
-    *sorted({*(ROOT / "src/auv_fmu").glob("*.py")} - {ROOT / "src/auv_fmu/arrays.py"}),
+    *sorted({*PACKAGE.glob("*.py")} - {PACKAGE / "arrays.py"}),
     *(ROOT / package.replace(".", "/") / "behaviour.py" for package in components().values()),
 ]
 

@@ -343,7 +343,20 @@ def test_an_array_with_a_start_that_is_not_finite_is_refused_by_name(tmp_path: P
     assert mentions(str(error.value), "lag.M[1,3] finite")
 
 
-@pytest.mark.parametrize("write", [write_ssp, write_osp, write_container])
+@pytest.mark.parametrize(
+    "write",
+    [
+        write_ssp,
+        write_osp,
+        pytest.param(
+            write_container,
+            marks=pytest.mark.skipif(
+                find_spec("fmu_manipulation_toolbox") is None,
+                reason="fmu_manipulation_toolbox is not installed",
+            ),
+        ),
+    ],
+)
 def test_an_fmu_that_has_changed_since_it_was_read_is_refused(tmp_path: Path, write):
     """As by every other command that takes it along."""
     path = fmu(tmp_path / "a.fmu", variable("u", "input"), variable("y", "output"))
