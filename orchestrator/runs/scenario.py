@@ -390,7 +390,10 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
             for line, values in rows
         ]
         if not 2 <= len(waypoints) <= MOST:
-            raise ValueError(f"it has {len(waypoints)} waypoints; a path has 2 to {MOST}")
+            raise ValueError(
+                f"it has {len(waypoints)} waypoints, and a path has 2 to {MOST}; for more, write a "
+                "planner (docs/how-to/trajectories.md)"
+            )
     values: dict[str, Any] = {"count": len(waypoints), "timed": "t" in names}
     for number, waypoint in enumerate(waypoints, start=1):
         values |= {f"waypoint[{number}].{name}": value for name, value in waypoint.items()}

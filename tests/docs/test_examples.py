@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import orchestrator.studies.batch
+from fmus.compilers import machines_compiler
 from orchestrator import simulate, sweep
 from orchestrator.commands.main import main
 from orchestrator.runs.loading import load_scenario
@@ -29,7 +30,10 @@ from support.markdown import DOCS, blocks
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
-ACCURACY, BATCH, EVENTS, EXAMPLES, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE = (
+(
+    ACCURACY, BATCH, EVENTS, EXAMPLES, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE,
+    TRAJECTORIES,
+) = (
     DOCS / f"{name}.md"
     for name in (
         "explanation/accuracy",
@@ -41,8 +45,9 @@ ACCURACY, BATCH, EVENTS, EXAMPLES, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_
         "reference/scenario-files",
         "how-to/studies",
         "how-to/test-one-component",
+        "how-to/trajectories",
     )
-)
+)  # fmt: skip
 
 
 def needs(extra: str, *packages: str) -> pytest.MarkDecorator:
@@ -222,3 +227,20 @@ def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_sa
         for values in (QUIET, RK4)
     ]
     assert [f"{effort:.3g}" for effort in found] == [said[0], said[-1]] == ["166", "133"]
+
+
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_a_trajectory_of_ones_own_is_that_of_its_table(capsys: pytest.CaptureFixture[str]):
+    """Between the rows it is the curve that the rows are on, whose derivatives are known."""
+    executed(TRAJECTORIES, capsys)
+    Path("table_planner.py").write_text(blocks(TRAJECTORIES, "python")[1].text)
+    Path("eight.toml").write_text(blocks(TRAJECTORIES, "toml")[0].text)
+    assert main(["check", "table_planner.py"]) == 0
+    assert main(["build", "table_planner.py", "--kind", "native"]) == 0
+    result = simulate("eight.toml", kind="native", stop_time=60.0)
+    w, t = 2.0 * np.pi / 240.0, result.time
+    x, y = 20.0 * np.exp(1j * w * t), 10.0 * np.exp(2j * w * t)
+    assert np.abs(result["planner.y_d.x"] - x.imag).max() < 1e-6
+    assert np.abs(result["planner.dy_d.x"] - (1j * w * x).imag).max() < 1e-5
+    assert np.abs(result["planner.ddy_d.y"] - ((2j * w) ** 2 * y).imag).max() < 1e-3
+    assert max(result.metrics()["final_error"]) < 0.5
