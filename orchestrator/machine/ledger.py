@@ -236,6 +236,7 @@ class Ledger:
                 target.replace(source)
             rmtree(self._earlier, ignore_errors=True)
             raise
+        rmtree(self._earlier, ignore_errors=True)
         leaving, self._leaving = self._leaving, []
         self._files |= self._moving
         self._moving = {}

@@ -29,6 +29,9 @@ MAKE, FREE = "fmi2Instantiate", "fmi2FreeInstance"
 #: What an instance is made with where nothing is wrong.
 GOOD = "everything as it should be"
 
+#: Calls that read values, which may have to be computed first.
+_READING = {f"fmi2Get{fmi_type}" for fmi_type in TYPES}
+
 #: Calls that the rest of a run depends on, and those that save and free states.
 _MOVING = {
     *(f"fmi2Set{fmi_type}" for fmi_type in TYPES),
@@ -207,9 +210,7 @@ class Pair(Players):
     def _make_beside(self, call: Call) -> Status:
         """Make a call if a run depends on it, or if it may fail with wild values."""
         side = self.beside
-        if call.function not in _MOVING and not (
-            self.known.wild and call.function == "fmi2GetReal"
-        ):
+        if call.function not in _MOVING and not (self.known.wild and call.function in _READING):
             return Status.OK
         if call.function == "fmi2SetFMUstate":
             return side.host.set_state(side.saved.states[slot_of(call)])
