@@ -297,6 +297,12 @@ def test_a_chart_that_comes_into_sight_shows_the_time_that_the_others_show(opene
     header, table = rows(opened.run(CSV))
     known = table[np.isclose(table[:, 0], 20.0), header.index("controller.theta_hat[4]")]
     assert float(opened.run(value)) == pytest.approx(known[0], rel=5e-3)
+    end = opened.run("Number(document.getElementById('stop-time').value)")
+    for part, shift in ((".u-cursor-x", 0.0), (".u-cursor-pt", 3.0)):
+        box = f"{last}.querySelector('{part}').getBoundingClientRect()"
+        plot = f"{last}.querySelector('.u-over').getBoundingClientRect()"
+        share = opened.run(f"({box}.left + {shift} - {plot}.left) / {plot}.width")
+        assert share == pytest.approx(20.0 / end, abs=0.02), part
 
 
 def test_remark_says_that_its_numbers_are_those_of_the_preset(opened):

@@ -271,7 +271,8 @@ class Chart {
     this.root.classList.remove("pending");
     const empty = new Float64Array(0);
     this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
-    this.#point();
+    // uPlot takes on its new scales in a microtask, too.
+    queueMicrotask(() => this.#point());
   }
 
   /** Begins at another time [s], so that small values can be seen once large ones are over. */
