@@ -108,7 +108,6 @@ def source_of_script(path: Path) -> Source:
     if stem in sys.stdlib_module_names or is_other:
         raise ValueError(f"{path}: {stem} is already a module of Python; choose another name")
     import_from(root)
-    watch(root)
     if place.is_dir():
         modules = tuple(f"{stem}.{module}" for module in _MODULES)
         return Source(name_of(stem), modules, place, root)
@@ -125,7 +124,10 @@ class _Text(SourceFileLoader):
 
 
 def import_from(root: Path) -> None:
-    """Let modules of a folder be imported, from their texts, before all others."""
+    """Let modules of a folder be imported, from their texts, before all others.
+
+    From then on the data files that they read there are remembered.
+    """
 
     def finder(folder: str) -> FileFinder:
         here = Path(folder)
@@ -139,6 +141,7 @@ def import_from(root: Path) -> None:
         sys.path.insert(0, str(root))
     sys.path_hooks.insert(0, finder)
     sys.path_importer_cache.pop(str(root), None)
+    _watch(root)
 
 
 def _is_of(module: object, place: Path) -> bool:
@@ -156,7 +159,7 @@ _read: dict[Path, dict[str, Path]] = {}
 _NO_DATA = (".py", ".pyc", ".pyi", ".fmu")
 
 
-def watch(root: Path) -> None:
+def _watch(root: Path) -> None:
     """Remember from now on which data files are read in the folder of a script, and below it."""
     if not _read:
         sys.addaudithook(_see)

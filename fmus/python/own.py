@@ -13,7 +13,7 @@ from pathlib import Path
 from pythonfmu.builder import get_model_class
 
 from fmus.python.packaging import best_loader, fmu_entries, seal
-from fmus.script import import_from, no_component, watch
+from fmus.script import import_from, no_component
 
 #: The script of the FMU, with a slave that may raise.
 _SCRIPT = """\
@@ -38,7 +38,6 @@ def build_script(script: Path, destination: Path, loader: str | None = None) -> 
     """
     own = script.resolve().parent
     import_from(own)
-    watch(own)
     try:
         component = get_model_class(script).__name__
     except ValueError as error:
