@@ -10,7 +10,6 @@ import argparse
 import hashlib
 import json
 import sys
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -134,19 +133,17 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: st
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2
-    modules: Sequence[str] = (path.stem,)
     try:
         if is_component(path):
             source = source_of_script(path)
             # Before PythonFMU imports a copy, in which mistakes would be elsewhere.
             source.definition  # noqa: B018
-            fmu, modules = folder / f"{source.name}.fmu", source.modules
+            fmu = folder / f"{source.name}.fmu"
             kind.write(source, fmu)
         else:
             assert isinstance(kind, PythonKind)
             fmu = build_script(path, folder, kind.loader)
-        script, digests = _origin(path, modules)
-        origin = Origin(fmu.name, kind.name, home, script, digests)
+        origin = Origin(fmu.name, kind.name, home, path.name, _digests(path))
         add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
     except Exception as error:
         print(told(error, path), file=sys.stderr)
@@ -154,17 +151,15 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: st
     return 0
 
 
-def _origin(path: Path, modules: Sequence[str]) -> tuple[str, dict[str, str]]:
-    """The script of an FMU, and the digests of all files of the user's that it was made from."""
-    place = path.resolve()
-    root, folder = place.parent, place if place.is_dir() else place.parent
-    files = modules_of("\n".join(f"import {module}" for module in modules), {}, root)
-    digests = {
-        file.relative_to(folder).as_posix(): digest_at(file) or ""
+def _digests(script: Path) -> dict[str, str]:
+    """The digests of all files of the user's that an FMU was made from."""
+    root = script.resolve().parent
+    files = modules_of(f"import {script.stem}", {}, root)
+    return {
+        file.relative_to(root).as_posix(): digest_at(file) or ""
         for _, file in sorted({**data_files(root), **files}.items())
-        if folder in file.parents
+        if root in file.parents
     }
-    return "" if place.is_dir() else place.name, digests
 
 
 def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:

@@ -35,7 +35,7 @@ def mistakes(path: Path, folder: Path) -> list[str]:
     """All that is wrong with a component, by file and line.
 
     Args:
-        path: of its script, or of its folder.
+        path: of its script, or of the folder of its name.
         folder: that its FMUs are written into, if nothing is wrong.
 
     Raises:
@@ -68,15 +68,13 @@ def _order(text: str) -> tuple[str, int]:
 
 def _mistakes(script: Path, folder: Path) -> Iterator[str]:
     source = source_of_script(script)
-    files = [script] if script.is_file() else sorted(script.glob("*.py"))
     try:
-        for name in source.modules:
-            import_module(name)
+        import_module(source.module)
     except Exception as error:
-        yield from (text for file in files for text in _foreign(file, script))
+        yield from _foreign(script, script)
         yield told(error, script)
         return
-    for file in _files_of(script.resolve().parent, files):
+    for file in _files_of(script):
         yield from _foreign(file, script)
     try:
         definition = source.definition
@@ -112,21 +110,19 @@ def write(source: Source, folder: Path) -> None:
     PythonKind("plain").write(source, folder / f"{PYTHON}.fmu")
 
 
-def _files_of(root: Path, files: list[Path]) -> list[Path]:
-    """The files of a component, and of the modules beside it that it has imported."""
-    known = {file.resolve() for file in files}
+def _files_of(script: Path) -> list[Path]:
+    """The script of a component, and the modules beside it that it has imported."""
+    root = script.resolve().parent
     beside = {
         Path(file)
         for name, module in [*sys.modules.items()]
         if (file := getattr(module, "__file__", None)) and lies_in(root, Path(file), name)
     }
-    return [*files, *sorted(beside - known)]
+    return [script, *sorted(beside - {script.resolve()})]
 
 
 def _foreign(file: Path, script: Path) -> list[str]:
     """What is outside the language in a file, which is named as the user would."""
-    if file.name == "ports.py":
-        return []  # it declares, and is no part of what is translated
     return [
         text.replace(str(file), shown(str(file.resolve()), script), 1) for text in foreign(file)
     ]

@@ -51,10 +51,10 @@ def name_of(module: str) -> str:
 
 
 def components() -> dict[str, str]:
-    """The name of every component, and the package that its folder is."""
+    """The name of every component, and its module."""
     return {
-        name_of(ports.parent.name): f"fmus.{ports.parent.name}"
-        for ports in sorted(package_folder("fmus").glob("*/ports.py"))
+        name_of(file.parent.name): f"fmus.{file.parent.name}.component"
+        for file in sorted(package_folder("fmus").glob("*/component.py"))
     }
 
 
@@ -63,49 +63,41 @@ class Source(NamedTuple):
 
     Attributes:
         name: of the component.
-        modules: that define it.
+        module: that says it all.
         folder: that its page and its reference results lie in.
-        root: that its modules are imported from; None: they are installed.
+        root: that it is imported from; None: it is installed.
 
     """
 
     name: str
-    modules: tuple[str, ...]
+    module: str
     folder: Path
     root: Path | None = None
 
     @property
     def definition(self) -> Definition:
-        """What its modules say; they are imported.
+        """What its module says; it is imported.
 
         Raises:
-            TypeError: they do not go together.
+            Misdeclared: it is no component.
 
         """
-        return define(self.name, *map(import_module, self.modules))
+        return define(self.name, import_module(self.module))
 
     @property
     def page(self) -> str:
-        """What its author says of it, in Markdown: the docstring, if one module says it all.
-
-        Raises:
-            ValueError: there is no page.
-
-        """
-        if len(self.modules) > 1:
-            page = self.folder / "page.md"
-            if not page.is_file():
-                raise ValueError("there is no page.md in it: describe the component there")
+        """What its author says of it, in Markdown: in `page.md`, or in the docstring."""
+        page = self.folder / "page.md"
+        if self.root is None and page.is_file():
             return page.read_text(encoding="utf-8").strip()
-        said = cleandoc(import_module(*self.modules).__doc__ or "")
+        said = cleandoc(import_module(self.module).__doc__ or "")
         return f"# {self.name}\n\n{said}".strip()
 
 
 def source_of(name: str) -> Source:
     """What a component of the bundle is made from."""
-    package = components()[name]
-    modules = (f"{package}.ports", f"{package}.behaviour")
-    return Source(name, modules, package_folder(package))
+    module = components()[name]
+    return Source(name, module, package_folder(module.rpartition(".")[0]))
 
 
 def ports_of(name: str) -> Sequence[Port]:
@@ -163,7 +155,7 @@ class Origin(NamedTuple):
         fmu: name of the file of the FMU.
         kind: of the FMU.
         folder: of the script, from that of the FMU on.
-        script: its name; empty: the folder is the component.
+        script: its name.
         digests: of the files, by their paths from the folder of the script on.
 
     """
@@ -177,7 +169,7 @@ class Origin(NamedTuple):
     def changed(self, fmu: Path) -> list[Path]:
         """The files that are others now than when an FMU was built; none, if there is no script."""
         folder = self.place(fmu)
-        if not (folder / (self.script or "behaviour.py")).is_file():
+        if not (folder / self.script).is_file():
             return []
         paths = {folder / name: digest for name, digest in self.digests.items()}
         return [path for path, digest in paths.items() if digest_at(path) != digest]

@@ -1,7 +1,6 @@
 """A component of the user's own: where it is, what its FMU is made from, and its mistakes in words.
 
-It is a script with the functions `begin` and `advance`, a folder with such a script of its name,
-or a folder with `ports.py` and `behaviour.py` as the components of the bundle have. Any other
+It is a script with the function `outputs`, or a folder with such a script of its name. Any other
 script holds a slave of PythonFMU.
 """
 
@@ -27,30 +26,21 @@ from types import CodeType
 from fmus.discovery import Source, lies_in, name_of
 from fmus.ports.port import Misdeclared
 
-#: Functions that tell a component from a slave of PythonFMU.
-_FUNCTIONS = frozenset(("begin", "advance"))
-
-#: What makes a folder a component: a package, and its modules in it.
-_MODULES = ("ports", "behaviour")
-_FILES = ("__init__.py", *(f"{module}.py" for module in _MODULES))
+#: The function that tells a component from a slave of PythonFMU.
+_FUNCTION = "outputs"
 
 
 def script_in(path: Path) -> Path:
     """The script that a path means: itself, or the one in a folder that has its name.
-
-    Returns:
-        The folder, if it is a component by its `ports.py` and `behaviour.py`.
 
     Raises:
         ValueError: there is none.
 
     """
     if path.is_dir():
-        if all((path / name).is_file() for name in _FILES):
-            return path
         script = path / f"{path.resolve().name}.py"
         if not script.is_file():
-            raise ValueError(f"{path}: has neither {script.name} nor all of {', '.join(_FILES)}")
+            raise ValueError(f"{path}: has no {script.name}")
         return script
     if not (path.is_file() and path.suffix == ".py"):
         raise ValueError(f"{path}: no such Python file")
@@ -58,23 +48,21 @@ def script_in(path: Path) -> Path:
 
 
 def is_component(path: Path) -> bool:
-    """Whether a script, or a folder, is a component, and not a slave of PythonFMU.
+    """Whether a script is a component, and not a slave of PythonFMU.
 
     One that is no Python is taken for a component: a mistake in it is told in the same way.
     """
-    if path.is_dir():
-        return True
     try:
         tree = ast.parse(path.read_bytes())
     except (RecursionError, SyntaxError, ValueError):
         return True
     names = {name for node in tree.body for name in _defined(node)}
-    return not names.isdisjoint(_FUNCTIONS)
+    return _FUNCTION in names
 
 
 def no_component(path: Path) -> str:
     """What is said of a script that is no component."""
-    return f"{path}: not a component, which has functions begin() and advance() (see `auv-fmu new`)"
+    return f"{path}: not a component, which has a function outputs() (see `auv-fmu new`)"
 
 
 def _defined(node: ast.stmt) -> Iterator[str]:
@@ -108,10 +96,7 @@ def source_of_script(path: Path) -> Source:
     if stem in sys.stdlib_module_names or is_other:
         raise ValueError(f"{path}: {stem} is already a module of Python; choose another name")
     import_from(root)
-    if place.is_dir():
-        modules = tuple(f"{stem}.{module}" for module in _MODULES)
-        return Source(name_of(stem), modules, place, root)
-    return Source(name_of(stem), (stem,), root, root)
+    return Source(name_of(stem), stem, root, root)
 
 
 class _Text(SourceFileLoader):
@@ -268,17 +253,15 @@ def _frames(error: BaseException, path: Path) -> list[str]:
 
 def _place_of(place: tuple[str, ...], path: Path) -> str:
     """Where a class or a function is, with its line, or a field or argument of it."""
-    files = [path] if path.is_file() else [path / f"{module}.py" for module in _MODULES]
-    for file in files if place else ():
-        for node in ast.parse(file.read_bytes()).body:
-            if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name != place[0]:
-                continue
-            if isinstance(node, ast.FunctionDef):
-                lines = {argument.arg: argument.lineno for argument in node.args.args}
-                lines["return"] = (node.returns or node).lineno
-            else:
-                lines = dict(_fields(node))
-            return f"{file}:{lines.get(place[-1], node.lineno)}"
+    for node in ast.parse(path.read_bytes()).body if place else ():
+        if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name != place[0]:
+            continue
+        if isinstance(node, ast.FunctionDef):
+            lines = {argument.arg: argument.lineno for argument in node.args.args}
+            lines["return"] = (node.returns or node).lineno
+        else:
+            lines = dict(_fields(node))
+        return f"{path}:{lines.get(place[-1], node.lineno)}"
     return str(path)
 
 

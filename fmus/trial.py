@@ -20,9 +20,9 @@ from math import isfinite
 from types import ModuleType
 from typing import Any, Union
 
+from auv_fmu.quantities import group_name
 from fmus.discovery import name_of
 from fmus.ports.port import Port, Refusal
-from fmus.ports.quantities import group_name
 from fmus.python.loading import ANSWER
 from fmus.python.slave import slave_of
 

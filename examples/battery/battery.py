@@ -21,7 +21,7 @@ from math import exp
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Vector, interpolate
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 CHARGES = Vector((0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0))
 SOURCE = Vector((2.9, 3.3, 3.45, 3.55, 3.65, 3.8, 3.98, 4.2))  #: [V]

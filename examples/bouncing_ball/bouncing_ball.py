@@ -19,7 +19,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 #: The smallest normal number: just above the ground [m].
 GROUND = 2.2250738585072014e-308

@@ -19,7 +19,7 @@ from math import cos, sin
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector, solve
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 
 class Parameters(NamedTuple):

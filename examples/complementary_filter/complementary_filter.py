@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import atan2, cos, exp, sin
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 
 class Parameters(NamedTuple):

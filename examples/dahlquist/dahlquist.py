@@ -17,7 +17,7 @@ from __future__ import annotations
 from math import exp
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 
 class Parameters(NamedTuple):

@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Vector
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 
 class Parameters(NamedTuple):

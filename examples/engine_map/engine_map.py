@@ -21,7 +21,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector, interpolate
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 SPEEDS = Vector((0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0))  #: [rad/s]
 THROTTLES = Vector((0.0, 0.25, 0.5, 1.0))

@@ -21,7 +21,7 @@ from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector, solve
-from fmus.ports.variable import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Refusal, Variable
 
 _XY = ("x", "y")
 GUESS = Vector((700.0, 700.0))  #: [m]

@@ -23,7 +23,7 @@ from math import sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 IDENTITY = Matrix(((1.0, 0.0), (0.0, 1.0)))
 H = Matrix(((1.0, 0.0),))  #: Only the position is measured.

@@ -21,7 +21,7 @@ from math import exp
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Vector
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 CELLS = 50
 

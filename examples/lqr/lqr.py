@@ -23,7 +23,7 @@ from math import inf
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.variable import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Refusal, Variable
 
 #: Most rounds of the iteration, and the relative change of the gain that ends it.
 ROUNDS, ACCURACY = 10_000, 1e-12

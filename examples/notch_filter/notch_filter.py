@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import pi, tan
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Refusal, Variable
 
 
 class Parameters(NamedTuple):

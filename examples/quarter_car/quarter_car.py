@@ -23,7 +23,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector, solve
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 IDENTITY = Matrix(
     ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))

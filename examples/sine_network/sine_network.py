@@ -20,7 +20,7 @@ from math import sin, tanh
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 W1 = Vector((-0.653, 2.608, -2.315, 0.747, -0.101))
 W2 = Matrix(

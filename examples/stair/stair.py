@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 #: By how much a sum of steps may miss a full second [s].
 ROUNDING = 1e-5

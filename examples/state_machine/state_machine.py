@@ -19,7 +19,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 #: By how much a sum of steps may miss the end of a mode [s].
 ROUNDING = 1e-9

@@ -20,7 +20,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 IDENTITY = Matrix(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 from math import exp
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 
 class Parameters(NamedTuple):

@@ -22,7 +22,7 @@ from enum import IntEnum
 from math import exp
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 
 class Mode(IntEnum):

@@ -18,7 +18,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable
 
 GRAVITY = 9.81  #: [m/s2]
 

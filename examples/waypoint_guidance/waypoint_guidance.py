@@ -19,7 +19,7 @@ from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.variable import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Refusal, Variable
 
 COUNT = 5
 XY = ("x", "y")

@@ -6,7 +6,7 @@ from auv_fmu.allocation import Parameters
 from auv_fmu.tail import FASTEST
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, setting
-from fmus.ports.quantities import NU, TAU
+from auv_fmu.quantities import NU, TAU
 from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 
 DESCRIPTION = "Allocation of a force and two moments to the fins and the propeller of Remus100"

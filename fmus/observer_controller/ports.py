@@ -17,7 +17,7 @@ from fmus.ports.controllers import (
 )
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters, setting
-from fmus.ports.quantities import POSITION, VELOCITY, per_axis
+from auv_fmu.quantities import POSITION, VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT, PAPER
 
 DESCRIPTION = "Saturated output-feedback tracking controller with velocity observer"

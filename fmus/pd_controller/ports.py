@@ -14,7 +14,7 @@ from fmus.ports.controllers import (
 )
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
-from fmus.ports.quantities import VELOCITY, per_axis
+from auv_fmu.quantities import VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT, PAPER
 
 DESCRIPTION = "Adaptive robust PD tracking controller with measured velocity"

@@ -1,6 +1,6 @@
-"""What a component's `behaviour.py` may say: the hooks that both kinds of FMU call.
+"""What a component may say: the hooks that both kinds of FMU call.
 
-The functions of a behaviour are the :class:`Hooks`, and those that they call. A hook takes the
+The functions of a component are the :class:`Hooks`, and those that they call. A hook takes the
 arguments that it needs, under their names and in any order. All of it is in the language of
 equations (language.md), because the C kind runs its translation.
 """
@@ -10,9 +10,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 from inspect import signature
+from math import isfinite
 from string import Formatter
-from types import CodeType, FunctionType, GenericAlias, ModuleType
-from typing import Any, NamedTuple, Protocol, get_args
+from types import CodeType, FunctionType, ModuleType
+from typing import Any, NamedTuple, Protocol
 
 from fmus.ports.groups import (
     Nothing,
@@ -21,6 +22,7 @@ from fmus.ports.groups import (
     fields_of,
     form,
     hints_of,
+    is_record,
     scalars_of,
     word,
 )
@@ -28,34 +30,40 @@ from fmus.ports.port import Misdeclared
 
 
 class Hooks(Protocol):
-    """The hooks. A behaviour has `Outputs`, `begin` and `advance`; all others are optional.
+    """The hooks, of x_k+1 = update(x_k, u_k) and y_k = outputs(x_k, u_k).
+
+    A component has `outputs`; with a state also `start` and `update`; all others are optional.
 
     Args:
-        parameters: what `PARAMETERS` in ports.py makes of the values of the parameters.
-        inputs: NamedTuple with a number, tuple, vector or matrix for each group of input ports, in
-            their order.
-        state: NamedTuple of all that a step depends on besides inputs and parameters;
-            :class:`~fmus.ports.groups.Nothing` for a component without memory.
-        derived: what `derive` makes of the state.
-        outputs: of the type `Outputs`.
-        t: time at the beginning of the step, or of the run [s].
-        h: length of an internal step [s], at most `h_max`.
-        n: how many internal steps a communication step has.
+        parameters: NamedTuple of all parameters.
+        inputs: NamedTuple with a number, tuple, vector or matrix for each group of input ports.
+        state: NamedTuple of all that the rest of a run depends on besides inputs and parameters.
+        derived: what `derive` returns.
+        t: time [s].
+        h: length of a step [s], at most `h_max`.
 
     """
 
-    #: TypedDict or NamedTuple with a number, tuple, vector or matrix for each group of output
-    #: ports, in their order.
-    Outputs: type
-
     #: What is logged, once an instance, when `restarted` is called; `{t}` or `{t:g}` is the time.
     RESTARTED: str
+
+    #: Whether the outputs belong to the last communication point, until inputs arrive: those of a
+    #: digital controller with a zero-order hold do. Others follow the state, and the time.
+    SAMPLED: bool
+
+    #: Default of the parameter `h_max` [s]: a longer step is split evenly. Without it there is no
+    #: such parameter, and no step is split.
+    H_MAX: float
+
+    #: The experiment that a host runs if nothing else is asked for [s].
+    STEP_SIZE: float
+    STOP_TIME: float
 
     @staticmethod
     def check(parameters: Any) -> None:
         """Refuse parameters, each of which is in its range, that do not fit together.
 
-        Called before `begin`, for each new value of a tunable parameter, and for a state that is
+        Called before `start`, for each new value of a tunable parameter, and for a state that is
         restored.
 
         Raises:
@@ -64,85 +72,75 @@ class Hooks(Protocol):
         """
 
     @staticmethod
-    def begin(parameters: Any, inputs: Any, t: float) -> tuple[Any, ...]:
-        """Return state and outputs at the start time.
+    def start(parameters: Any, inputs: Any, t: float) -> Any:
+        """Return the state at the start time.
 
         Called at the end of the initialisation, and during it each time that outputs are read after
         a value was set.
-
-        Returns:
-            `(state, outputs)`; with a hook `derive`, `(state, derived, outputs)`; only outputs, if
-            there is no state.
-
         """
 
     @staticmethod
-    def derive(parameters: Any, state: Any) -> Any:
-        """Return what a step needs of the state, where outputs at the end of the last needed it.
+    def derive(parameters: Any, state: Any, inputs: Any, t: float) -> Any:
+        """Return what `outputs` and `update` both need.
 
-        It spares computing that twice, so `begin` and `advance` return what this would. Called
-        before an `advance` whose state was restored or restarted, or whose parameters have changed
-        since `begin` or `advance` gave the state.
+        Called once, until something that it takes has changed.
+        """
+
+    @staticmethod
+    def outputs(parameters: Any, state: Any, derived: Any, inputs: Any, t: float) -> Any:
+        """Return the outputs: a NamedTuple of numbers, tuples, vectors and matrices.
+
+        Called when they are read, until something that it takes has changed.
+        """
+
+    @staticmethod
+    def update(parameters: Any, state: Any, derived: Any, inputs: Any, t: float, h: float) -> Any:
+        """Return the state after a step of h seconds with held inputs.
+
+        Called once for each internal step of a communication step. What is not finite is refused,
+        and with it the step.
         """
 
     @staticmethod
     def credible(parameters: Any, state: Any, inputs: Any) -> bool:
-        """Return whether a step may go on from the state.
+        """Return whether a run may go on from the state, with these inputs.
 
-        Called before each `advance`.
+        Called before `outputs`, and before the first `update` of a communication step.
         """
 
     @staticmethod
     def restarted(parameters: Any, state: Any, inputs: Any) -> Any:
-        """Return the state that the step begins with instead.
+        """Return the state that it goes on from instead, where `credible` says no.
 
-        Called where `credible` says no, after `RESTARTED` was logged.
-        """
-
-    @staticmethod
-    def advance(
-        parameters: Any, state: Any, derived: Any, inputs: Any, t: float, h: float, n: int
-    ) -> tuple[Any, ...]:
-        """Return state and outputs after n internal steps with held inputs.
-
-        Called once a communication step. What is not finite is refused, and with it the step.
-
-        Returns:
-            What `begin` returns.
-
+        A step that begins so logs `RESTARTED`.
         """
 
     @staticmethod
     def seed(parameters: Any) -> int:
         """Return the seed of the noise of `measured`.
 
-        Called before `begin`.
+        Called before `start`.
         """
 
     @staticmethod
     def measured(parameters: Any, n: Any) -> Any:
         """Return one group of outputs with noise.
 
-        Called after each `begin` and `advance`. A further argument has the name of the group, and
-        gets it without noise.
+        A further argument has the name of the group, and gets it without noise.
 
         Args:
             parameters: as above.
             n: as many independent standard normal numbers as the type of this argument has, which
-                is of floats only.
+                is of floats only; they are drawn at the start and in each communication step.
 
         """
 
     @staticmethod
-    def expected(parameters: Any, state: Any, outputs: Any) -> Any:
-        """Return the outputs that belong to a state that is restored.
-
-        They are compared with the outputs that are restored with it, which are given for whatever
-        else some outputs depend on, such as noise. Without this hook, outputs do not follow from
-        the state only: a controller's belong to the beginning of its last step.
+    def check_state(parameters: Any, state: Any) -> None:
+        """Refuse a state that is to be restored, and that no run can have led to.
 
         Raises:
-            Refusal: no run can have led to the state.
+            Refusal: none can; the text says why.
 
         """
 
@@ -158,109 +156,155 @@ HOOKS: Mapping[str, tuple[str, ...]] = {
 }
 
 #: What goes together.
-_TOGETHER = (("credible", "restarted", "RESTARTED"), ("seed", "measured"))
+_TOGETHER = (("start", "update"), ("credible", "restarted", "RESTARTED"), ("seed", "measured"))
+
+#: Classes that hooks take, if they are there, by the argument.
+_CLASSES = {"Parameters": "parameters", "Inputs": "inputs", "State": "state"}
 
 
 class Behaviour(NamedTuple):
-    """What a behaviour says.
+    """What the hooks of a component say.
 
     Attributes:
         hooks: all by name; None for one that it does not have.
-        state, derived, inputs, outputs, parameters: types that they take and return; derived is
-            None without `derive`.
-        is_stateless: whether `begin` and `advance` give only outputs.
+        parameters, inputs, state, outputs: types that they take and return.
+        derived: what `derive` returns; None without it.
         noisy: the group of outputs that `measured` gives; empty: there is none.
         draws: how many numbers it takes.
         restarted: the text `RESTARTED`, as `str.format` takes it.
+        is_sampled: whether the outputs belong to the last communication point.
+        h_max: default of the largest internal step [s]; None: no step is split.
+        step, stop: of the default experiment [s].
 
     """
 
     hooks: Mapping[str, FunctionType | None]
-    state: Any
-    derived: Any
-    inputs: Any
-    outputs: Any
     parameters: Any
-    is_stateless: bool
+    inputs: Any
+    state: Any
+    outputs: Any
+    derived: Any
     noisy: str
     draws: int
     restarted: str
+    is_sampled: bool
+    h_max: float | None
+    step: float
+    stop: float
 
     def arguments(self, name: str) -> tuple[str, ...]:
         """The arguments of a hook, in its own order; none of one that it does not have."""
         hook = self.hooks[name]
         return tuple(signature(hook).parameters) if hook else ()
 
+    def takes(self, name: str, argument: str) -> bool:
+        """Whether a hook takes an argument, or what it takes is made of it."""
+        taken = {*self.arguments(name)}
+        if name in ("outputs", "update"):
+            if "derived" in taken:
+                taken |= {*self.arguments("derive")}
+            if "state" in taken:
+                taken |= {*self.arguments("credible"), *self.arguments("restarted")}
+        return argument in taken
+
 
 #: Types of the arguments of hooks that are the same for all components.
-_ARGUMENTS: Mapping[str, Any] = {"t": float, "h": float, "n": int}
+_ARGUMENTS: Mapping[str, Any] = {"t": float, "h": float}
 
-#: Arguments whose types are the component's own, except the outputs.
+#: Arguments whose types are the component's own.
 _GROUPS = ("parameters", "inputs", "state", "derived")
 
 #: Types of what hooks return that are the same for all components.
-_RETURNS: Mapping[str, Any] = {"check": type(None), "credible": bool, "seed": int}
+_RETURNS: Mapping[str, Any] = {
+    "check": type(None), "check_state": type(None), "credible": bool, "seed": int,
+}  # fmt: skip
 
 #: What other hooks return, by the argument that has the same type.
-_SAME = {"derive": "derived", "restarted": "state", "expected": "outputs"}
+_SAME = {"start": "state", "update": "state", "restarted": "state", "derive": "derived"}
 
 
 def read_behaviour(module: ModuleType) -> Behaviour:
-    """What the behaviour of a component says.
+    """What the hooks of a component say.
 
     Args:
-        module: `behaviour` in the folder of the component.
+        module: of the component.
 
     Raises:
-        Misdeclared: it is not a behaviour.
+        Misdeclared: it is none.
 
     """
     where, said = module.__name__, vars(module)
     hooks = _hooks(module)
-    outputs = said["Outputs"]
     hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
+    outputs = hints["outputs"]["return"]
+    if not is_record(outputs):
+        raise Misdeclared(
+            f"{where}.outputs returns {word(form(outputs))}, no NamedTuple", "outputs"
+        )
     noisy = _noisy(where, hints, outputs)
-    types = _types_of_groups(hints, outputs)
-    is_stateless = "state" not in types
-    derived = [types["derived"]] if "derive" in hooks else []
-    returned = outputs
-    if not is_stateless:
-        returned = form(GenericAlias(tuple, (types["state"], *derived, outputs)))
+    types = _types_of_groups(hints)
+    if "state" in types and "start" not in hooks:
+        name = next(name for name, found in hints.items() if "state" in found)
+        raise Misdeclared(f"{where}.{name} takes a state, but there is no start", name)
     for name, found in hints.items():
-        if name in ("begin", "advance"):
-            if form(found["return"]) != returned:
-                raise Misdeclared(f"{where}.{name} does not return {word(returned)}", name)
-        elif name != "measured":
-            wanted = _RETURNS[name] if name in _RETURNS else types.get(_SAME[name])
+        if name not in ("outputs", "measured"):
+            wanted = _RETURNS[name] if name in _RETURNS else types[_SAME[name]]
             _check_same(where, name, "return", found["return"], wanted)
         for argument, hint in found.items():
             if argument not in ("return", *noisy) and (name, argument) != ("measured", "n"):
                 _check_same(where, name, argument, hint, types[argument])
-    for argument, hint in types.items():
-        takes = [name for name, found in hints.items() if argument in found]
+    for argument, hint in {**types, "outputs": outputs}.items():
+        takes = [name for name, found in hints.items() if argument in (name, *found)]
+        if argument in _CLASSES.values() and not is_record(hint):
+            why = f"{argument} of the type {word(form(hint))}; write a NamedTuple"
+            raise Misdeclared(f"{where}.{takes[0]} takes {why}", takes[0], argument)
         check_type(hint, *takes[:1], argument)
-    return Behaviour(
+    for cls, argument in _CLASSES.items():
+        if cls in said and argument not in types:
+            raise Misdeclared(f"{cls} is there, but no hook takes {argument}", cls)
+    behaviour = Behaviour(
         {name: hooks.get(name) for name in HOOKS},
-        Nothing if is_stateless else types["state"],
-        derived[0] if derived else None,
-        types.get("inputs", Nothing),
-        outputs,
         types.get("parameters", Nothing),
-        is_stateless,
+        types.get("inputs", Nothing),
+        types.get("state", Nothing),
+        outputs,
+        types.get("derived"),
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         _message(where, said.get("RESTARTED", "")),
+        said.get("SAMPLED", False),
+        _seconds(said, "H_MAX", None),
+        _seconds(said, "STEP_SIZE", 0.02),
+        _seconds(said, "STOP_TIME", 100.0),
     )
+    _check_constants(where, behaviour)
+    return behaviour
+
+
+def _check_constants(where: str, behaviour: Behaviour) -> None:
+    """Refuse constants that do not go with the hooks."""
+    if not isinstance(behaviour.is_sampled, bool):
+        raise Misdeclared(f"SAMPLED is {behaviour.is_sampled!r:.40}; write True or False")
+    if behaviour.is_sampled and not behaviour.takes("outputs", "inputs"):
+        raise Misdeclared(f"{where}.outputs takes no inputs, so it is not SAMPLED", "outputs")
+    if behaviour.h_max is not None and behaviour.hooks["update"] is None:
+        raise Misdeclared(f"{where} has H_MAX, but no update", "outputs")
+
+
+def _seconds(said: Mapping[str, Any], name: str, default: Any) -> Any:
+    """A time that a component states."""
+    found = said.get(name, default)
+    is_number = isinstance(found, (float, int)) and not isinstance(found, bool)
+    if found is not default and not (is_number and isfinite(found) and found > 0):
+        raise Misdeclared(f"{name} is {found!r:.40}; write seconds, more than 0")
+    return found if found is None else float(found)
 
 
 def _hooks(module: ModuleType) -> dict[str, FunctionType]:
-    """The hooks of a behaviour, if it has those that belong together, and no others."""
+    """The hooks of a component, if it has those that belong together, and no others."""
     where, said = module.__name__, vars(module)
-    for name in ("begin", "advance", "Outputs"):
-        if name not in said:
-            raise Misdeclared(f"{where} has no {name}")
-    if not isinstance(said["Outputs"], type):
-        raise Misdeclared(f"{where}.Outputs is no class")
+    if "outputs" not in said:
+        raise Misdeclared(f"{where} has no function outputs")
     for together in _TOGETHER:
         there = [name for name in together if name in said]
         missing = [name for name in together if name not in said]
@@ -303,24 +347,21 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
     return noisy
 
 
-def _types_of_groups(hints: Mapping[str, Mapping[str, Any]], outputs: type) -> dict[str, Any]:
+def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The type that each argument has in all hooks: what most of them say."""
     found: dict[str, list[Any]] = {}
     for name, hint in _said_of_groups(hints):
         found.setdefault(name, []).append(form(hint))
     types = {name: max(forms, key=forms.count) for name, forms in found.items()}
-    return {**types, **_ARGUMENTS, "outputs": outputs}
+    return {**types, **_ARGUMENTS}
 
 
 def _said_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any]]:
     """The types of the component's own groups, as each hook takes or returns them."""
     for name, found in hints.items():
         yield from ((argument, found[argument]) for argument in _GROUPS if argument in found)
-        if name in ("derive", "restarted"):
+        if name in _SAME:
             yield _SAME[name], found["return"]
-        elif name in ("begin", "advance"):
-            parts = get_args(found["return"])
-            yield from zip(("state", "derived") if len(parts) > 2 else ("state",), parts[:-1])
 
 
 def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from auv_fmu.output_feedback import Gains
+from auv_fmu.quantities import ACCELERATION, EULER, POSITION, TAU, THETA, VELOCITY, member_name
 from fmus.ports.groups import Field
 from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, parameters, setting
-from fmus.ports.quantities import ACCELERATION, EULER, POSITION, TAU, THETA, VELOCITY, member_name
 
 _GAINS = Gains()
 

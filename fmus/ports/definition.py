@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from fmus.ports.behaviour import HOOKS, Behaviour, read_behaviour
-from fmus.ports.groups import Field, Nothing, ParameterSet, form, ports_in, word
-from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, is_line
-from fmus.ports.variable import declared
+from fmus.ports.behaviour import Behaviour, read_behaviour
+from fmus.ports.fields import declared
+from fmus.ports.groups import Field, ParameterSet, ports_in
+from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, is_line, largest_step
 
 
 class Origin(NamedTuple):
-    """Where a component comes from."""
+    """Where a component comes from: what its module says as `__author__`, and so on."""
 
     author: str = ""
     license: str = ""
@@ -32,8 +32,8 @@ class Definition:
         summary: one line.
         origin: where it comes from.
         ports: all but `fault`, in the order of their value references.
-        parameters: what its parameters mean to the equations.
-        group_of: fields of its inputs that bear another name than their group of ports.
+        parameters: what its parameters mean to the equations, all but `h_max`.
+        noisy: the names of the outputs that have noise.
         behaviour: how it runs.
 
     """
@@ -43,7 +43,7 @@ class Definition:
     origin: Origin
     ports: tuple[Port, ...]
     parameters: ParameterSet[Any]
-    group_of: Mapping[str, str]
+    noisy: tuple[str, ...]
     behaviour: Behaviour
 
     @property
@@ -60,101 +60,75 @@ class Definition:
 
 
 @cache
-def define(name: str, *modules: ModuleType) -> Definition:
-    """What modules say of a component, the same each time.
+def define(name: str, module: ModuleType) -> Definition:
+    """What a module says of a component, the same each time.
 
     Args:
         name: of the component.
-        modules: `ports` and `behaviour` of its folder, or the one module that says it all.
+        module: that says it all.
 
     Raises:
-        TypeError: they do not go together; in one module it is a Misdeclared.
+        Misdeclared: it is no component.
 
     """
-    if len(modules) == 1:
-        return _of_one_module(name, modules[0])
-    ports, behaviour = modules
-    return Definition(
-        name,
-        ports.DESCRIPTION,
-        getattr(ports, "ORIGIN", Origin()),
-        ports.PORTS,
-        ports.PARAMETERS,
-        getattr(ports, "GROUP_OF", {}),
-        read_behaviour(behaviour),
-    )
-
-
-#: Names of the classes whose fields are ports, with the causality of these.
-_CLASSES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter"}
-
-
-def _of_one_module(name: str, module: ModuleType) -> Definition:
     said = read_behaviour(module)
-    made = {cls: _class(said, module, cls) for cls in _CLASSES}
-    taken = said.arguments("begin")
-    inputs = made["Inputs"]._fields if "inputs" in taken else ()
-    direct = (*inputs, *([TIME.name] * ("t" in taken)))
-    fields = {cls: declared(made[cls], causality, direct) for cls, causality in _CLASSES.items()}
-    _hold_apart(fields)
-    own = ParameterSet(made["Parameters"], **fields["Parameters"])
-    internal = (H_MAX,) if "n" in said.arguments("advance") else ()
-    ports = (
-        *(port for field in fields["Inputs"].values() for port in ports_in(field)),
-        *_fed_through(fields["Outputs"], fields["Inputs"], direct),
-        *own.ports,
-        *internal,
+    inputs = declared(said.inputs, "input")
+    direct = (*inputs, *([TIME.name] if said.takes("outputs", "t") else []))
+    if not said.takes("outputs", "inputs"):
+        direct = direct[len(inputs) :]
+    outputs = declared(
+        said.outputs, "output", direct, tuple(inputs) if said.takes("start", "inputs") else ()
     )
+    own = ParameterSet(said.parameters, **declared(said.parameters, "parameter"))
+    ports = (
+        *(port for field in inputs.values() for port in ports_in(field)),
+        *_fed_through(said, outputs, inputs),
+        *own.ports,
+        *([] if said.h_max is None else [largest_step(said.h_max)]),
+    )
+    _hold_apart(said, ports)
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
     origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
     for place, text in {"its docstring": summary, **origin._asdict()}.items():
         if not is_line(text.replace("\n", " ").replace("\t", " ")):
             raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
-    return Definition(name, summary, origin, ports, own, {}, said)
-
-
-def _class(said: Behaviour, module: ModuleType, cls: str) -> Any:
-    """The class of a name, if it is what the hooks take and return."""
-    argument, made = cls.lower(), getattr(module, cls, Nothing)
-    used = getattr(said, argument)
-    if used is Nothing and made is not Nothing:
-        raise Misdeclared(f"{cls} is there, but no hook takes {argument}", cls)
-    if used is not made:
-        hook = next(name for name in ("begin", *HOOKS) if argument in said.arguments(name))
-        why = f"{argument} are of the type {word(form(used))}; call it {cls}"
-        raise Misdeclared(why, hook, argument)
-    return made
+    noisy = tuple(port.name for port in ports_in(outputs[said.noisy])) if said.noisy else ()
+    return Definition(name, summary, origin, ports, own, noisy, said)
 
 
 def _fed_through(
-    fields: Mapping[str, Field], inputs: Mapping[str, Field], direct: Sequence[str]
+    said: Behaviour, outputs: Mapping[str, Field], inputs: Mapping[str, Field]
 ) -> Iterator[Port]:
-    """The outputs, with the names of ports where the fields of the inputs stood.
-
-    At the start they depend on all that `begin` takes.
-    """
+    """The outputs, with the names of ports where the fields of the inputs stood."""
     names = {field: [port.name for port in ports_in(ports)] for field, ports in inputs.items()}
+    names |= {name: [name] for found in [*names.values()] for name in found}
     names[TIME.name] = [TIME.name]
-    for field, ports in fields.items():
+    for field, ports in outputs.items():
         for port in ports_in(ports):
-            for one in port.feedthrough:
+            place = (said.outputs.__name__, field)
+            for one in (*port.feedthrough, *port.initially):
                 if one not in names:
                     why = f"depends on {one!r}; there are {', '.join(names)}"
-                    raise Misdeclared(f"Outputs.{field} {why}", "Outputs", field)
-            later = [one for one in direct if one not in (*port.feedthrough, TIME.name)]
+                    raise Misdeclared(f"{'.'.join(place)} {why}", *place)
+            direct = tuple(name for one in port.feedthrough for name in names[one])
+            if said.is_sampled and not {*direct} - {TIME.name}:
+                why = "is sampled with the inputs, so it has feedthrough; leave out feedthrough=()"
+                raise Misdeclared(f"{'.'.join(place)} {why}", *place)
+            initial = (name for one in port.initially for name in names[one])
             yield replace(
                 port,
-                feedthrough=tuple(name for one in port.feedthrough for name in names[one]),
-                initially=tuple(name for one in later for name in names[one]),
+                feedthrough=direct,
+                initially=tuple(name for name in initial if name not in direct),
             )
 
 
-def _hold_apart(fields: Mapping[str, Mapping[str, Field]]) -> None:
+def _hold_apart(said: Behaviour, ports: tuple[Port, ...]) -> None:
     """Hold the names of ports apart, also from those that a component has anyway."""
-    taken = dict.fromkeys((FAULT.name, TIME.name, H_MAX.name), "every component")
-    for cls, found in fields.items():
-        for field in found:
-            if field in taken:
-                why = f"has a name that {taken[field]} has already"
-                raise Misdeclared(f"{cls}.{field} {why}", cls, field)
-            taken[field] = cls
+    taken = dict.fromkeys((FAULT.name, TIME.name), "every component")
+    made = {"input": said.inputs, "output": said.outputs, "parameter": said.parameters}
+    for port in ports:
+        name = made[port.causality].__name__
+        if port.name in taken:
+            why = f"has a name that {taken[port.name]} has already"
+            raise Misdeclared(f"{name}.{port.name} {why}", name, port.name)
+        taken[port.name] = name if port.name != H_MAX else "H_MAX"

@@ -11,13 +11,10 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
-from auv_fmu.euler import STEP
+from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.port import FAULT, Port, Value
 from fmus.ports.units import unit_of
-
-#: Start, end and step of an experiment when the host names none [s].
-EXPERIMENT = (0.0, 100.0, STEP)
 
 #: What a component can do, where all versions of FMI have the same word for it.
 CAPABILITIES = {
@@ -153,10 +150,10 @@ def log_categories(fmi: str) -> Element:
     return categories
 
 
-def default_experiment() -> Element:
+def default_experiment(said: Behaviour) -> Element:
     """The experiment that a host runs if nothing else is asked for."""
-    start, stop, step = map(str, EXPERIMENT)
-    return Element("DefaultExperiment", startTime=start, stopTime=stop, stepSize=step)
+    stop, step = str(said.stop), str(said.step)
+    return Element("DefaultExperiment", startTime="0.0", stopTime=stop, stepSize=step)
 
 
 # FMI 2.0
@@ -183,7 +180,7 @@ def fmi2_description(definition: Definition, guid: str) -> bytes:
     root = root_of("2.0", definition, guid=guid)
     implementation = SubElement(root, "CoSimulation", modelIdentifier=definition.name)
     SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCE)
-    root.extend((log_categories("fmi2"), default_experiment()))
+    root.extend((log_categories("fmi2"), default_experiment(definition.behaviour)))
     SubElement(root, "ModelVariables")
     SubElement(root, "ModelStructure")
     return text(complete(root, (*definition.ports, FAULT)))

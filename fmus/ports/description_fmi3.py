@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
 
+from auv_fmu.quantities import member_of
 from fmus.ports.definition import Definition
 from fmus.ports.description import (
     CAPABILITIES,
@@ -26,7 +27,6 @@ from fmus.ports.description import (
 )
 from fmus.ports.groups import slices
 from fmus.ports.port import FAULT, TIME, Port
-from fmus.ports.quantities import member_of
 from fmus.ports.units import unit_of
 
 #: What FMI 3.0 calls the types of variables.
@@ -66,7 +66,7 @@ def fmi3_description(definition: Definition, token: str) -> bytes:
             unit_definitions(units),
             _type_definitions(units),
             log_categories("fmi3"),
-            default_experiment(),
+            default_experiment(definition.behaviour),
             _variables(variables),
             _structure(variables),
         )

@@ -1,9 +1,4 @@
-"""Flat values of ports and the groups that equations take and give, each made from the other.
-
-What a component's types say of its groups is held against its ports when its class is made: a
-group that is missing, too long, or elsewhere than its ports is a TypeError there, and not a
-number in the wrong place.
-"""
+"""Flat values of ports and the groups that equations take and give, each made from the other."""
 
 from __future__ import annotations
 
@@ -24,14 +19,14 @@ from typing import (
 )
 
 from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.quantities import group_name
 from fmus.ports.port import Misdeclared, Port, Value, is_int32
-from fmus.ports.quantities import group_name
 
 T = TypeVar("T")
 
 
 class Nothing(NamedTuple):
-    """State of a component without memory; inputs of one without inputs."""
+    """State of a component without memory; inputs or parameters of one without any."""
 
 
 def slices(ports: Sequence[Port]) -> dict[str, slice]:
@@ -154,7 +149,7 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
             raise Misdeclared(f"{kind.__name__} has no members", kind.__name__)
     elif kind in around:
         raise Misdeclared(f"{where}is a {kind.__name__} within a {kind.__name__}", *place)
-    elif is_record(kind) or hasattr(kind, "__total__"):
+    elif is_record(kind):
         for name, part in fields_of(kind).items():
             check_type(part, kind.__name__, name, around=(*around, kind))
     elif get_origin(kind) is tuple and Ellipsis not in get_args(kind):
@@ -187,66 +182,21 @@ def reals_first(ports: Sequence[Port]) -> list[Port]:
     return sorted(ports, key=lambda port: port.type != "Real")
 
 
-def _sizes(fields: type) -> dict[str, int]:
-    """The fields of a NamedTuple or TypedDict and how many values each holds."""
-    return {name: count_values(hint) for name, hint in hints_of(fields).items()}
-
-
-def _check_types(fields: type, hint: Any, ports: Sequence[Port]) -> None:
-    """Raise TypeError if a number of a type has a port of another one."""
-    for scalar, port in zip(scalars_of(hint), ports):
-        if is_class(scalar, IntEnum):
-            is_text = port.causality == "parameter"
-            fitting: tuple[str, ...] = ("String",) if is_text else ("Integer",)
-        else:
-            fitting = _FITTING.get(scalar, ())
-        if port.type not in fitting:
-            where, name = fields.__qualname__, getattr(scalar, "__name__", scalar)
-            raise TypeError(f"{where}: {port.name} is of type {name}, its port is a {port.type}")
-
-
-#: Types of ports, by those of Python.
-_FITTING = {float: ("Real",), int: ("Integer", "String"), bool: ("Boolean",)}
-
-
-def _hold(fields: type, ports: Sequence[Port], groups: Mapping[str, str]) -> dict[str, slice]:
-    """The slices of the ports, if they are the fields'."""
-    places = slices(ports)
-    said = [(groups.get(name, name), size) for name, size in _sizes(fields).items()]
-    declared = [(group, place.stop - place.start) for group, place in places.items()]
-    if said != declared:
-        raise TypeError(f"{fields.__qualname__} has the groups {said}, its ports are {declared}")
-    for hint, place in zip(hints_of(fields).values(), places.values()):
-        _check_types(fields, hint, ports[place])
-    return places
-
-
-def unpacking(
-    made: type[T], ports: Sequence[Port], groups: Mapping[str, str]
-) -> Callable[[Sequence[Value]], T]:
+def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]], T]:
     """A function that makes groups from the values of ports, Reals first.
 
     Args:
-        made: NamedTuple or TypedDict with a number or a tuple a group, in the order of the ports.
+        made: NamedTuple with a number or a tuple a group, in the order of the ports.
         ports: with one value each.
-        groups: of fields that bear another name than their group.
-
-    Raises:
-        TypeError: `made` has other groups than the ports.
 
     """
-    if not _hold(made, ports, groups):
+    if not ports:
         nothing = made()
         return lambda values: nothing
     names = [f"x{i}" for i in range(len(ports))]
     ordered = [name for name, _ in sorted(zip(names, ports), key=lambda one: one[1].type != "Real")]
-    found = iter(names)
-    scope = {"made": made, **SCOPE}
-    fields = {name: gathered(hint, found, scope) for name, hint in hints_of(made).items()}
-    if issubclass(made, tuple):
-        result = f"make(made, ({''.join(f'{text}, ' for text in fields.values())}))"
-    else:
-        result = f"{{{', '.join(f'{name!r}: {text}' for name, text in fields.items())}}}"
+    scope = {**SCOPE}
+    result = gathered(made, iter(names), scope)
     return _compiled(f"({', '.join(ordered)},) = values\n return {result}", "values", scope)
 
 
@@ -269,26 +219,16 @@ def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
     return f"make({name}, {text})"
 
 
-def packing(given: type[T], ports: Sequence[Port]) -> Callable[[T], list[Value]]:
+def packing(given: type[T]) -> Callable[[T], list[Value]]:
     """A function that makes the values of ports, Reals first, from groups.
 
     It raises OverflowError for an integer that FMI has no room for.
 
     Args:
-        given: TypedDict or NamedTuple with a number or a tuple a group, in the order of the ports.
-        ports: to have one value each.
-
-    Raises:
-        TypeError: `given` has other groups than the ports.
+        given: NamedTuple with a number or a tuple a group, in the order of the ports.
 
     """
-    _hold(given, ports, {})
-    is_tuple = issubclass(given, tuple)
-    texts = [
-        text
-        for name, hint in hints_of(given).items()
-        for text in scattered(hint, f"groups.{name}" if is_tuple else f"groups[{name!r}]")
-    ]
+    texts = [*scattered(given, "groups")]
     values = ", ".join(text for text, _ in sorted(texts, key=lambda it: it[1] is not float))
     return _compiled(f"return [{values}]", "groups", {**SCOPE})
 
@@ -299,6 +239,9 @@ def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:
     if parts is None:
         scalar = class_of(hint)
         yield f"whole({text})" if is_whole(scalar) else text, scalar
+    elif is_record(class_of(hint)):
+        for name, part in hints_of(hint).items():
+            yield from scattered(part, f"{text}.{name}")
     elif parts and parts_of(parts[0]) is None and all(part is parts[0] for part in parts):
         scalar = class_of(parts[0])
         yield f"*map(whole, {text})" if is_whole(scalar) else f"*{text}", scalar
@@ -353,34 +296,17 @@ class ParameterSet(Generic[T]):
         Args:
             made: NamedTuple of the equations.
             fields: for each field a port, the ports of a tuple, vector or matrix, or the set of a
-                nested NamedTuple, in the order that the ports shall have.
-
-        Raises:
-            TypeError: the fields are not `made`'s, or not of their sizes.
+                nested NamedTuple.
 
         """
-        sizes = _sizes(made)  # type: ignore[arg-type]
-        declared = {name: len(ports_in(field)) for name, field in fields.items()}
-        if declared != sizes:
-            raise TypeError(f"{made} has the fields {sizes}, its parameters are {declared}")
         self._made = made
         self._hints = hints_of(made)
         self._fields = fields
-        for name, field in fields.items():
-            if not isinstance(field, ParameterSet):
-                _check_types(made, self._hints[name], ports_in(field))  # type: ignore[arg-type]
 
     @property
     def ports(self) -> tuple[Port, ...]:
         """All parameters, in the order of their declaration."""
         return tuple(port for port, _ in self._leaves())
-
-    def before(self, *later: Port) -> tuple[Port, ...]:
-        """The parameters except some that have come later: these stand at the end of all ports.
-
-        So the value references of the others are what they were.
-        """
-        return tuple(port for port in self.ports if port not in later)
 
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:

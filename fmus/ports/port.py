@@ -1,19 +1,14 @@
-"""Declaration of ports: the one place where a component says which it has.
-
-modelDescription.xml, the checks of the slave, the connectors of the SSP, the tables in the
-documentation and the tests all read these declarations, directly or through the built FMU.
-"""
+"""One port of a component: what a description says of it, and what values it takes."""
 
 from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Union
 
-from auv_fmu.euler import STEP
-from fmus.ports.quantities import Members, member_name
+from auv_fmu.variable import POSITIVE, Refusal
 
 Value = Union[float, int, bool, str]
 
@@ -27,13 +22,6 @@ _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\]
 
 #: What a line of text in XML cannot have.
 _UNWRITABLE = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-
-#: Smallest value of a parameter that must be positive. FMI knows only inclusive bounds.
-POSITIVE = 1e-9
-
-
-class Refusal(Exception):
-    """A value or a step that a component does not accept; the text says why."""
 
 
 class Misdeclared(TypeError):
@@ -166,96 +154,23 @@ def _is_bound(bound: object, fmi_type: str) -> bool:
     return is_number and -_LARGEST <= bound <= _LARGEST  # type: ignore[operator]
 
 
-def inputs(group: str, members: Members, description: str) -> tuple[Port, ...]:
-    """Real inputs, one for each member of a group, starting at zero."""
-    about = ("input", "continuous", "Real")
-    return tuple(
-        Port(member_name(group, member), *about, f"{description}: {member}", unit, start=0.0)
-        for member, unit in members.items()
+#: Of the largest internal step.
+H_MAX = "h_max"
+
+
+def largest_step(h_max: float) -> Port:
+    """The parameter of a component that splits its steps, with its start value [s]."""
+    return Port(
+        H_MAX,
+        "parameter",
+        "fixed",
+        "Real",
+        "Largest internal step; longer steps are split evenly",
+        "s",
+        h_max,
+        POSITIVE,
     )
 
-
-def outputs(
-    group: str,
-    members: Members,
-    description: str,
-    feedthrough: Sequence[Port] = (),
-    initially: Sequence[Port] = (),
-) -> tuple[Port, ...]:
-    """Real outputs, one for each member of a group, each depending directly on the given inputs."""
-    return tuple(
-        Port(
-            member_name(group, member),
-            "output",
-            "continuous",
-            "Real",
-            f"{description}: {member}",
-            unit,
-            feedthrough=tuple(port.name for port in feedthrough),
-            initially=tuple(port.name for port in initially),
-        )
-        for member, unit in members.items()
-    )
-
-
-def parameter(
-    name: str,
-    start: float,
-    unit: str,
-    description: str,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    tunable: bool = False,
-) -> Port:
-    """A Real parameter."""
-    variability = "tunable" if tunable else "fixed"
-    return Port(name, "parameter", variability, "Real", description, unit, start, minimum, maximum)
-
-
-def setting(
-    name: str,
-    start: int | str,
-    description: str,
-    choices: Mapping[str, object] | None = None,
-    minimum: int | None = None,
-    maximum: int | None = None,
-) -> Port:
-    """A fixed parameter that is not a Real: it has the type of its start value."""
-    fmi_type = {bool: "Boolean", int: "Integer", str: "String"}[type(start)]
-    about = ("parameter", "fixed", fmi_type, description, None)
-    return Port(name, *about, start, minimum, maximum, choices or {})
-
-
-def parameters(
-    group: str,
-    starts: Sequence[float],
-    members: Members,
-    description: str,
-    minimum: float | None = None,
-    maximum: float | None = None,
-    tunable: bool = False,
-) -> tuple[Port, ...]:
-    """Real parameters, one for each member of a group."""
-    if len(starts) != len(members):
-        raise TypeError(f"{group}: {len(starts)} start values for {len(members)} members")
-    return tuple(
-        parameter(
-            member_name(group, member),
-            start,
-            unit,
-            f"{description}: {member}",
-            minimum,
-            maximum,
-            tunable,
-        )
-        for start, (member, unit) in zip(starts, members.items())
-    )
-
-
-#: Largest internal step of components with a state (see `Component.do_step`).
-H_MAX = parameter(
-    "h_max", STEP, "s", "Largest internal step; longer steps are split evenly", POSITIVE
-)
 
 #: Present in every component.
 FAULT = Port(

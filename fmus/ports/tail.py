@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from math import pi
 
+from auv_fmu.quantities import Members
 from auv_fmu.tail import Tail
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, parameter
-from fmus.ports.quantities import Members
 from fmus.ports.vehicle import PAPER
 
 #: The source of the model, and the paper whose numbers of equations stand beside it.

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from auv_fmu import __version__
 from auv_fmu.actuators import Limits
 from auv_fmu.control_point import ELL
+from auv_fmu.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
 from auv_fmu.vehicle import Vehicle
 from fmus.ports.definition import Origin
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, Port, outputs, parameter, parameters
-from fmus.ports.quantities import ACCELERATION, ETA_WITHOUT_ROLL, POSITION, TAU, VELOCITY
 
 #: The paper that the components implement.
 PAPER = Origin(

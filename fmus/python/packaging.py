@@ -31,11 +31,11 @@ _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
 #: The script of a component.
 _SCRIPT = """\
-{imports}
+{imported}
 from fmus.python.loading import settle
 from fmus.python.slave import slave_of
 
-{component} = slave_of("{component}", {modules})
+{component} = slave_of("{component}", {module})
 settle({component}, globals(), locals())
 """
 
@@ -222,15 +222,9 @@ class PythonKind:
             OSError: the loader cannot be compiled, or the file cannot be written.
 
         """
-        places = [module.rpartition(".") for module in source.modules]
-        text = _SCRIPT.format(
-            imports="\n".join(
-                f"from {package} import {name}" if package else f"import {name}"
-                for package, _, name in places
-            ),
-            modules=", ".join(name for _, _, name in places),
-            component=source.name,
-        )
+        package, _, name = source.module.rpartition(".")
+        imported = f"from {package} import {name}" if package else f"import {name}"
+        text = _SCRIPT.format(imported=imported, module=name, component=source.name)
         entries = fmu_entries(source.name, text, self.loader, source.root)
         entries |= documentation.fmu_documents(source)
         seal(entries, path)

@@ -32,7 +32,7 @@ from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import define
 from fmus.ports.groups import SCOPE, Nothing, gathered, hints_of, reals_first, scattered
 from fmus.ports.port import Port, Refusal
-from fmus.ports.quantities import group_name
+from auv_fmu.quantities import group_name
 from fmus.python.component import Component, Inputs, Outputs, Parameters, State
 
 #: Numbers that are drawn between two notes of a generator's state.

@@ -16,7 +16,7 @@ from fmus.ports.port import (
     parameters,
     setting,
 )
-from fmus.ports.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
+from auv_fmu.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
 from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 from fmus.ports.vehicle import CONTROL_POINT
 

@@ -450,7 +450,7 @@ def component_text(name: str, network: Network, source: str) -> str:
         "from __future__ import annotations",
         "\n".join([*imports, "from typing import Annotated, NamedTuple"]),
         "from auv_fmu.linear_algebra import Matrix, Vector\n"
-        "from fmus.ports.variable import Variable",
+        "from auv_fmu import Variable",
         *(text for i, layer in enumerate(network.layers, 1) for text in _constants(i, layer)),
     ]
     body = [

@@ -44,4 +44,18 @@ Conventions: SI units; north-east-down earth frame E (reading 16); body frame B 
 starboard, z down; tuples are in the order of the paper's vectors.
 """
 
+from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.linear_algebra import interpolate, solve
+from auv_fmu.variable import POSITIVE, Refusal, Variable
+
+__all__ = ["POSITIVE", "Matrix", "Refusal", "Variable", "Vector", "interpolate", "solve"]
+
 __version__ = "0.1.0"
+
+#: Where the components come from, and what their equation numbers refer to.
+__author__ = "auv-fmu"
+__license__ = "MIT"
+__citation__ = (
+    'Equation numbers are from the paper "Three-dimensional tracking control of autonomous '
+    'underwater vehicles with limited torque and without velocity sensors"'
+)

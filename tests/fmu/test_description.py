@@ -27,7 +27,7 @@ from fmus.ports.description_fmi3 import (
     terminals_and_icons,
 )
 from fmus.ports.port import TIME
-from fmus.ports.quantities import group_name
+from auv_fmu.quantities import group_name
 from support.raw import Library, Status, instance
 
 GUID = "{00000000-0000-0000-0000-000000000000}"

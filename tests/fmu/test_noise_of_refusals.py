@@ -23,7 +23,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.arrays import Vector
-from fmus.ports.variable import Refusal, Variable
+from auv_fmu import Refusal, Variable
 
 
 class Parameters(NamedTuple):

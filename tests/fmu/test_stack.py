@@ -59,7 +59,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 N = {n}
 

@@ -80,7 +80,7 @@ from enum import IntEnum
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.variable import Refusal, Variable
+from auv_fmu import Refusal, Variable
 
 
 class Mode(IntEnum):

@@ -20,7 +20,7 @@ from __future__ import annotations
 from math import expm1
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Refusal, Variable
 
 __author__ = "Me"
 __version__ = "1.2"
@@ -57,17 +57,19 @@ def check(parameters: Parameters) -> None:
         raise Refusal("x0 is too far away")
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return State(parameters.x0), Outputs(parameters.x0)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.x0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step."""
-    x = state.x - (inputs.u - state.x) * expm1(-h / parameters.T)
-    return State(x), Outputs(x)
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step."""
+    return State(state.x - (inputs.u - state.x) * expm1(-h / parameters.T))
+
+
+def outputs(state: State) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.x)
 '''
 
 

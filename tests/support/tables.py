@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fmus.ports.quantities import ETA, NU, TAU
+from auv_fmu.quantities import ETA, NU, TAU
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table

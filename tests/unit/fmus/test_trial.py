@@ -11,7 +11,7 @@ from types import FrameType
 import numpy as np
 import pytest
 
-from fmus.ports.variable import Refusal
+from auv_fmu import Refusal
 from fmus.trial import run
 from support.own import imported
 

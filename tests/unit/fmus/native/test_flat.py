@@ -344,7 +344,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Annotated, NamedTuple
 
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 
 class Mode(IntEnum):

@@ -72,7 +72,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from fmus.ports.groups import Nothing
-from fmus.ports.variable import Variable
+from auv_fmu import Variable
 
 
 class Outputs(NamedTuple):

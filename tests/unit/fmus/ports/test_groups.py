@@ -10,7 +10,7 @@ import pytest
 from auv_fmu.linear_algebra import Matrix, Vector
 from fmus.ports.groups import Nothing, ParameterSet, packing, slices, unpacking
 from fmus.ports.port import Port, inputs, outputs, parameter, parameters, setting
-from fmus.ports.quantities import NU, POSITION, TAU, per_axis
+from auv_fmu.quantities import NU, POSITION, TAU, per_axis
 from fmus.python.component import Component
 
 Vector3 = tuple[float, float, float]

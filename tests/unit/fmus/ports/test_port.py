@@ -8,7 +8,7 @@ from math import inf, nan
 import pytest
 
 from fmus.ports.port import Misdeclared, Port, Refusal, inputs, parameter, parameters
-from fmus.ports.quantities import (
+from auv_fmu.quantities import (
     ETA_WITHOUT_ROLL,
     TAU,
     THETA,

@@ -19,7 +19,7 @@ from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_description
 from fmus.ports.groups import ParameterSet, ports_in
 from fmus.ports.port import Misdeclared, Port
-from fmus.ports.variable import POSITIVE, Variable, declared
+from auv_fmu import POSITIVE, Variable, declared
 
 
 class Mode(IntEnum):

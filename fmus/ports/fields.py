@@ -1,58 +1,25 @@
-"""Ports from the fields of a class: what `Annotated` says of a field, and what follows from it.
-
-A component in one file declares its ports as NamedTuples, whose fields have a type, a start value
-and a :class:`Variable`:
-
-    class Inputs(NamedTuple):
-        u: Annotated[float, Variable("V", "Voltage")] = 0.0
-        y: Annotated[Vector, 2, Variable("m", "Position", members=("x", "z"))]
-
-gives the ports `u`, `y.x` and `y.z`.
-"""
+"""Ports from the fields of a class: what `Annotated` says of a field, and what follows from it."""
 
 from __future__ import annotations
 
+import re
 import sys
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.variable import Refusal, Variable
 from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
-from fmus.ports.port import POSITIVE, Misdeclared, Port, Refusal
-
-__all__ = ("POSITIVE", "Refusal", "Variable", "declared")
-
-
-@dataclass(frozen=True)
-class Variable:
-    """What a field says of its ports besides name, type and start value.
-
-    Attributes:
-        unit: of a float, as :mod:`fmus.ports.units` reads it; "1" for none, "" if it is not known.
-        description: one line.
-        minimum, maximum: inclusive bounds of an input or a parameter.
-        tunable: of a parameter: whether it may change during a run.
-        members: names of the elements of a vector or a tuple; without them these have numbers.
-        feedthrough: of an output: the inputs that it depends on without a state between, or
-            `time`; None: all inputs if `begin` takes them, else none.
-
-    """
-
-    unit: str = "1"
-    description: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    tunable: bool = False
-    members: tuple[str, ...] = ()
-    feedthrough: tuple[str, ...] | None = None
+from fmus.ports.port import Misdeclared, Port
 
 
 class _Part(NamedTuple):
     """One number of a field."""
 
-    name: str  #: after the field's
-    label: str  #: in its description
+    member: str  #: what it is called within the field; empty: it is all of it
+    name: str  #: of its port
+    unit: str
     type: Any
     start: Any
 
@@ -65,57 +32,69 @@ _TYPES: dict[Any, tuple[str, Any]] = {
 }
 
 #: What is said only of some.
-_ONLY = {"feedthrough": "output", "tunable": "parameter"}
+_ONLY = {"feedthrough": "output", "initially": "output", "tunable": "parameter"}
+
+#: An input, or a group of them, in `feedthrough`.
+_SOURCE = re.compile(r"[\w.,\[\]{}]+", re.ASCII)
 
 
-def declared(made: Any, causality: str, direct: tuple[str, ...] = ()) -> dict[str, Field]:
+def declared(
+    made: Any, causality: str, direct: tuple[str, ...] = (), initial: tuple[str, ...] = ()
+) -> dict[str, Field]:
     """The ports of each field of a class, by the names of its fields.
 
     Args:
-        made: the class.
+        made: the class, a NamedTuple.
         causality: of the ports: `input`, `output` or `parameter`.
-        direct: what outputs depend on that do not say it: fields of the inputs, which stand in
-            `feedthrough` of the ports.
+        direct, initial: `feedthrough` and `initially` of outputs that do not say it.
 
     Raises:
         Misdeclared: a field is wrong, or says too little.
 
     """
-    return _declared(made, causality, direct, "", None)
+    return _declared(made, causality, Variable(feedthrough=direct, initially=initial), "", None)
 
 
 def _declared(
-    made: Any, causality: str, direct: tuple[str, ...], prefix: str, given: Any
+    made: Any, causality: str, default: Variable, prefix: str, given: Any
 ) -> dict[str, Field]:
-    name = getattr(made, "__name__", str(made))
-    if not (isinstance(made, type) and hasattr(made, "_field_defaults")):
-        raise _wrong((name,), f"is no NamedTuple; write class {name}(NamedTuple)")
     starts = dict(made._field_defaults) if given is None else given._asdict()
     fields: dict[str, Field] = {}
     for field, hint in fields_of(made).items():
-        place, start = (name, field), starts.get(field)
+        place, start = (made.__name__, field), starts.get(field)
         inner, notes = _annotated(hint)
         if is_record(inner):
             if start is not None and not isinstance(start, inner):
                 raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
-            below = _declared(inner, causality, direct, f"{prefix}{field}.", start)
+            before = prefix + _prefix(notes, field, place)
+            below = _declared(inner, causality, default, before, start)
             fields[field] = ParameterSet(inner, **below)
             continue
         said = _said(notes, causality, place, inner)
         check_type(hint, *place)
-        parts = list(_parts(inner, notes, said, start, place))
+        parts = list(_parts(inner, notes, said, start, prefix, place))
         if causality == "parameter" and any(part.start is None for part in parts):
             raise _wrong(place, "has no default value, which a parameter starts with")
-        if causality == "output" and said.feedthrough is None:
-            said = replace(said, feedthrough=direct)
-        named = [(f"{prefix}{field}{part.name}", part) for part in parts]
-        ports = [_port(name, causality, said, part, place) for name, part in named]
-        fields[field] = tuple(ports) if parts[0].name else ports[0]
+        if causality == "output":
+            for name in ("feedthrough", "initially"):
+                if getattr(said, name) is None:
+                    said = replace(said, **{name: getattr(default, name)})
+        ports = [_port(causality, said, part, place) for part in parts]
+        fields[field] = tuple(ports) if parts[0].member else ports[0]
     return fields
 
 
 def _wrong(place: tuple[str, ...], why: str) -> Misdeclared:
     return Misdeclared(f"{'.'.join(place)} {why}", *place)
+
+
+def _prefix(notes: tuple[Any, ...], field: str, place: tuple[str, ...]) -> str:
+    """What the names begin with of the fields of a NamedTuple that is a field."""
+    found = [note for note in notes if isinstance(note, Variable)]
+    if found and found != [Variable(name=found[0].name)]:
+        raise _wrong(place, "is a NamedTuple, of which a Variable says only the name")
+    name = found[0].name if found else None
+    return f"{field}." if name is None else f"{name}." if name else ""
 
 
 def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner: Any) -> Variable:
@@ -130,22 +109,35 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
             raise _wrong(place, f"is no {of}, and {name} is for {of}s")
     if causality == "output" and (said.minimum, said.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
-    for name in ("feedthrough", "members"):
+    for name in ("feedthrough", "initially"):
         names = getattr(said, name)
-        if names is not None and not _are_names(names):
+        if names is not None and not _are_different(names, _is_source):
             raise _wrong(place, f"has the {name} {names!r:.40}; write a tuple of different names")
+    if isinstance(said.unit, Mapping):
+        if said.members:
+            raise _wrong(place, "has its members twice: with their units, and without")
+        said = replace(said, members=tuple(said.unit))
+    if not _are_different(said.members, _is_member):
+        why = f"has the members {said.members!r:.40}; write a tuple of different names"
+        raise _wrong(place, why)
     if not isinstance(said.description, str):
         raise _wrong(place, f"has the description {said.description!r:.40}; write a text")
     return said
 
 
-def _are_names(names: object) -> bool:
-    """Whether something is a tuple of names, each once."""
-    return (
-        isinstance(names, tuple)
-        and all(isinstance(name, str) and name.isidentifier() and name.isascii() for name in names)
-        and len({*names}) == len(names)
-    )
+def _are_different(names: object, is_one: Any) -> bool:
+    """Whether something is a tuple of names of a kind, each once."""
+    return isinstance(names, tuple) and all(map(is_one, names)) and len({*names}) == len(names)
+
+
+def _is_source(name: object) -> bool:
+    return isinstance(name, str) and _SOURCE.fullmatch(name) is not None
+
+
+def _is_member(name: object) -> bool:
+    if isinstance(name, str):
+        return name.isidentifier() and name.isascii()
+    return type(name) is int and name >= 0
 
 
 def _annotated(hint: Any) -> tuple[Any, tuple[Any, ...]]:
@@ -164,19 +156,33 @@ def _word(hint: Any) -> str:
 
 
 def _parts(
-    hint: Any, notes: tuple[Any, ...], said: Variable, start: Any, place: tuple[str, ...]
+    hint: Any,
+    notes: tuple[Any, ...],
+    said: Variable,
+    start: Any,
+    prefix: str,
+    place: tuple[str, ...],
 ) -> Iterator[_Part]:
     """The numbers of a field, in their order."""
     shape, number = _shape(hint, notes, place)
     if said.members and (len(shape) != 1 or shape[0] != len(said.members)):
         size = " x ".join(map(str, shape)) or "one"
         raise _wrong(place, f"has {len(said.members)} members for {size} numbers")
-    names = [f".{member}" for member in said.members] or [
-        f"[{','.join(map(str, at))}]" if at else "" for at in _places(shape)
-    ]
-    starts = [None] * len(names) if start is None else list(_flat(start, shape, place))
-    for name, first in zip(names, starts):
-        yield _Part(name, name.strip(".[]"), number, first)
+    members = said.members or [",".join(map(str, at)) for at in _places(shape)]
+    starts = [None] * len(members) if start is None else list(_flat(start, shape, place))
+    base = prefix + (place[-1] if said.name is None else said.name)
+    for member, first in zip(members, starts):
+        unit = said.unit[member] if isinstance(said.unit, Mapping) else said.unit
+        yield _Part(str(member), _named(base, member, said.members), unit, number, first)
+
+
+def _named(base: str, member: str | int, members: tuple[str | int, ...]) -> str:
+    """The name of one member of a group."""
+    if "{}" in base:
+        return base.replace("{}", str(member))
+    if member == "":
+        return base
+    return f"{base}.{member}" if members and isinstance(member, str) else f"{base}[{member}]"
 
 
 def _shape(
@@ -216,9 +222,9 @@ def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterato
             yield from _flat(part, shape[1:], place)
 
 
-def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
+def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
     kind, start, choices, bounds = _meant(part, causality, place)
-    if kind != "Real" and said.unit != "1":
+    if kind != "Real" and part.unit != "1":
         raise _wrong(place, f"is of the type {_word(part.type)}; only a float has a unit")
     variability = "tunable" if said.tunable else "fixed"
     if causality != "parameter":
@@ -228,23 +234,25 @@ def _port(name: str, causality: str, said: Variable, part: _Part, place: tuple[s
         if (minimum, maximum) != (None, None):
             raise _wrong(place, "has a minimum or maximum, but its range is its members")
         minimum, maximum = bounds
+    label = "" if said.name and "{}" in said.name else part.member
     try:
         port = Port(
-            name,
+            part.name,
             causality,
             variability,
             kind,
-            ": ".join(filter(None, (said.description, part.label))),
-            (said.unit or None) if kind == "Real" else None,
+            ": ".join(filter(None, (said.description, label))),
+            (part.unit or None) if kind == "Real" else None,
             start,
             minimum,
             maximum,
             choices,
-            tuple(said.feedthrough or ()),
+            tuple(name.replace("{}", part.member) for name in said.feedthrough or ()),
+            tuple(name.replace("{}", part.member) for name in said.initially or ()),
         )
         port.checked(start)
     except Misdeclared as error:
-        raise _wrong(place, str(error).removeprefix(f"{name} ")) from None
+        raise _wrong(place, str(error).removeprefix(f"{part.name} ")) from None
     except Refusal as refusal:
         raise _wrong(place, f"starts with {refusal}") from None
     return replace(port, start=None) if causality == "output" else port
@@ -262,9 +270,12 @@ def _meant(part: _Part, causality: str, place: tuple[str, ...]) -> tuple[str, An
     start = members[0] if start is None else start
     if not isinstance(start, number):
         raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
+    named = {one.name.lower(): one for one in members}
+    if len(named) < len(members):
+        raise _wrong(place, f"has choices of {number.__name__} that differ only in capitals")
     if causality == "parameter":
-        return "String", start.name, {one.name: one for one in members}, None
+        return "String", start.name.lower(), named, None
     if causality == "output":
         return "Integer", int(start), {}, None
-    named = {one.name: int(one) for one in members}
-    return "Integer", int(start), named, (int(min(members)), int(max(members)))
+    choices = {name: int(one) for name, one in named.items()}
+    return "Integer", int(start), choices, (int(min(members)), int(max(members)))
