@@ -200,8 +200,8 @@ class Behaviour(NamedTuple):
     def takes(self, name: str, argument: str) -> bool:
         """Whether a hook takes an argument, or what it takes is made of it."""
         taken = {*self.arguments(name)}
-        if name == "outputs":
-            taken |= {*self.arguments("measured")} & {"parameters"}
+        if name == "outputs" and "parameters" in self.arguments("measured"):
+            taken.add("parameters")
         if name in ("outputs", "update", "derive"):
             if "derived" in taken:
                 taken |= {*self.arguments("derive")}
