@@ -73,6 +73,7 @@ def run(
         t = start_time + k * step
         if k > 0:
             one.set("input", given(t))
+            one.renew()
         result["time"].append(t)
         for port in outputs:
             result[port.name].append(one.get(port))
@@ -109,11 +110,13 @@ class _Trial:
 
     def get(self, port: Port) -> Any:
         """The value of an output."""
-        if not self._slave._fresh:
-            self._slave.renew_outputs()
         read = getattr(self._slave, f"get_{port.type.lower()}")
         [value] = read([self._references[port.name]])
         return value
+
+    def renew(self) -> None:
+        """Evaluate the outputs of this time."""
+        self._slave.renew_outputs()
 
     def begin(self) -> None:
         """Enter the run."""

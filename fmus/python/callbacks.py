@@ -154,6 +154,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._stale = False
         #: Whether the outputs are up to date: nothing has changed that they depend on.
         self._fresh = True
+        #: Whether the outputs are a sample of the last step, which the next one takes anew.
+        self._held = False
         self._said: set[str] = set()
         self._has_loader = has_loader(self.resources)
         #: What no answer has told, where there is no loader.

@@ -140,7 +140,7 @@ class Component(Callbacks):
         self._check_size(state)
         self._derived, store.outputs = self.evaluate(state, None, inputs, t, draws)
         self._state, self._noise, self._draws, self._time = state, noise, draws, t
-        self._stale, self._fresh = False, True
+        self._stale, self._fresh, self._held = False, True, False
 
     def _new_noise(self) -> Noise | None:
         if not self.behaviour.draws:
@@ -189,7 +189,7 @@ class Component(Callbacks):
         self._derived, store.outputs = self.evaluate(
             self._state, self._derived, self.unpack(store.inputs), self._time, self._draws
         )
-        self._fresh = True
+        self._fresh, self._held = True, False
 
     def _forget(self, what: str) -> None:
         if self._mode == STEPPING:
@@ -235,7 +235,8 @@ class Component(Callbacks):
             fresh = fresh and "t" not in self.outputs_of
             derived = None if "t" in self.derived_of else derived
         inputs = self.unpack(store.inputs)
-        if self.behaviour.is_sampled and not fresh:
+        is_sampled = self.behaviour.is_sampled
+        if is_sampled and (self._held or not fresh):
             derived, outputs = self.evaluate(self._state, derived, inputs, t, self._draws)
         state, derived = self.advance(self._state, derived, inputs, t, h / n, n)
         self._check_size(state)
@@ -249,7 +250,7 @@ class Component(Callbacks):
                     noise.take_back()
                 raise
         self._state, self._derived, self._draws, self._time = state, derived, draws, end
-        store.outputs, self._fresh = outputs, self.is_prompt or self.behaviour.is_sampled
+        store.outputs, self._fresh, self._held = outputs, self.is_prompt or is_sampled, is_sampled
 
     def _internal_steps(self, t: float, h: float) -> int:
         if not isfinite(t) or not isfinite(h):
@@ -283,6 +284,7 @@ class Component(Callbacks):
             inputs=list(store.inputs),
             outputs=list(store.outputs) if self.behaviour.is_sampled else [],
             fresh=self.behaviour.is_sampled and self._fresh,
+            held=self._held,
             state=self._state,
             draws=self._draws if has_noise else (),
             generator=self._noise.state if has_noise else None,
@@ -323,6 +325,7 @@ class Component(Callbacks):
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
         self._fresh = not self._stale and (self._state is None or wanted["fresh"])
+        self._held = wanted["held"]
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

@@ -120,6 +120,7 @@ class Snapshot(TypedDict):
     inputs: list[Value]
     outputs: list[Value]  #: of a sampled component; others follow from what is here
     fresh: bool  #: whether these are up to date
+    held: bool  #: whether they are a sample of the last step
     state: Any  #: NamedTuple of the component, None before the initialisation
     draws: tuple[float, ...]  #: what the noise of the outputs is made of
     generator: Any  #: state of the generator of the noise, None without one
@@ -183,7 +184,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
     mode, state, time = saved["mode"], saved["state"], saved["time"]
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
-    for truth in ("fresh", "fault"):
+    for truth in ("fresh", "held", "fault"):
         if not isinstance(saved[truth], bool):
             raise Refusal(f"its {truth} is neither true nor false")
     outputs = _values(store, store.output_references if said.is_sampled else [], saved["outputs"])
@@ -205,6 +206,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=outputs,
         fresh=saved["fresh"] and said.is_sampled,
+        held=saved["held"] and said.is_sampled,
         state=None if state is None else restored(said.state, state),
         draws=_draws(saved["draws"], 0 if state is None else said.draws),
         generator=_frozen(saved["generator"]),

@@ -240,7 +240,7 @@ static int advance(instance *it, double time, double step, message *why) {
         if (MODEL_OUTPUTS_TAKE_TIME) next->fresh = 0;
         if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
-    if (MODEL_SAMPLED && !next->fresh && !evaluate(it, next, &next->outputs, why)) return 0;
+    if (MODEL_SAMPLED && next->fresh != 1 && !evaluate(it, next, &next->outputs, why)) return 0;
     error.raised = 0;
     if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
         compose(&said, MODEL_RESTARTED, time);
@@ -256,7 +256,7 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     if (!is_sound(&next->state, &error, why)) return 0;
     next->time = end_of_step(run->start_time, time, step);
-    if (!MODEL_SAMPLED) next->fresh = 0;
+    next->fresh = MODEL_SAMPLED ? HELD : 0;
     if (MODEL_DRAWS > 0) {
         copy_for(&before, &run->noise, MODEL_DRAWS);
         draw(&run->noise, next->draws);

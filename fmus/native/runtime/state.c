@@ -154,8 +154,8 @@ static int take_noise(reader *from, generator *noise, double draws[], message *w
 /* The outputs that a sampled component keeps. */
 static int take_sample(reader *from, moment *it, message *why) {
     take_values(from, it->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
-    it->fresh = take_truth(from);
-    if (it->fresh < 0) return compose(why, "its outputs are neither fresh nor not");
+    it->fresh = (int)take_word(from);
+    if (it->fresh < 0 || it->fresh > HELD) return compose(why, "its outputs are neither fresh nor not");
     return good_values(it->outputs.values, MODEL_OUTPUTS, output_references, why);
 }
 
