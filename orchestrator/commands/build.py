@@ -55,8 +55,8 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         type=Path,
         metavar="SCRIPT.py|DIR",
-        help="your own component: a script with the functions begin and advance, the folder of "
-        "such a script, or a script with a PythonFMU class (only for --kind "
+        help="your own component: a script with the function outputs, the folder of such a "
+        "script, or a script with a PythonFMU class (only for --kind "
         f"{PYTHON}); its FMU is written next to it; default: build the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
