@@ -123,7 +123,11 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
             "measured takes 0 groups of outputs, not one",
         ),
         ("def _moved", "seed = measured = 1\n\n\ndef _moved", "seed is no function, but has the"),
-        ("start(parameters: Gains)", "start(parameters: State)", "start takes parameters as State"),
+        (
+            "start(parameters: Gains)",
+            "start(parameters: State)",
+            "outputs takes parameters as Gains",
+        ),
         (
             "class Gains(NamedTuple):\n    k: float",
             "Gains = float",

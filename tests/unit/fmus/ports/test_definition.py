@@ -188,7 +188,9 @@ def test_mistakes_are_named(defined, old, new, why, place):
     assert caught.value.place == place
 
 
-def test_what_is_sampled_depends_on_inputs(defined):
+def test_what_is_sampled_is_discrete_and_depends_on_inputs(defined):
+    [x] = [port for port in defined(TAKES, SAMPLED).ports if port.causality == "output"]
+    assert (x.variability, x.feedthrough) == ("discrete", ("u",))
     with pytest.raises(Misdeclared, match=r"^Outputs\.x is sampled with the inputs, so it has "):
         defined(TAKES, SAMPLED, SAID)
 
