@@ -272,8 +272,9 @@ class Component(Callbacks):
     def _get_fmu_state(self) -> Mapping[str, Any]:
         if self._stale:
             self._refresh()
-        store = self._store
-        has_noise = self._noise is not None and self._state is not None
+        store, is_begun = self._store, self._state is not None
+        noise = self._noise if is_begun else None
+        keeps = self.behaviour.is_sampled and is_begun
         return Snapshot(
             identity=self._identity(),
             mode=self._mode,
@@ -281,11 +282,11 @@ class Component(Callbacks):
             time=self._time,
             parameters=dict(store.parameters),
             inputs=list(store.inputs),
-            outputs=list(store.outputs) if self.behaviour.is_sampled else [],
-            fresh=self.behaviour.is_sampled and self._fresh,
+            outputs=list(store.outputs) if keeps else [],
+            fresh=keeps and self._fresh,
             state=self._state,
-            draws=self._draws if has_noise else (),
-            generator=self._noise.state if has_noise else None,
+            draws=self._draws if noise else (),
+            generator=noise.state if noise else None,
             fault=store.fault,
         )
 
@@ -322,7 +323,8 @@ class Component(Callbacks):
         )
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
-        self._fresh = not self._stale and (self._state is None or wanted["fresh"])
+        keeps = self.behaviour.is_sampled and wanted["fresh"]
+        self._fresh = not self._stale and (self._state is None or keeps)
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)
