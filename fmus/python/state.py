@@ -16,9 +16,10 @@ from math import hypot, inf
 from types import GenericAlias
 from typing import Any, Callable, TypedDict
 
+from auv_fmu.variable import Refusal
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import class_of, is_class, parts_of, whole
-from fmus.ports.port import Refusal, Value, is_int32
+from fmus.ports.port import Value, is_int32
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
 from fmus.python.noise import check_draws
 
@@ -209,7 +210,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=_values(store, sampled, saved["outputs"]),
-        fresh=saved["fresh"],
+        fresh=bool(sampled) and saved["fresh"],
         state=None if state is None else restored(said.state, state),
         draws=draws,
         generator=_frozen(saved["generator"]),
