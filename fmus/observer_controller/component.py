@@ -36,7 +36,8 @@ class Outputs(NamedTuple):
 
     tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments (21), not limited")]
     y_hat: Annotated[
-        Vector3, Variable(POSITION, "Estimated control point (y_hat)", feedthrough=("y",))
+        Vector3,
+        Variable(POSITION, "Estimated control point (y_hat)", feedthrough=("y",), initially=()),
     ]
     dy_hat: Annotated[
         Vector3,
@@ -44,14 +45,17 @@ class Outputs(NamedTuple):
             VELOCITY,
             "Estimated velocity of the control point (23)",
             feedthrough=("y", "y_d", "dy_d"),
+            initially=(),
         ),
     ]
     theta_hat: Estimate
     e: Annotated[
         Vector3,
-        Variable(POSITION, "Tracking error y - y_d", feedthrough=("y.{}", "y_d.{}")),
+        Variable(POSITION, "Tracking error y - y_d", feedthrough=("y.{}", "y_d.{}"), initially=()),
     ]
-    z: Annotated[Vector3, Variable(POSITION, "Estimation error y - y_hat", feedthrough=("y",))]
+    z: Annotated[
+        Vector3, Variable(POSITION, "Estimation error y - y_hat", feedthrough=("y",), initially=())
+    ]
 
 
 def start(parameters: Gains, inputs: Measurement) -> ControllerState:

@@ -142,7 +142,7 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
             raise Misdeclared(f"{where}{why}", *place)
     elif is_class(kind, IntEnum):
         for name, member in kind.__members__.items():
-            if not (name.isidentifier() and is_int32(member)):
+            if not (name.replace("-", "_").isidentifier() and is_int32(member)):
                 why = f"has the member {name!r:.40} = {member:d}; write a name and 32 bits"
                 raise Misdeclared(f"{kind.__name__} {why}", kind.__name__, name)
         if not kind.__members__:
