@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from random import Random
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
@@ -42,7 +42,7 @@ from fmus.python.noise import Noise
 from fmus.python.state import Snapshot, checked, from_bytes, to_bytes
 
 #: Longest step of a component that has no internal steps [s].
-_NO_LIMIT = 1e300
+_NO_LIMIT = inf
 
 
 class Component(Callbacks):
