@@ -16,11 +16,12 @@ from math import hypot, inf
 from types import GenericAlias
 from typing import Any, Callable, TypedDict
 
+from auv_fmu.variable import Refusal
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import class_of, is_class, parts_of, whole
-from fmus.ports.port import Refusal, Value, is_int32
+from fmus.ports.port import Value, is_int32
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
-from fmus.python.noise import LARGEST_NORMAL
+from fmus.python.noise import check_draws
 
 #: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
 #: reported, so they are refused when they are set.
@@ -120,7 +121,6 @@ class Snapshot(TypedDict):
     inputs: list[Value]
     outputs: list[Value]  #: of a sampled component; others follow from what is here
     fresh: bool  #: whether these are up to date
-    held: bool  #: whether they are a sample of the last step
     state: Any  #: NamedTuple of the component, None before the initialisation
     draws: tuple[float, ...]  #: what the noise of the outputs is made of
     generator: Any  #: state of the generator of the noise, None without one
@@ -184,14 +184,19 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
     mode, state, time = saved["mode"], saved["state"], saved["time"]
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
-    for truth in ("fresh", "held", "fault"):
-        if not isinstance(saved[truth], bool):
-            raise Refusal(f"its {truth} is neither true nor false")
-    outputs = _values(store, store.output_references if said.is_sampled else [], saved["outputs"])
+    if not isinstance(saved["fault"], bool):
+        raise Refusal("its fault is neither true nor false")
+    if not isinstance(saved["fresh"], bool):
+        raise Refusal("its outputs are neither fresh nor not")
     if mode == INSTANTIATED and state is not None:
         raise Refusal("it has a state before the initialisation")
-    if state is None and (mode == STEPPING or any(outputs)):
-        raise Refusal("it has steps, or outputs, without a state")
+    if state is None and mode == STEPPING:
+        raise Refusal("it has steps without a state")
+    sampled = store.output_references if said.is_sampled and state is not None else []
+    draws = restored(
+        GenericAlias(tuple, (float,) * (state is not None) * said.draws), saved["draws"]
+    )
+    check_draws(*draws)
     parameters = saved["parameters"]
     declared = [port for port in store.ports if port.causality == "parameter"]
     if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
@@ -204,21 +209,13 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         time=time if time in (inf, -inf) else restored(float, time),
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
-        outputs=outputs,
-        fresh=saved["fresh"] and said.is_sampled,
-        held=saved["held"] and said.is_sampled,
+        outputs=_values(store, sampled, saved["outputs"]),
+        fresh=bool(sampled) and saved["fresh"],
         state=None if state is None else restored(said.state, state),
-        draws=_draws(saved["draws"], 0 if state is None else said.draws),
+        draws=draws,
         generator=_frozen(saved["generator"]),
         fault=saved["fault"],
     )
-
-
-def _draws(values: Any, count: int) -> tuple[float, ...]:
-    draws: tuple[float, ...] = restored(GenericAlias(tuple, (float,) * count), values)
-    if any(abs(draw) > LARGEST_NORMAL for draw in draws):
-        raise Refusal(f"its noise exceeds {LARGEST_NORMAL:g}")
-    return draws
 
 
 def _frozen(value: Any) -> Any:

@@ -89,16 +89,13 @@ typedef struct {
 
 typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
 
-enum { HELD = 2 };
-
 /* A communication point. */
 typedef struct {
     double time;
     state_values state;
     double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* that the noise is made of */
     output_values outputs;
-    int fresh; /* whether they are what they have to be, else they are computed when they are read; or
-                  HELD: a sample of the last step, which the next one takes anew */
+    int fresh; /* whether they are what they have to be; else they are computed when they are read */
 } moment;
 
 /* Everything that the rest of a run depends on. */
