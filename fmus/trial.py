@@ -72,6 +72,7 @@ def run(
         t = start_time + k * step
         if k > 0:
             one.set("input", given(t))
+            one.renew()
         result["time"].append(t)
         for port in outputs:
             result[port.name].append(one.get(port))
@@ -112,6 +113,10 @@ class _Trial:
         [value] = read([self._references[port.name]])
         return value
 
+    def renew(self) -> None:
+        """Take all outputs for those of another time."""
+        self._slave._store.fresh = False
+
     def begin(self) -> None:
         """Enter the run."""
         self._slave.enter_initialization_mode()
@@ -131,7 +136,7 @@ def _meant(port: Port, value: Any) -> Any:
     """A value of the type that a port takes."""
     if port.type == "Real" and not isinstance(value, str):
         return float(value)
-    return value.name if isinstance(value, IntEnum) and port.type == "String" else value
+    return value.name.lower() if isinstance(value, IntEnum) and port.type == "String" else value
 
 
 def _flat(value: Any) -> list[Any]:

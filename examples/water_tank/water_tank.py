@@ -22,7 +22,7 @@ from auv_fmu import POSITIVE, Variable
 
 GRAVITY = 9.81  #: [m/s2]
 
-H_MAX, STEP_SIZE, STOP_TIME = 0.02, 0.1, 1000.0
+H_MAX, STEP_SIZE, STOP_TIME = 0.02, 1.0, 1000.0
 
 
 class Parameters(NamedTuple):

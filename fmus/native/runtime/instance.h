@@ -96,6 +96,7 @@ typedef struct {
     double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* that the noise is made of */
     output_values outputs;
     int fresh; /* whether they are what they have to be; else they are computed when they are read */
+    int held;  /* whether they are a sample of the last step, which the next one takes anew */
 } moment;
 
 /* Everything that the rest of a run depends on. */

@@ -124,6 +124,7 @@ static int start(instance *it, message *why) {
     model_start(&it->meant.model, &run->inputs.groups, next->time, &next->state.groups, &error);
     if (!is_sound(&next->state, &error, why) || !evaluate(it, next, &next->outputs, why)) return 0;
     next->fresh = 1;
+    next->held = 0;
     run->now = !run->now;
     run->begun = 1;
     return 1;
@@ -141,6 +142,7 @@ static int refresh(instance *it, message *why) {
         }
         now->outputs = *outputs;
         now->fresh = 1;
+        now->held = 0;
         return 1;
     }
     it->stale = !start(it, &said);
@@ -238,7 +240,10 @@ static int advance(instance *it, double time, double step, message *why) {
         if (MODEL_OUTPUTS_TAKE_TIME) next->fresh = 0;
         if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
-    if (MODEL_SAMPLED && !next->fresh && !evaluate(it, next, &next->outputs, why)) return 0;
+    if (MODEL_SAMPLED && (next->held || !next->fresh) &&
+        !evaluate(it, next, &next->outputs, why)) {
+        return 0;
+    }
     error.raised = 0;
     if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
         compose(&said, MODEL_RESTARTED, time);
@@ -254,7 +259,7 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     if (!is_sound(&next->state, &error, why)) return 0;
     next->time = end_of_step(run->start_time, time, step);
-    next->fresh = MODEL_SAMPLED;
+    next->fresh = next->held = MODEL_SAMPLED;
     if (MODEL_DRAWS > 0) {
         copy_for(&before, &run->noise, MODEL_DRAWS);
         draw(&run->noise, next->draws);

@@ -6,7 +6,7 @@
  *     parameters in the order of their ports, inputs, Reals before others,
  *     whether there is a state, and if so: the numbers of the state; of the noise the words of the
  *     generator, the place of the next, whether there is a next number, and it, and what is drawn;
- *     of a sampled component the outputs, Reals before others, and whether they are fresh;
+ *     of a sampled component the outputs, Reals before others, and whether they are fresh and held;
  *     fault;
  *     the CRC-32 of all that.
  */
@@ -63,6 +63,7 @@ static void put_run(writer *to, const run *it) {
         if (MODEL_SAMPLED) {
             put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
             put_word(to, (uint32_t)now->fresh);
+            put_word(to, (uint32_t)now->held);
         }
     }
     put_word(to, (uint32_t)it->fault);
@@ -155,7 +156,9 @@ static int take_noise(reader *from, generator *noise, double draws[], message *w
 static int take_sample(reader *from, moment *it, message *why) {
     take_values(from, it->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     it->fresh = take_truth(from);
+    it->held = take_truth(from);
     if (it->fresh < 0) return compose(why, "its fresh is neither true nor false");
+    if (it->held < 0) return compose(why, "its held is neither true nor false");
     return good_values(it->outputs.values, MODEL_OUTPUTS, output_references, why);
 }
 
