@@ -72,7 +72,6 @@ def run(
         t = start_time + k * step
         if k > 0:
             one.set("input", given(t))
-            one.renew()
         result["time"].append(t)
         for port in outputs:
             result[port.name].append(one.get(port))
@@ -106,16 +105,15 @@ class _Trial:
             for port, one in zip(ports, given):
                 put = getattr(self._slave, f"set_{port.type.lower()}")
                 put([self._references[port.name]], [_meant(port, one)])
+        if causality == "input":
+            # Those that stay as they are belong to another time.
+            self._slave._forget("inputs")
 
     def get(self, port: Port) -> Any:
         """The value of an output."""
         read = getattr(self._slave, f"get_{port.type.lower()}")
         [value] = read([self._references[port.name]])
         return value
-
-    def renew(self) -> None:
-        """Take all outputs for those of another time."""
-        self._slave._store.fresh = False
 
     def begin(self) -> None:
         """Enter the run."""

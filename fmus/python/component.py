@@ -235,8 +235,8 @@ class Component(Callbacks):
             return False
         store.state, store.derived = state, derived
         store.outputs, store.draws = outputs, draws
-        store.time, store.fresh = end, self._is_prompt or self._is_sampled
-        store.held = self._is_sampled
+        store.time, store.held = end, self._is_sampled
+        store.fresh = self._is_prompt or self._is_sampled
         return True
 
     def _internal_steps(self, t: float, h: float) -> int:

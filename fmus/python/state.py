@@ -121,7 +121,7 @@ class Snapshot(TypedDict):
     inputs: list[Value]
     outputs: list[Value]  #: of a sampled component; others follow from what is here
     fresh: bool  #: whether these are up to date
-    held: bool  #: whether they are a sample of the last step
+    held: bool  #: whether they are those of the last step
     state: Any  #: NamedTuple of the component, None before the initialisation
     draws: tuple[float, ...]  #: what the noise of the outputs is made of
     generator: Any  #: state of the generator of the noise, None without one
@@ -185,9 +185,10 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
     mode, state, time = saved["mode"], saved["state"], saved["time"]
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
-    for truth in ("fresh", "held", "fault"):
-        if not isinstance(saved[truth], bool):
-            raise Refusal(f"its {truth} is neither true nor false")
+    if not isinstance(saved["fault"], bool):
+        raise Refusal("its fault is neither true nor false")
+    if not (isinstance(saved["fresh"], bool) and isinstance(saved["held"], bool)):
+        raise Refusal("its outputs are neither fresh nor not")
     if mode == INSTANTIATED and state is not None:
         raise Refusal("it has a state before the initialisation")
     if state is None and mode == STEPPING:
