@@ -103,7 +103,7 @@ class _Trial:
             if len(given) != len(ports):
                 raise ValueError(f"{name}: {len(given)} values for {len(ports)} ports")
             for port, one in zip(ports, given):
-                put = getattr(self._slave, f"set_{port.type.lower()}")
+                put = getattr(self._slave, f"set_{_passed_as(port)}")
                 put([self._references[port.name]], [_meant(port, one)])
                 self._refuse()
 
@@ -111,7 +111,7 @@ class _Trial:
         """The value of an output."""
         if not self._slave._fresh:
             self._slave.renew_outputs()
-        read = getattr(self._slave, f"get_{port.type.lower()}")
+        read = getattr(self._slave, f"get_{_passed_as(port)}")
         [value] = read([self._references[port.name]])
         return value
 
@@ -133,11 +133,19 @@ class _Trial:
         self._slave.log_queue.clear()
 
 
+def _passed_as(port: Port) -> str:
+    """The type of the calls that pass a port's values, in small letters."""
+    return "integer" if port.type == "Enumeration" else port.type.lower()
+
+
 def _meant(port: Port, value: Any) -> Any:
-    """A value of the type that a port takes."""
+    """A value of the type that a port takes; choices have names."""
     if port.type == "Real" and not isinstance(value, str):
         return float(value)
-    return value.name if isinstance(value, IntEnum) and port.type == "String" else value
+    if port.type == "Enumeration":
+        value = port.choices.get(value, value)
+        return int(value) if isinstance(value, IntEnum) else value
+    return value
 
 
 def _flat(value: Any) -> list[Any]:

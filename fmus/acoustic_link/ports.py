@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from auv_fmu.acoustic_link import Parameters
+from auv_fmu.quantities import EULER, POSITION
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, setting
-from auv_fmu.quantities import EULER, POSITION
 from fmus.ports.vehicle import PAPER
 
 DESCRIPTION = "Acoustic link: messages with a vehicle's position, late and sometimes lost"

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from auv_fmu.allocation import Parameters
+from auv_fmu.quantities import NU, TAU
 from auv_fmu.tail import FASTEST
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, Port, inputs, outputs, parameter, setting
-from auv_fmu.quantities import NU, TAU
 from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 
 DESCRIPTION = "Allocation of a force and two moments to the fins and the propeller of Remus100"

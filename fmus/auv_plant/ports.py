@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from auv_fmu.plant import ETA_0, INTEGRATORS, NU_0, Localisation, Parameters, RollAxis
+from auv_fmu.quantities import ACCELERATION, ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, outputs, parameter, parameters, setting
-from auv_fmu.quantities import ACCELERATION, ETA, LAG, NU, POSITION, TAU, TAU_W, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, LIMITS, PAPER, VEHICLE
 
 DESCRIPTION = "Autonomous underwater vehicle with limited actuators and noisy position sensor"

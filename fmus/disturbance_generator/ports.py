@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from auv_fmu.disturbance import Disturbance
+from auv_fmu.quantities import NU, TAU_W
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import TIME, Port, inputs, outputs, parameter
-from auv_fmu.quantities import NU, TAU_W
 from fmus.ports.vehicle import PAPER
 
 DESCRIPTION = "Disturbance by friction, waves and ocean currents in six degrees of freedom"

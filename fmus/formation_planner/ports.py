@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from auv_fmu.formation import MOST, SHAPES, Estimator, Parameters, Stages
+from auv_fmu.quantities import ACCELERATION, POSITION, VELOCITY
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, setting
-from auv_fmu.quantities import ACCELERATION, POSITION, VELOCITY
 from fmus.ports.vehicle import CONTROL_POINT, LIMITS, PAPER, VEHICLE, reference
 
 DESCRIPTION = "Formation planner: reference of a vehicle that keeps its place beside a leader"

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from auv_fmu.motion_planner import ETA_D0, NU_D0, TAU_D, Parameters
+from auv_fmu.quantities import ETA_WITHOUT_ROLL, NU_WITHOUT_ROLL, TAU
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, Port, parameters
-from auv_fmu.quantities import ETA_WITHOUT_ROLL, NU_WITHOUT_ROLL, TAU
 from fmus.ports.vehicle import CONTROL_POINT, PAPER, VEHICLE, reference
 
 DESCRIPTION = "Motion planner: helical reference with velocity and acceleration"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from auv_fmu.observer import FORMS
 from auv_fmu.output_feedback import Gains
+from auv_fmu.quantities import POSITION, VELOCITY, per_axis
 from auv_fmu.saturation import SATURATIONS
 from fmus.ports.controllers import (
     ADAPTATION,
@@ -17,7 +18,6 @@ from fmus.ports.controllers import (
 )
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, outputs, parameter, parameters, setting
-from auv_fmu.quantities import POSITION, VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT, PAPER
 
 DESCRIPTION = "Saturated output-feedback tracking controller with velocity observer"

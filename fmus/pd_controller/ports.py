@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from auv_fmu.pd import PdGains
+from auv_fmu.quantities import VELOCITY, per_axis
 from fmus.ports.controllers import (
     ADAPTATION,
     INPUTS,
@@ -14,7 +15,6 @@ from fmus.ports.controllers import (
 )
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import H_MAX, POSITIVE, Port, inputs, parameter, parameters
-from auv_fmu.quantities import VELOCITY, per_axis
 from fmus.ports.vehicle import CONTROL_POINT, PAPER
 
 DESCRIPTION = "Adaptive robust PD tracking controller with measured velocity"

@@ -86,14 +86,17 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
 
 def value_attributes(port: Port) -> dict[str, str]:
     """What is said of a variable's values."""
-    said = {
-        "declaredType": unit_of(port.unit).type_name if port.unit else port.enumeration or None,
-        "unit": port.unit,
+    declared = unit_of(port.unit).type_name if port.unit else port.enumeration
+    said = {"declaredType": declared, "unit": port.unit}
+    values = {
         "start": port.start,
         "min": port.minimum,
         "max": port.maximum,
     }
-    return {name: _literal(value) for name, value in said.items() if value is not None}
+    return {
+        **{name: text for name, text in said.items() if text},
+        **{name: _literal(value) for name, value in values.items() if value is not None},
+    }
 
 
 def enumerations_of(ports: Sequence[Port]) -> dict[str, Mapping[str, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from auv_fmu.hull import Drag, Hull
 from auv_fmu.plant import Localisation
+from auv_fmu.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
 from auv_fmu.remus100 import Parameters
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import (
@@ -16,7 +17,6 @@ from fmus.ports.port import (
     parameters,
     setting,
 )
-from auv_fmu.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
 from fmus.ports.tail import REMUS, TAIL, TAIL_COMMAND
 from fmus.ports.vehicle import CONTROL_POINT
 

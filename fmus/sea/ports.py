@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from auv_fmu.ocean_current import Current
+from auv_fmu.quantities import ACCELERATION, POSITION, VELOCITY
 from auv_fmu.sea import Sea
 from auv_fmu.waves import MOST, SPECTRA, Waves
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import POSITIVE, TIME, Port, inputs, outputs, parameter, setting
-from auv_fmu.quantities import ACCELERATION, POSITION, VELOCITY
 from fmus.ports.vehicle import PAPER
 
 DESCRIPTION = "Waves and an ocean current at the vehicle"
