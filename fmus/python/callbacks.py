@@ -284,7 +284,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 values.append(MISSING[fmi_type])
         return values
 
-    def _set(self, vrs: list[int], values: Sequence[Value], fmi_type: str) -> None:
+    def _set(self, vrs: list[int], values: Sequence[Any], fmi_type: str) -> None:
         """Take all values of a call, or none."""
         if self._mode == TERMINATED:
             self._follows(f"fmi2Set{fmi_type}", STEPPING)
