@@ -135,7 +135,7 @@ def _row(ports: Sequence[Port], types: Mapping[str, str]) -> list[str]:
     name = f"`{port.name}`" if port is last else f"`{port.name}` to `{last.name}`"
     cells = [name, cell, port.unit or "", port.description]
     if port.causality == "parameter":
-        starts = [_literal(one.start) for one in ports]
+        starts = [_start(one) for one in ports]
         while len(starts) > 1 and starts[-1] == starts[-2]:
             starts.pop()
         cells[3:3] = [", ".join(starts), _range(port), port.variability]
@@ -145,14 +145,16 @@ def _row(ports: Sequence[Port], types: Mapping[str, str]) -> list[str]:
     return cells
 
 
-def _literal(value: object) -> str:
-    return f"{value:g}" if isinstance(value, float) else str(value).lower()
+def _start(port: Port) -> str:
+    for name, number in port.choices.items():
+        if number == port.start:
+            return name
+    return f"{port.start:g}" if isinstance(port.start, float) else str(port.start).lower()
 
 
 def _range(port: Port) -> str:
     if port.choices:
-        texts = (f"{number:d} {text}" for text, number in port.choices.items())
-        return ", ".join(texts if port.type == "Integer" else port.choices)
+        return ", ".join(f"{number:d} {text}" for text, number in port.choices.items())
     lower = "" if port.minimum is None else f"≥ {port.minimum:g}"
     upper = "" if port.maximum is None else f"≤ {port.maximum:g}"
     return " ".join(filter(None, (lower, upper)))

@@ -103,7 +103,7 @@ class _Trial:
             if len(given) != len(ports):
                 raise ValueError(f"{name}: {len(given)} values for {len(ports)} ports")
             for port, one in zip(ports, given):
-                put = getattr(self._slave, f"set_{port.type.lower()}")
+                put = getattr(self._slave, f"set_{_passed_as(port)}")
                 put([self._references[port.name]], [_meant(port, one)])
         if causality == "input":
             # Those that stay as they are belong to another time.
@@ -111,7 +111,7 @@ class _Trial:
 
     def get(self, port: Port) -> Any:
         """The value of an output."""
-        read = getattr(self._slave, f"get_{port.type.lower()}")
+        read = getattr(self._slave, f"get_{_passed_as(port)}")
         [value] = read([self._references[port.name]])
         return value
 
@@ -130,11 +130,18 @@ def _raised(slave: object, error: BaseException) -> str:
     raise error
 
 
+def _passed_as(port: Port) -> str:
+    """The type of the calls that pass a port's values, in small letters."""
+    return "integer" if port.type == "Enumeration" else port.type.lower()
+
+
 def _meant(port: Port, value: Any) -> Any:
-    """A value of the type that a port takes."""
+    """A value of the type that a port takes; choices have names."""
     if port.type == "Real" and not isinstance(value, str):
         return float(value)
-    return value.name.lower() if isinstance(value, IntEnum) and port.type == "String" else value
+    if port.type == "Enumeration":
+        value = port.choices.get(value, value)
+    return int(value) if isinstance(value, IntEnum) else value
 
 
 def _flat(value: Any) -> list[Any]:

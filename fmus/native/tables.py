@@ -13,7 +13,7 @@ from fmus.native.layout import quoted
 from fmus.native.shapes import Shape, Structure, shape_of
 from fmus.ports.definition import Definition
 from fmus.ports.groups import hints_of, is_class, reals_first, scalars_of
-from fmus.ports.port import FAULT, H_MAX, Port, Value
+from fmus.ports.port import FAULT, H_MAX, Port
 
 _HEAD = f"""\
 /* The ports: a value reference is a place in the first table.
@@ -84,20 +84,13 @@ def _row(port: Port, places: Mapping[str, str], names: Mapping[str, str]) -> str
             port.causality.upper(),
             port.variability.upper(),
             places[port.name],
-            "0.0" if port.start is None else _number(port, port.start),
-            "-DBL_MAX" if port.minimum is None else _number(port, port.minimum),
-            "DBL_MAX" if port.maximum is None else _number(port, port.maximum),
+            "0.0" if port.start is None else repr(float(port.start)),
+            "-DBL_MAX" if port.minimum is None else repr(float(port.minimum)),
+            "DBL_MAX" if port.maximum is None else repr(float(port.maximum)),
             names[port.name] if port.choices else "NULL",
             str(len(port.choices)),
         )
     )
-
-
-def _number(port: Port, value: Value) -> str:
-    """The number that stands for a value."""
-    meant = port.meaning(value)
-    assert isinstance(meant, (float, int))
-    return repr(float(meant))
 
 
 def names_of_choices(ports: Sequence[Port]) -> dict[str, str]:

@@ -12,6 +12,7 @@ from fmus.ports.behaviour import Behaviour, read_behaviour
 from fmus.ports.fields import declared
 from fmus.ports.groups import Field, ParameterSet, ports_in
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, is_line, largest_step
+from fmus.ports.units import unit_of
 
 
 class Origin(NamedTuple):
@@ -87,6 +88,7 @@ def define(name: str, module: ModuleType) -> Definition:
         *([] if said.h_max is None else [largest_step(said.h_max)]),
     )
     _hold_apart(said, ports)
+    _check_enumerations(ports)
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
     origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
     for place, text in {"its docstring": summary, **origin._asdict()}.items():
@@ -133,3 +135,13 @@ def _hold_apart(said: Behaviour, ports: tuple[Port, ...]) -> None:
             why = f"has a name that {taken[port.name]} has already"
             raise Misdeclared(f"{name}.{port.name} {why}", name, port.name)
         taken[port.name] = name if port.name != H_MAX else "H_MAX"
+
+
+def _check_enumerations(ports: tuple[Port, ...]) -> None:
+    """Refuse types of one name that are two, or whose name something else has."""
+    taken: dict[str, object] = {port.name: port for port in ports}
+    taken |= {unit_of(port.unit).type_name: port.unit for port in ports if port.unit}
+    for port in ports:
+        if port.enumeration and taken.setdefault(port.enumeration, port.choices) != port.choices:
+            why = f"is the name of something else in the FMU, besides that of {port.name}'s choices"
+            raise Misdeclared(f"{port.enumeration} {why}: rename it", port.enumeration)

@@ -6,7 +6,7 @@ from the ports.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -86,14 +86,28 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
 
 def value_attributes(port: Port) -> dict[str, str]:
     """What is said of a variable's values."""
-    said = {
-        "declaredType": unit_of(port.unit).type_name if port.unit else None,
-        "unit": port.unit,
+    declared = unit_of(port.unit).type_name if port.unit else port.enumeration
+    said = {"declaredType": declared, "unit": port.unit}
+    values = {
         "start": port.start,
         "min": port.minimum,
         "max": port.maximum,
     }
-    return {name: _literal(value) for name, value in said.items() if value is not None}
+    return {
+        **{name: text for name, text in said.items() if text},
+        **{name: _literal(value) for name, value in values.items() if value is not None},
+    }
+
+
+def enumerations_of(ports: Sequence[Port]) -> dict[str, Mapping[str, int]]:
+    """The types of enumerations that ports have, with their items."""
+    return {port.enumeration: port.choices for port in ports if port.enumeration}
+
+
+def add_items(parent: Element, choices: Mapping[str, int]) -> None:
+    """Add the items of an enumeration."""
+    for name, value in choices.items():
+        SubElement(parent, "Item", name=name, value=str(int(value)))
 
 
 def units_of(ports: Sequence[Port]) -> list[str]:
@@ -202,10 +216,11 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
     implementation.attrib.update(_CAPABILITIES)
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
-    units = units_of(ports)
-    if units:
+    types = _type_definitions(ports)
+    if units := units_of(ports):
         root.insert(1, unit_definitions(units))
-        root.insert(2, _type_definitions(units))
+    if len(types):
+        root.insert(1 + bool(units), types)
     return root
 
 
@@ -215,12 +230,15 @@ def _variable(reference: int, port: Port) -> Element:
     return variable
 
 
-def _type_definitions(units: Sequence[str]) -> Element:
+def _type_definitions(ports: Sequence[Port]) -> Element:
     definitions = Element("TypeDefinitions")
-    for unit in units:
+    for unit in units_of(ports):
         name = unit_of(unit).type_name
         simple_type = SubElement(definitions, "SimpleType", name=name)
         SubElement(simple_type, "Real", quantity=name, unit=unit)
+    for name, choices in enumerations_of(ports).items():
+        simple_type = SubElement(definitions, "SimpleType", name=name)
+        add_items(SubElement(simple_type, "Enumeration"), choices)
     return definitions
 
 

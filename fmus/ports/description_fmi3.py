@@ -14,9 +14,11 @@ from auv_fmu.quantities import member_of
 from fmus.ports.definition import Definition
 from fmus.ports.description import (
     CAPABILITIES,
+    add_items,
     default_experiment,
     dependencies,
     dependent_on,
+    enumerations_of,
     log_categories,
     root_of,
     text,
@@ -30,7 +32,9 @@ from fmus.ports.port import FAULT, TIME, Port
 from fmus.ports.units import unit_of
 
 #: What FMI 3.0 calls the types of variables.
-TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
+TYPES = {
+    "Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration",
+}  # fmt: skip
 
 _VERSION = "3.0"
 
@@ -64,7 +68,7 @@ def fmi3_description(definition: Definition, token: str) -> bytes:
     root.extend(
         (
             unit_definitions(units),
-            _type_definitions(units),
+            _type_definitions(variables),
             log_categories("fmi3"),
             default_experiment(definition.behaviour),
             _variables(variables),
@@ -86,11 +90,13 @@ def fmi3_build_description(name: str) -> bytes:
     return text(root)
 
 
-def _type_definitions(units: Sequence[str]) -> Element:
+def _type_definitions(ports: Sequence[Port]) -> Element:
     definitions = Element("TypeDefinitions")
-    for unit in units:
+    for unit in units_of(ports):
         name = unit_of(unit).type_name
         SubElement(definitions, "Float64Type", name=name, quantity=name, unit=unit)
+    for name, choices in enumerations_of(ports).items():
+        add_items(SubElement(definitions, "EnumerationType", name=name), choices)
     return definitions
 
 
@@ -98,9 +104,7 @@ def _variables(ports: Sequence[Port]) -> Element:
     variables = Element("ModelVariables")
     for place, port in enumerate(ports, start=1):
         attributes = {**variable_attributes(place, port), **value_attributes(port)}
-        variable = SubElement(variables, TYPES[port.type], attributes)
-        if isinstance(port.start, str):
-            SubElement(variable, "Start", value=variable.attrib.pop("start"))
+        SubElement(variables, TYPES[port.type], attributes)
     return variables
 
 

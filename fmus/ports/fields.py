@@ -223,17 +223,12 @@ def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterato
 
 
 def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
-    kind, start, choices, bounds = _meant(part, causality, place)
+    kind, start, choices = _meant(part, place)
     if kind != "Real" and part.unit != "1":
         raise _wrong(place, f"is of the type {_word(part.type)}; only a float has a unit")
     variability = "tunable" if said.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
-    minimum, maximum = said.minimum, said.maximum
-    if bounds is not None:
-        if (minimum, maximum) != (None, None):
-            raise _wrong(place, "has a minimum or maximum, but its range is its members")
-        minimum, maximum = bounds
     label = "" if said.name and "{}" in said.name else part.member
     try:
         port = Port(
@@ -244,9 +239,10 @@ def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -
             ": ".join(filter(None, (said.description, label))),
             (part.unit or None) if kind == "Real" else None,
             start,
-            minimum,
-            maximum,
+            said.minimum,
+            said.maximum,
             choices,
+            part.type.__name__ if choices else "",
             tuple(name.replace("{}", part.member) for name in said.feedthrough or ()),
             tuple(name.replace("{}", part.member) for name in said.initially or ()),
         )
@@ -258,24 +254,19 @@ def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -
     return replace(port, start=None) if causality == "output" else port
 
 
-def _meant(part: _Part, causality: str, place: tuple[str, ...]) -> tuple[str, Any, Any, Any]:
-    """FMI's type of a number, its start value, its choices, and bounds that follow from them."""
+def _meant(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, int]]:
+    """FMI's type of a number, its start value, and its choices."""
     number, start = part.type, part.start
     if number in _TYPES:
         kind, zero = _TYPES[number]
         start = zero if start is None else start
         is_whole = kind == "Real" and type(start) is int and abs(start) <= sys.float_info.max
-        return kind, float(start) if is_whole else start, {}, None
+        return kind, float(start) if is_whole else start, {}
     members = list(number)
     start = members[0] if start is None else start
     if not isinstance(start, number):
         raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
-    named = {one.name.lower(): one for one in members}
-    if len(named) < len(members):
+    choices = {one.name.lower(): one for one in members}
+    if len(choices) < len(members):
         raise _wrong(place, f"has choices of {number.__name__} that differ only in capitals")
-    if causality == "parameter":
-        return "String", start.name.lower(), named, None
-    if causality == "output":
-        return "Integer", int(start), {}, None
-    choices = {name: int(one) for name, one in named.items()}
-    return "Integer", int(start), choices, (int(min(members)), int(max(members)))
+    return "Enumeration", int(start), choices

@@ -6,14 +6,14 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Union
+from typing import Union
 
 from auv_fmu.variable import POSITIVE, Refusal
 
-Value = Union[float, int, bool, str]
+Value = Union[float, int, bool]
 
 #: Python's types of the values of FMI's types.
-_TYPES = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "String": (str,)}
+_TYPES = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "Enumeration": (int,)}
 
 _LARGEST = sys.float_info.max
 
@@ -46,13 +46,13 @@ class Port:
         name: structured name, for example `tau.u`.
         causality: `input`, `output`, `parameter`, or `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
-        type: of FMI: `Real`, `Integer`, `Boolean` or `String`.
+        type: of FMI: `Real`, `Integer`, `Boolean` or `Enumeration`.
         unit: of a Real, as :mod:`fmus.ports.units` reads it.
         start: value before anything is set. Outputs have none.
         description: one line.
         minimum, maximum: inclusive bounds of a number.
-        choices: values that a String may have, with what each stands for in the equations; of an
-            Integer what each number is called that it may have.
+        choices: the values of an Enumeration by their names.
+        enumeration: what its type is called.
         feedthrough: of an output, what it depends on without a state between: inputs, the time.
         initially: of an output, inputs that its value at the start depends on besides.
 
@@ -67,7 +67,8 @@ class Port:
     start: Value | None = None
     minimum: float | None = None
     maximum: float | None = None
-    choices: Mapping[str, Any] = field(default_factory=dict)
+    choices: Mapping[str, int] = field(default_factory=dict)
+    enumeration: str = ""
     feedthrough: tuple[str, ...] = ()
     initially: tuple[str, ...] = ()
 
@@ -104,8 +105,6 @@ class Port:
 
         """
         self.sound(value)
-        if isinstance(value, str):
-            return value
         if self.minimum is not None and value < self.minimum:
             raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
         if self.maximum is not None and value > self.maximum:
@@ -121,20 +120,17 @@ class Port:
         """
         if type(value) not in _TYPES[self.type]:
             raise Refusal(f"{self.name} = {value!r:.20}: must be a {self.type}")
-        if isinstance(value, str):
-            if value not in self.choices:
-                raise Refusal(f"{self.name} = {value!r}: use one of {', '.join(self.choices)}")
-        elif not -_LARGEST <= value <= _LARGEST:
+        if not -_LARGEST <= value <= _LARGEST:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
-        elif self.type == "Integer" and not is_int32(value):
+        if self.type == "Integer" and not is_int32(value):
             raise Refusal(f"{self.name} = {value!r:.20}: must fit into 32 bits")
-        elif self.choices and value not in self.choices.values():
-            numbers = ", ".join(f"{number:d}" for number in self.choices.values())
-            raise Refusal(f"{self.name} = {value}: use one of {numbers}")
+        if self.choices and value not in self.choices.values():
+            known = ", ".join(f"{number:d} ({name})" for name, number in self.choices.items())
+            raise Refusal(f"{self.name} = {value}: use one of {known}")
 
-    def meaning(self, value: Value) -> object:
-        """What the equations take for a value of this port."""
-        return self.choices[str(value)] if self.type == "String" else value
+    def meaning(self, value: Value) -> Value:
+        """What the equations take for a value of this port: a member of an enumeration."""
+        return next((one for one in self.choices.values() if one == value), value)
 
 
 def is_line(text: object) -> bool:

@@ -21,8 +21,16 @@ from fmus.ports.port import FAULT, Port, Value
 from fmus.python.loading import ANSWER, MISSING, has_loader, place
 from fmus.python.noise import Noise
 
-#: Types that can be read as numbers: hosts read all outputs with fmi2GetReal.
-_NUMBERS = ("Real", "Integer", "Boolean")
+#: Types of ports, by those of the calls that pass their values; no port is a text.
+_PASSED = {
+    "Real": ("Real",),
+    "Integer": ("Integer", "Enumeration"),
+    "Boolean": ("Boolean",),
+    "String": (),
+}
+
+#: Values of ports that have none.
+_NOTHING = {**MISSING, "Enumeration": 0}
 
 #: Modes of an instance.
 INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
@@ -81,7 +89,7 @@ class Store:
         self.only_outputs = None if has_others else self.real_outputs
         self.fault_references = [len(ports)]
         self.inputs: list[Value] = [
-            MISSING[ports[r].type] if ports[r].start is None else ports[r].start
+            _NOTHING[ports[r].type] if ports[r].start is None else ports[r].start
             for r in self.input_references
         ]
         self.outputs = self.no_outputs()
@@ -106,7 +114,7 @@ class Store:
 
     def no_outputs(self) -> list[Value]:
         """The outputs where there is no state."""
-        return [MISSING[self.ports[reference].type] for reference in self.output_references]
+        return [_NOTHING[self.ports[reference].type] for reference in self.output_references]
 
     def check_outputs(self, values: Sequence[Value]) -> None:
         """Refuse outputs that are not finite.
@@ -122,27 +130,29 @@ class Store:
         """Where the value of an input or an output lies."""
         return self._places[reference]
 
-    def port(self, reference: int, *types: str) -> Port:
-        """The port of one of some types that has a value reference.
+    def port(self, reference: int, fmi_type: str) -> Port:
+        """The port that has a value reference, if its values are passed by the calls for a type.
 
         Raises:
             Refusal: there is none.
 
         """
-        if not 0 <= reference < len(self.ports) or self.ports[reference].type not in types:
-            # PythonFMU hands references from 2^31 over as negative numbers.
-            raise Refusal(f"no {types[0]} has the value reference {reference % 2**32}")
-        return self.ports[reference]
+        if 0 <= reference < len(self.ports):
+            port = self.ports[reference]
+            if port.type in _PASSED[fmi_type]:
+                return port
+        # PythonFMU hands references from 2^31 over as negative numbers.
+        raise Refusal(f"no {fmi_type} has the value reference {reference % 2**32}")
 
     def get(self, reference: int, fmi_type: str) -> Value:
-        """The value of a port.
+        """The value of a port. Hosts read all outputs with fmi2GetReal.
 
         Raises:
             Refusal: no port with the reference has a value of this type.
 
         """
-        if fmi_type == "Real":
-            return float(self._value(reference, self.port(reference, *_NUMBERS)))
+        if fmi_type == "Real" and 0 <= reference < len(self.ports):
+            return float(self._value(reference, self.ports[reference]))
         return self._value(reference, self.port(reference, fmi_type))
 
     def _value(self, reference: int, port: Port) -> Value:
@@ -296,7 +306,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 values.append(MISSING[fmi_type])
         return values
 
-    def _set(self, vrs: list[int], values: Sequence[Value], fmi_type: str) -> None:
+    def _set(self, vrs: list[int], values: Sequence[Any], fmi_type: str) -> None:
         """Take all values of a call, or none."""
         if self._mode == TERMINATED:
             self._follows(f"fmi2Set{fmi_type}", STEPPING)

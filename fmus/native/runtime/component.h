@@ -16,7 +16,7 @@
 
 #include "host.h"
 
-typedef enum { REAL, INTEGER, BOOLEAN, STRING } fmi_type;
+typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION } fmi_type;
 
 typedef struct instance instance;
 
@@ -32,7 +32,8 @@ typedef struct {
 
 /* What it calls things. */
 typedef struct {
-    string types[STRING + 1]; /* of values */
+    string types[ENUMERATION + 1]; /* of values */
+    int enumerations_are_integers; /* whether they are passed as such */
     string token;             /* what tells an FMU from others */
 } names;
 
@@ -78,20 +79,20 @@ static void exit_initialisation(call *this);
 static void terminate(call *this);
 static void reset(call *this);
 
-/* Values. What cannot be got is given as 0 or "". Integers and Booleans can be got as Reals. */
+/* Values. What cannot be got is given as 0. All can be got as Reals. */
 static void get_reals(call *this, const uint32_t references[], size_t n, double values[]);
 
 /* Before Integers or Booleans are got: outputs are made what they are. */
 static void prepare_to_get(call *this, const uint32_t references[], size_t n);
 static int32_t get_integer(call *this, uint32_t reference);
 static int get_boolean(call *this, uint32_t reference);
-static string get_string(call *this, uint32_t reference);
+static int64_t get_enumeration(call *this, uint32_t reference);
 
 /* All values of a call are taken, or none: they are set one by one between the beginning and the
  * end of a setting. */
 typedef struct setting setting;
 static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n);
-static void set_value(setting *it, uint32_t reference, double number, string text);
+static void set_value(setting *it, uint32_t reference, double number);
 static void end_setting(setting *it);
 
 static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]);

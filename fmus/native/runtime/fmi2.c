@@ -33,7 +33,8 @@ typedef struct {
 } callbacks;
 
 static const names version = {
-    .types = {"Real", "Integer", "Boolean", "String"},
+    .types = {"Real", "Integer", "Boolean", "Enumeration"},
+    .enumerations_are_integers = 1,
     .token = "GUID",
 };
 
@@ -121,21 +122,26 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
 #define SET(name, type, wrong, action)                                                           \
     ANSWER(name, NOT_AFTER_ERROR, wrong,                                                         \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
-#define SET_EACH(name, c_type, type, wrong, number, text)                                        \
-    SET(name, c_type, wrong, {                                                                   \
+#define SET_EACH(name, c_type, type, number)                                                     \
+    SET(name, c_type, wrong_values(n, r, v), {                                                   \
         setting it = begin_setting(&this, type, r, n);                                           \
-        FOR_EACH(set_value(&it, r[i], number, text));                                            \
+        FOR_EACH(set_value(&it, r[i], number));                                                  \
         end_setting(&it);                                                                        \
     })
 
 GET(fmi2GetReal, double, get_reals(&this, r, n, v))
 GET_EACH(fmi2GetInteger, int, get_integer)
 GET_EACH(fmi2GetBoolean, int, get_boolean)
-GET(fmi2GetString, string, FOR_EACH(v[i] = get_string(&this, r[i])))
 SET(fmi2SetReal, double, wrong_values(n, r, v), set_reals(&this, r, n, v))
-SET_EACH(fmi2SetInteger, int, INTEGER, wrong_values(n, r, v), v[i], NULL)
-SET_EACH(fmi2SetBoolean, int, BOOLEAN, wrong_values(n, r, v), v[i] != 0, NULL)
-SET_EACH(fmi2SetString, string, STRING, wrong_strings(n, r, v), 0.0, v[i])
+SET_EACH(fmi2SetInteger, int, INTEGER, v[i])
+SET_EACH(fmi2SetBoolean, int, BOOLEAN, v[i] != 0)
+
+/* No variable is a text. */
+GET(fmi2GetString, string, {
+    FOR_EACH(v[i] = "");
+    get_unknown(&this, "String", r, n);
+})
+SET(fmi2SetString, string, wrong_strings(n, r, v), set_unknown(&this, "String", r, n))
 
 /* States */
 

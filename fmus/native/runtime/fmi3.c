@@ -9,7 +9,7 @@
 #include "component.h"
 
 static const names version = {
-    .types = {"Float64", "Int32", "Boolean", "String"},
+    .types = {"Float64", "Int32", "Boolean", "Enumeration"},
     .token = "instantiation token",
 };
 
@@ -161,13 +161,13 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
         return end(&this);                                                                       \
     }
 
-#define SET(name, c_type, type, wrong, number, text)                                             \
+#define SET(name, c_type, type, number)                                                          \
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const c_type v[],         \
                           size_t n_v) {                                                          \
         call this = begin(handle, #name, NOT_AFTER_ERROR);                                       \
-        if (GOES_ON(this, wrong_numbers(n, r, v, n_v)) && GOES_ON(this, wrong)) {                \
+        if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
             setting it = begin_setting(&this, type, r, n);                                       \
-            for (size_t i = 0; i < n; i++) set_value(&it, r[i], number, text);                   \
+            for (size_t i = 0; i < n; i++) set_value(&it, r[i], (double)(number));               \
             end_setting(&it);                                                                    \
         }                                                                                        \
         return end(&this);                                                                       \
@@ -175,10 +175,10 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
 
 GET(fmi3GetInt32, int32_t, get_integer)
 GET(fmi3GetBoolean, boolean, get_boolean)
-GET(fmi3GetString, string, get_string)
-SET(fmi3SetInt32, int32_t, INTEGER, NULL, v[i], NULL)
-SET(fmi3SetBoolean, boolean, BOOLEAN, NULL, v[i] != 0, NULL)
-SET(fmi3SetString, string, STRING, wrong_strings(n, r, v), 0.0, v[i])
+GET(fmi3GetInt64, int64_t, get_enumeration)
+SET(fmi3SetInt32, int32_t, INTEGER, v[i])
+SET(fmi3SetBoolean, boolean, BOOLEAN, v[i] != 0)
+SET(fmi3SetInt64, int64_t, ENUMERATION, v[i])
 
 EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
                                 size_t n_v) {
@@ -235,8 +235,21 @@ NO_VARIABLE(UInt8, uint8_t)
 NO_VARIABLE(Int16, int16_t)
 NO_VARIABLE(UInt16, uint16_t)
 NO_VARIABLE(UInt32, uint32_t)
-NO_VARIABLE(Int64, int64_t)
 NO_VARIABLE(UInt64, uint64_t)
+
+EXPORT int FMI3(fmi3GetString)(void *handle, const uint32_t r[], size_t n, string v[],
+                               size_t n_v) {
+    string wrong = wrong_numbers(n, r, v, n_v);
+    for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = "";
+    return get_none(handle, "fmi3GetString", "String", r, n, wrong);
+}
+
+EXPORT int FMI3(fmi3SetString)(void *handle, const uint32_t r[], size_t n, const string v[],
+                               size_t n_v) {
+    string wrong = wrong_numbers(n, r, v, n_v);
+    return set_none(handle, "fmi3SetString", "String", r, n,
+                    wrong != NULL ? wrong : wrong_strings(n, r, v));
+}
 
 static string wrong_binaries(size_t n, const uint32_t r[], const size_t sizes[], const void *values,
                              size_t n_values) {

@@ -24,7 +24,7 @@ enum { MOST_MESSAGES = 100 };
 typedef enum { INPUT, OUTPUT, PARAMETER } causality;
 typedef enum { CONTINUOUS, DISCRETE, TUNABLE, FIXED } variability;
 
-/* A text that a port takes, and what stands for it in the equations. */
+/* An item of an enumeration. */
 typedef struct {
     string text;
     int number;

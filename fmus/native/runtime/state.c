@@ -93,10 +93,6 @@ static int good_value(const port *port, double number, message *why) {
     if (port->type == BOOLEAN && !is_truth(number)) {
         return compose(why, "%s: must be a Boolean", port->name);
     }
-    if (port->type == STRING) {
-        return text_of(port, number) != NULL ||
-               compose(why, "%s: is not one of the choices", port->name);
-    }
     return port->causality == OUTPUT ? is_finite(port, number, why) : in_range(port, number, why);
 }
 

@@ -27,10 +27,10 @@ static const port *port_at(uint32_t reference) {
     return place < N_PORTS ? &ports[place] : NULL;
 }
 
-/* The port of a type that has a value reference. */
-static const port *port_of(uint32_t reference, fmi_type type) {
-    const port *port = port_at(reference);
-    return port != NULL && port->type == type ? port : NULL;
+/* Whether a port is passed by the calls for a type. */
+static int passes_as(const port *port, fmi_type type) {
+    return port->type == type || (type == INTEGER && port->type == ENUMERATION &&
+                                  version.enumerations_are_integers);
 }
 
 /* The text of a number among n; NULL: it is none of them. */
@@ -41,36 +41,19 @@ static string text_among(const choice choices[], size_t n, double number) {
     return NULL;
 }
 
-/* The text that a number stands for; NULL: none. */
-static string text_of(const port *port, double number) {
-    return text_among(port->choices, port->n_choices, number);
-}
-
-static int has_choice(const port *port, string text, double *number, message *why) {
-    for (size_t i = 0; i < port->n_choices; i++) {
-        *number = port->choices[i].number;
-        if (strcmp(port->choices[i].text, text) == 0) return 1;
-    }
-    compose(why, "%s = %q: use one of ", port->name, text);
-    for (size_t i = 0; i < port->n_choices; i++) {
-        append_text(why, i > 0 ? ", " : "");
-        append_text(why, port->choices[i].text);
-    }
-    return 0;
-}
-
 static int is_finite(const port *port, double number, message *why) {
     return isfinite(number) || compose(why, "%s = %r: must be finite", port->name, number);
 }
 
-/* Whether a port that takes numbers can take one. */
+/* Whether a port can take a number. */
 static int in_range(const port *port, double number, message *why) {
     if (!is_finite(port, number, why)) return 0;
-    if (port->n_choices > 0 && text_of(port, number) == NULL) {
+    if (port->n_choices > 0 && text_among(port->choices, port->n_choices, number) == NULL) {
         compose(why, "%s = %.0f: use one of ", port->name, number);
         for (size_t i = 0; i < port->n_choices; i++) {
+            const choice *it = &port->choices[i];
             message one;
-            compose(&one, i > 0 ? ", %.0f" : "%.0f", (double)port->choices[i].number);
+            compose(&one, i > 0 ? ", %.0f (%s)" : "%.0f (%s)", (double)it->number, it->text);
             append_text(why, one.text);
         }
     } else if (number < port->minimum) {
@@ -83,7 +66,7 @@ static int in_range(const port *port, double number, message *why) {
     return 0;
 }
 
-/* A parameter, as the number that it is or that stands for it. */
+/* A parameter. */
 static double parameter(const parameter_values *values, const port *port) {
     const char *place = (const char *)values + port->place;
     double real;
@@ -123,7 +106,7 @@ static int is_fault(const port *port) { return port == &ports[N_PORTS - 1]; }
 static double number_of(call *this, uint32_t reference, fmi_type type) {
     const run *run = &this->instance->run;
     const port *port = port_at(reference);
-    if (port == NULL || (port->type != type && (type != REAL || port->type == STRING))) {
+    if (port == NULL || (type != REAL && !passes_as(port, type))) {
         get_unknown(this, version.types[type], &reference, 1);
         return 0.0;
     }
@@ -171,10 +154,8 @@ static int get_boolean(call *this, uint32_t reference) {
     return number_of(this, reference, BOOLEAN) != 0.0;
 }
 
-static string get_string(call *this, uint32_t reference) {
-    double number = number_of(this, reference, STRING);
-    const port *port = port_of(reference, STRING);
-    return port == NULL ? "" : text_of(port, number);
+static int64_t get_enumeration(call *this, uint32_t reference) {
+    return (int64_t)number_of(this, reference, ENUMERATION);
 }
 
 /* Setting */
@@ -216,8 +197,8 @@ static setting begin_setting(call *this, fmi_type type, const uint32_t reference
     instance *instance = this->instance;
     setting it = {this, can_set(this), 0, 0, 0};
     for (size_t i = 0; i < n && it.good; i++) {
-        const port *port = port_of(references[i], type);
-        if (port != NULL) {
+        const port *port = port_at(references[i]);
+        if (port != NULL && passes_as(port, type)) {
             it.has_parameters |= port->causality == PARAMETER;
         } else {
             set_unknown(this, version.types[type], &references[i], 1);
@@ -229,24 +210,17 @@ static setting begin_setting(call *this, fmi_type type, const uint32_t reference
     return it;
 }
 
-static int is_the_same(const run *run, const port *port, double number, string text) {
-    double now = parameter(&run->parameters, port);
-    return text == NULL ? number == now : strcmp(text, text_of(port, now)) == 0;
-}
-
-static int take_value(setting *it, const port *port, double number, string text, message *why) {
+static int take_value(setting *it, const port *port, double number, message *why) {
     instance *instance = it->call->instance;
     const run *run = &instance->run;
     if (port->causality == OUTPUT) {
         return compose(why, "%s is an output and cannot be set", port->name);
     }
     if (port->variability == FIXED && run->mode == STEPPING) {
-        return is_the_same(run, port, number, text) ||
+        return number == parameter(&run->parameters, port) ||
                compose(why, "%s is fixed and cannot change after initialisation", port->name);
     }
-    if (text != NULL ? !has_choice(port, text, &number, why) : !in_range(port, number, why)) {
-        return 0;
-    }
+    if (!in_range(port, number, why)) return 0;
     if (port->causality == INPUT) {
         instance->set_inputs.values[port->place] = number;
         it->changes_inputs = 1;
@@ -268,9 +242,9 @@ static void give_up(setting *it, message *why) {
     }
 }
 
-static void set_value(setting *it, uint32_t reference, double number, string text) {
+static void set_value(setting *it, uint32_t reference, double number) {
     message why;
-    if (it->good && !take_value(it, port_at(reference), number, text, &why)) give_up(it, &why);
+    if (it->good && !take_value(it, port_at(reference), number, &why)) give_up(it, &why);
 }
 
 static void end_setting(setting *it) {
@@ -304,6 +278,6 @@ static void set_reals(call *this, const uint32_t references[], size_t n, const d
         return;
     }
     setting it = begin_setting(this, REAL, references, n);
-    for (size_t i = 0; i < n; i++) set_value(&it, references[i], values[i], NULL);
+    for (size_t i = 0; i < n; i++) set_value(&it, references[i], values[i]);
     end_setting(&it);
 }

@@ -200,3 +200,16 @@ def test_names_are_told_apart_from_those_that_a_component_has_anyway(defined):
     assert "h_max" in [port.name for port in defined(own).ports]
     with pytest.raises(Misdeclared, match=r"Parameters\.h_max has a name that H_MAX has already"):
         defined(own, ("class State", "H_MAX = 1.0\n\n\nclass State"))
+
+
+@pytest.mark.parametrize("name", ["u", "Length"])
+def test_a_type_of_choices_has_a_name_of_its_own(defined, name):
+    """FMI holds the names of types apart from each other and from those of variables."""
+    choice = f"class {name}(IntEnum):\n    OFF = 0\n\n\nclass State"
+    own = f'    mode: Annotated[{name}, Variable("1", "Mode")] = {name}.OFF\n    T: Anno'
+    with pytest.raises(Misdeclared, match=f"^{name} is the name of something else in the FMU"):
+        defined(
+            ("from math", "from enum import IntEnum\nfrom math"),
+            ("class Parameters", choice.replace("State", "Parameters")),
+            ("    T: Anno", own),
+        )

@@ -20,7 +20,16 @@ PORTS = (
     Port("big", "parameter", "fixed", "Real", "Large", "1", 1.25e300),
     Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
     Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
-    Port("kind", "parameter", "fixed", "String", "Kind", start="Soft", choices={"Soft": 1}),
+    Port(
+        "kind",
+        "parameter",
+        "fixed",
+        "Enumeration",
+        "Kind",
+        start=1,
+        choices={"soft": 1, "hard": 4},
+        enumeration="Kind",
+    ),
     FAULT,
 )
 
@@ -47,6 +56,9 @@ AFTER = """
     <SimpleType name="Dimensionless"><Real quantity="Dimensionless" unit="1"/></SimpleType>
     <SimpleType name="Force"><Real quantity="Force" unit="N"/></SimpleType>
     <SimpleType name="Length"><Real quantity="Length" unit="m"/></SimpleType>
+    <SimpleType name="Kind"><Enumeration>
+      <Item name="soft" value="1"/><Item name="hard" value="4"/>
+    </Enumeration></SimpleType>
   </TypeDefinitions>
   <ModelVariables>
     <ScalarVariable name="a.x" valueReference="0" description="Place: x" causality="input"
@@ -67,7 +79,8 @@ AFTER = """
     <ScalarVariable name="on" valueReference="6" description="Switch" causality="parameter"
       variability="fixed" initial="exact"><Boolean start="true"/></ScalarVariable>
     <ScalarVariable name="kind" valueReference="7" description="Kind" causality="parameter"
-      variability="fixed" initial="exact"><String start="Soft"/></ScalarVariable>
+      variability="fixed" initial="exact"><Enumeration declaredType="Kind" start="1"/>
+    </ScalarVariable>
     <ScalarVariable name="fault" valueReference="8" description="FAULT" causality="output"
       variability="discrete" initial="calculated"><Boolean/></ScalarVariable>
   </ModelVariables>

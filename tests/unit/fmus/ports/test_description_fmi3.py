@@ -23,7 +23,16 @@ PORTS = (
     Port("k", "parameter", "tunable", "Real", "Gain", "1", 0.25, 0.0, 1e3),
     Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
     Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
-    Port("kind", "parameter", "fixed", "String", "Kind", start="Soft", choices={"Soft": 1}),
+    Port(
+        "kind",
+        "parameter",
+        "fixed",
+        "Enumeration",
+        "Kind",
+        start=1,
+        choices={"soft": 1, "hard": 4},
+        enumeration="Kind",
+    ),
 )
 
 DESCRIPTION = """
@@ -43,6 +52,8 @@ DESCRIPTION = """
     <Float64Type name="Dimensionless" quantity="Dimensionless" unit="1"/>
     <Float64Type name="Length" quantity="Length" unit="m"/>
     <Float64Type name="Time" quantity="Time" unit="s"/>
+    <EnumerationType name="Kind"><Item name="soft" value="1"/><Item name="hard" value="4"/>
+    </EnumerationType>
   </TypeDefinitions>
   <LogCategories>
     <Category name="logStatusWarning" description="Log messages with fmi3Warning status."/>
@@ -64,8 +75,8 @@ DESCRIPTION = """
       variability="fixed" initial="exact" start="-3"/>
     <Boolean name="on" valueReference="5" description="Switch" causality="parameter"
       variability="fixed" initial="exact" start="true"/>
-    <String name="kind" valueReference="6" description="Kind" causality="parameter"
-      variability="fixed" initial="exact"><Start value="Soft"/></String>
+    <Enumeration name="kind" valueReference="6" description="Kind" causality="parameter"
+      variability="fixed" initial="exact" declaredType="Kind" start="1"/>
     <Boolean name="fault" valueReference="7" description="FAULT" causality="output"
       variability="discrete" initial="calculated"/>
     <Float64 name="time" valueReference="8" description="Time" causality="independent"

@@ -72,14 +72,17 @@ def test_numbers_have_the_types_of_fmi(hint, start, kind, zero):
     assert (port.type, port.start) == (kind, None)
 
 
-def test_an_enumeration_is_chosen_by_name_and_seen_as_a_number():
-    [port] = ports("parameter", mode=(Annotated[Mode, PLAIN], Mode.SLOW))
-    assert (port.type, port.start) == ("String", "slow")
+@pytest.mark.parametrize("causality", ["input", "output", "parameter"])
+def test_an_int_enum_is_an_enumeration(causality):
+    [port] = ports(causality, mode=(Annotated[Mode, PLAIN], Mode.SLOW))
+    assert (port.type, port.enumeration) == ("Enumeration", "Mode")
+    assert port.start == (None if causality == "output" else 3)
     assert port.choices == {"off": Mode.OFF, "slow": Mode.SLOW, "fast": Mode.FAST}
-    [port] = ports("output", mode=Annotated[Mode, PLAIN])
-    assert (port.type, port.start, port.minimum) == ("Integer", None, None)
+
+
+def test_an_enumeration_starts_with_its_first_member_if_nothing_is_said():
     [port] = ports("input", mode=Annotated[Mode, PLAIN])
-    assert (port.type, port.start, port.minimum, port.maximum) == ("Integer", 0, 0, 5)
+    assert (port.start, port.minimum, port.maximum) == (0, None, None)
 
 
 @pytest.mark.parametrize(
@@ -299,7 +302,7 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         (
             "input",
             Annotated[Mode, Variable(minimum=0)],
-            "has a minimum or maximum, but its range i",
+            "has a minimum, which is for a float or an",
         ),
         (
             "parameter",
