@@ -40,7 +40,7 @@ from fmus.native.variables import (
     stored_names,
 )
 from fmus.ports.behaviour import NUMBER_FORMAT
-from fmus.ports.port import Refusal
+from auv_fmu import Refusal
 
 
 @cache

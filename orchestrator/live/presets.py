@@ -14,9 +14,9 @@ from typing import Any, NamedTuple
 
 from fmpy.model_description import ModelVariable
 
+from auv_fmu.quantities import POSITION, TAU, THETA, VELOCITY, Members
 from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
-from auv_fmu.quantities import POSITION, TAU, THETA, VELOCITY, Members
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR

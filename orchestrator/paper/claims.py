@@ -15,7 +15,7 @@ import numpy as np
 from auv_fmu.control_point import ELL
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import theorem
-from auv_fmu.saturation import MAXIMUM_SLOPE
+from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.vehicle import Vehicle
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import (
@@ -470,7 +470,7 @@ def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
 @claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not stated")
 def gains_meet_the_conditions() -> Finding:
     """With the gains as printed, which needs no run."""
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
     verdicts = [condition.verdict for condition in found.conditions]
     first, second, _ = found.conditions
     return Finding(
@@ -486,7 +486,7 @@ def gains_meet_the_conditions() -> Finding:
 )
 def region_is_arbitrarily_large() -> Finding:
     """What (42) can hold for, with any gains."""
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
     least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
     return Finding(
         f"as printed, (31) asks with any gains for more than {least:.4g} of lambda_d2, which is "

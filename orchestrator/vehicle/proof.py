@@ -26,6 +26,7 @@ from orchestrator.master.observers.observer import Ending, Header, every
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
+from orchestrator.system.values import Value
 from orchestrator.vehicle.cautions import gain_of_a_step, values_of
 from orchestrator.vehicle.signals import (
     ACTUATORS,
@@ -76,14 +77,24 @@ def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
     def of(name: str) -> Any:
         return value(f"{loop.controller}.{name}")
 
-    saturation = of("saturation")
-    if saturation not in MAXIMUM_SLOPE:
-        raise InputError(
-            f"{loop.controller}.saturation = {saturation}: use one of {', '.join(MAXIMUM_SLOPE)}"
-        )
+    slope = MAXIMUM_SLOPE[_saturation(of("saturation"), f"{loop.controller}.saturation")]
     K1, K2 = (tuple(of(f"{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
     gains = Gains(K1=K1, K2=K2, lambda_=of("lambda"), k_d=of("k_d"), gamma=of("gamma"))
-    return theorem(vehicle(value, loop), value(loop.ell), gains, MAXIMUM_SLOPE[saturation])
+    return theorem(vehicle(value, loop), value(loop.ell), gains, slope)
+
+
+def _saturation(value: Value, name: str) -> Saturation:
+    """The saturation function that a parameter names, or has the number of.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    for one in Saturation:
+        if value in (one.value, one.name.lower()):
+            return one
+    known = ", ".join(one.name.lower() for one in Saturation)
+    raise InputError(f"{name} = {value}: use one of {known}")
 
 
 def gain_check(system: System) -> str:
@@ -100,7 +111,7 @@ def gain_check(system: System) -> str:
         if len(loops) > 1:
             lines += [f"{loop.name}:", ""]
         lines += [*stated(found), "", _NOTE, "", *_sampling(system, loop)]
-        if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE["tanh"]):
+        if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE[Saturation.TANH]):
             lines += ["", _PAPER]
         lines.append("")
     return "\n".join(lines[:-1])
@@ -204,7 +215,7 @@ def _rows(loop: Loop, start: Table, end: Table) -> Iterator[list[float]]:
     *K2_names, lambda_name, saturation = _gains(loop)
     ell, lambda_ = real_parameter(start, loop.ell), real_parameter(start, lambda_name)
     K2_x, K2_y, K2_z = (real_parameter(start, name) for name in K2_names)
-    s = Saturation[str(value_of(start, saturation)).upper()]
+    s = _saturation(value_of(start, saturation), str(saturation))
     lower, upper = limits(start, loop)
 
     y, dy = true_control_point(start, loop), start.group(*loop.dy)

@@ -22,8 +22,8 @@ class Saturation(IntEnum):
 #: Scales the arc tangent to the bound M = 1; its slope at 0.
 _SCALE = 2.0 / pi
 
-#: Largest slope s'_M of Lemma 1 of each, by the names users select them with.
-MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0, "arctan": _SCALE}
+#: Largest slope s'_M of Lemma 1 of each.
+MAXIMUM_SLOPE = {Saturation.TANH: 1.0, Saturation.ALGEBRAIC: 1.0, Saturation.ARCTAN: _SCALE}
 
 #: From here on 1 + xi^2 is xi^2 apart from rounding, and not much later too large for a float.
 _LARGE = 1e9

@@ -11,7 +11,7 @@ from auv_fmu.disturbance import Disturbance
 from auv_fmu.output_feedback import Gains
 from auv_fmu.pd import PdGains
 from auv_fmu.plant import Localisation, Parameters
-from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
+from auv_fmu.saturation import MAXIMUM_SLOPE
 
 QUIET = Parameters(noise=Localisation(std=0.0))
 
@@ -78,7 +78,7 @@ def test_closed_loop_of_any_saturation_function_converges(name):
 
     Near rest a gain counts s'_M times, so that ball is 1 / s'_M times as large.
     """
-    *_, last = closed_loop(3000, Setting(controller=Gains(s=Saturation[name.upper()]), plant=QUIET))
+    *_, last = closed_loop(3000, Setting(controller=Gains(s=name), plant=QUIET))
     assert np.abs(last.signals.e).max() < 0.1 / MAXIMUM_SLOPE[name]
 
 

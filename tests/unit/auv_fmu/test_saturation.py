@@ -22,20 +22,20 @@ SMALLEST = 1e-300
 
 def s(name, xi):
     """s_i(xi)."""
-    return saturation(Saturation[name.upper()], (xi, 0.0, 0.0))[0]
+    return saturation(name, (xi, 0.0, 0.0))[0]
 
 
 def slope(name, xi):
     """s_i'(xi)."""
     x = (xi, 0.0, 0.0)
-    return slopes_of(Saturation[name.upper()], x, saturation(Saturation[name.upper()], x))[0]
+    return slopes_of(name, x, saturation(name, x))[0]
 
 
 @every
 @given(xi=vectors(numbers, 3))
 def test_vectors_are_saturated_component_by_component(name, xi):
-    values = saturation(Saturation[name.upper()], xi)
-    slopes = slopes_of(Saturation[name.upper()], xi, values)
+    values = saturation(name, xi)
+    slopes = slopes_of(name, xi, values)
     assert values == tuple(s(name, xi_i) for xi_i in xi)
     assert slopes == tuple(slope(name, xi_i) for xi_i in xi)
 
@@ -63,7 +63,7 @@ def test_slope_is_the_derivative(name, xi):
 @given(xi=numbers, k=positive)
 def test_lemma_1_i_and_ii(name, xi, k):
     """The integral of s(k r) from 0 to xi is that of s from 0 to k xi, over k."""
-    area, s_M = integral(Saturation[name.upper()], k * xi) / k, MAXIMUM_SLOPE[name]
+    area, s_M = integral(name, k * xi) / k, MAXIMUM_SLOPE[name]
     slack = ROUNDING * (1 + abs(area))
     assert s(name, k * xi) ** 2 / (2 * k * s_M) <= area + slack
     assert area <= k * s_M * xi**2 / 2 + slack
@@ -80,7 +80,7 @@ def test_integral_is_the_area_under_the_function(name, xi):
     weights = np.ones(2001)
     weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
     area = weights @ [s(name, node) for node in nodes] * xi / 2000 / 3
-    assert integral(Saturation[name.upper()], xi) == pytest.approx(area, abs=1e-8)
+    assert integral(name, xi) == pytest.approx(area, abs=1e-8)
 
 
 @given(xi=st.floats(-20.0, 20.0))
@@ -106,7 +106,7 @@ def test_lemma_1_iv_to_vi(name, x, k, psi):
         assert s(name, xi) ** 2 <= s_M * xi * s(name, xi) * (1 + ROUNDING)
         # As printed (vi) has no square on s'_M; by (iv) it belongs there.
         assert s(name, xi) ** 2 <= s_M**2 * xi**2 * (1 + ROUNDING)
-    values = np.array(saturation(Saturation[name.upper()], x))
+    values = np.array(saturation(name, x))
     left = np.array(x) @ np.diag(psi) @ values
     assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
 

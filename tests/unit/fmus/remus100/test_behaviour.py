@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import pytest
+from fmus.remus100.behaviour import Inputs
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu.remus100 import Parameters
 from fmus.ports.port import Refusal
 from fmus.remus100 import behaviour
-from fmus.remus100.behaviour import Inputs
 from support.instances import ClassInstance
 
 STILL = Inputs((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
