@@ -19,7 +19,7 @@ from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from fmus.kinds import AUTO
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
@@ -41,6 +41,9 @@ from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen, values_
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
+
+#: The orders that it has; without one it takes the first.
+_ORDERS = GAUSS_SEIDEL, JACOBI
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
@@ -205,9 +208,9 @@ def _job(loop: _Loop, point: Point) -> _Job:
     changed = [system.component(name.component).variable(name.port) for name in changes]
     if any(variable.causality != "parameter" for variable in changed):
         system.check()
-    experiment = Experiment(point.stop_time, point.step, point.order)
-    if point.order not in ORDERS:
-        raise InputError(f"the batch engine has only the orders {' and '.join(ORDERS)}; {_OTHER}")
+    experiment = Experiment(point.stop_time, point.step, point.order or GAUSS_SEIDEL)
+    if experiment.order not in _ORDERS:
+        raise InputError(f"the batch engine has only the orders {' and '.join(_ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
     full, stop = experiment.full_steps, experiment.stop_time
@@ -229,7 +232,7 @@ def _job(loop: _Loop, point: Point) -> _Job:
         stop,
         parts,
         last_parts,
-        experiment.order != ORDERS[0],
+        experiment.order == JACOBI,
     )
     return _Job(loop, system, experiment, setting, run_steps)
 
