@@ -31,7 +31,7 @@ from auv_fmu.control_point import ELL
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.gain_conditions import at_least, coupling
-from auv_fmu.saturation import MAXIMUM_SLOPE
+from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.vehicle import Vehicle
 from fmus.discovery import components, source_of
 from fmus.documentation import component_page
@@ -201,7 +201,7 @@ class _WithoutNull(GenerateJsonSchema):
 @cache
 def of_the_paper() -> Theorem:
     """The theorem for section 4.1."""
-    return theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+    return theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
 
 
 def paper() -> dict[str, str]:
@@ -213,7 +213,7 @@ def paper() -> dict[str, str]:
     turning = vehicle.m55 / ELL**3
     skew = (vehicle.m66 / ELL**2 - vehicle.m11) / ELL
     of_theta = found.bounds.lambda_M2
-    slow = theorem(vehicle, ELL, Gains(lambda_=0.1), MAXIMUM_SLOPE["tanh"], 0.05)
+    slow = theorem(vehicle, ELL, Gains(lambda_=0.1), MAXIMUM_SLOPE[Saturation.TANH], 0.05)
 
     def radius(theta: float, eps_t: float) -> float:
         return ball(theta, eps_t, Gains().sigma)

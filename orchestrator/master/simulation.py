@@ -25,7 +25,7 @@ from orchestrator.master.plan import Plan
 from orchestrator.master.row import Overrides, Row
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import literal, same, unit_of
+from orchestrator.system.values import literal, named, same, unit_of
 
 
 # What overflows on its way is named as the value of a port.
@@ -171,7 +171,9 @@ def _parameters(
                     f"{name}.{port} was set to {literal(wanted[port])}, but the FMU holds "
                     f"{literal(held[port])}"
                 )
-        parameters |= {PortName(name, port): held[port] for port in own}
+        parameters |= {
+            PortName(name, port): named(component.variables[port], held[port]) for port in own
+        }
     return parameters
 
 

@@ -36,7 +36,7 @@ from orchestrator.studies.batch.support import setting_of, unsupported
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value
+from orchestrator.system.values import Value, named
 from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen, values_of
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
@@ -263,9 +263,10 @@ def _empty_rows(job: _Job) -> np.ndarray:
 def _table(job: _Job, rows: np.ndarray, failure: str | None = None) -> Table:
     """Rows of a run, in the columns that it has."""
     parameters = {
-        name: job.system.value(name)
+        name: named(variable, job.system.value(name))
         for component in job.system.components.values()
-        for name in (PortName(component.name, v.name) for v in component.having("parameter"))
+        for variable in component.having("parameter")
+        for name in (PortName(component.name, variable.name),)
     }
     there = job.loop.there
     header = Header(tuple(compress(job.loop.columns, there)), job.experiment, parameters)

@@ -263,6 +263,12 @@ def items_of(variable: ModelVariable) -> dict[str, str]:
     return {} if declared is None else {item.name: item.value for item in declared.items}
 
 
+def named(variable: ModelVariable, value: Any) -> Any:
+    """A value as a user writes it: that of an Enumeration by its name."""
+    names = (name for name, number in items_of(variable).items() if int(number) == value)
+    return next(names, value)
+
+
 def literal(value: Value) -> str:
     """A value as XML writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)

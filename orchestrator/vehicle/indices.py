@@ -17,7 +17,9 @@ import numpy as np
 from auv_fmu.quantities import POSITION, TAU, THETA, Members, member_name
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
+from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.system.values import named
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.reducers import (
     LAST_SECONDS,
@@ -360,12 +362,7 @@ class Metrics(Indices):
             "stop_time": self._end,
             "step": experiment.step,
             "order": experiment.order,
-            # What differs from the FMUs' own.
-            "parameters": {
-                str(name): value
-                for name, value in {**self._header.parameters, **system.parameters}.items()
-                if value != system.component(name.component).start(name.port)
-            },
+            "parameters": dict(_differing(system, self._header.parameters)),
         }
         if self._failure is not None:
             content["failure"] = self._failure
@@ -399,3 +396,13 @@ def metrics_of(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> Metrics:
     found.take(table.rows)
     found.end(table.ending)
     return found
+
+
+def _differing(system: System, held: Mapping[PortName, Any]) -> Iterator[tuple[str, Any]]:
+    """The parameters that are not as their FMU has them, in a user's words."""
+    for name, value in {**held, **system.parameters}.items():
+        component = system.component(name.component)
+        variable = component.variable(name.port)
+        shown, own = (named(variable, one) for one in (value, component.start(name.port)))
+        if shown != own:
+            yield str(name), shown

@@ -26,7 +26,6 @@ from orchestrator.master.observers.observer import Ending, Header, every
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value
 from orchestrator.vehicle.cautions import gain_of_a_step, values_of
 from orchestrator.vehicle.signals import (
     ACTUATORS,
@@ -83,7 +82,7 @@ def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
     return theorem(vehicle(value, loop), value(loop.ell), gains, slope)
 
 
-def _saturation(value: Value, name: str) -> Saturation:
+def _saturation(value: object, name: str) -> Saturation:
     """The saturation function that a parameter names, or has the number of.
 
     Raises:

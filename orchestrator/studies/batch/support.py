@@ -22,7 +22,6 @@ from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value
 from orchestrator.vehicle.signals import AXES, DIRECTIONS
 
 #: Where a value lies: fields, and places in tuples.
@@ -139,9 +138,7 @@ def _block(fmu: str) -> _Block:
     return _Block(ports, parameters.paths, parameters.of(starts), checked)
 
 
-def setting_of(
-    fmus: Mapping[str, str], parameters: Mapping[PortName, Value], step: float
-) -> Setting:
+def setting_of(fmus: Mapping[str, str], parameters: Mapping[PortName, Any], step: float) -> Setting:
     """The setting of the loop.
 
     Args:
