@@ -303,7 +303,9 @@ def _trace(library: Library, plan: Sequence[int]) -> list[Any]:
             straight: list[Any] = []
             _step(host, Random(seed + 1), straight.append)
             found += [*straight, *again[0]]
-            if repr(again[0]) != repr(again[1]) or repr(again[0][: len(straight)]) != repr(straight):
+            if repr(again[0]) != repr(again[1]) or repr(again[0][: len(straight)]) != repr(
+                straight
+            ):
                 found.append(("not restored", library.description.kind))
     return found
 
