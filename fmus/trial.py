@@ -44,13 +44,14 @@ def run(
     Args:
         module: of the component.
         parameters: by the names of their ports; others have their default values.
-        inputs: for each step, at its beginning; those that are not named keep their values.
+        inputs: of each time; those that are not named keep their values.
         stop_time: end of the run [s], or the nearest end of a step.
         step: length of a communication step [s].
         start_time: begin of the run [s].
 
     Returns:
-        The time, and each output by the name of its port: values at the start and after each step.
+        The time, and each output by the name of its port: values at the start, with these inputs,
+        and after each step, with those of its end.
 
     Raises:
         ValueError: there is no such port, or the times make no run.
@@ -70,12 +71,13 @@ def run(
     count = round((stop_time - start_time) / step)
     for k in range(count + 1):
         t = start_time + k * step
+        if k > 0:
+            one.set("input", given(t))
         result["time"].append(t)
         for port in outputs:
             result[port.name].append(one.get(port))
         if k < count:
-            one.set("input", given(t))
-            one.advance(t, step)
+            one.step(t, step)
     return result
 
 
@@ -88,7 +90,6 @@ class _Trial:
         self._slave.setup_experiment(start_time)
         self.ports = {port.name: port for port in self._slave._store.ports}
         self._references = {name: reference for reference, name in enumerate(self.ports)}
-        self._start_time = start_time
 
     def set(self, causality: str, values: Mapping[str, Any]) -> None:
         """Set ports of a causality, one by one or all of a vector."""
@@ -108,28 +109,21 @@ class _Trial:
 
     def get(self, port: Port) -> Any:
         """The value of an output."""
+        if not self._slave._fresh:
+            self._slave.renew_outputs()
         read = getattr(self._slave, f"get_{port.type.lower()}")
         [value] = read([self._references[port.name]])
         return value
 
     def begin(self) -> None:
         """Enter the run."""
-        slave = self._slave
-        slave.enter_initialization_mode()
-        slave.exit_initialization_mode()
-        if slave._untold:
-            # Once more, past what turns an exception into a message.
-            slave._meaning(slave._store.parameters)
-            slave.begin(slave._unpack(slave._store.inputs), self._start_time)
-        self._refuse()
+        self._slave.enter_initialization_mode()
+        self._slave.begin()
+        self._slave.exit_initialization_mode()
 
-    def advance(self, t: float, h: float) -> None:
+    def step(self, t: float, h: float) -> None:
         """Take a step."""
-        slave = self._slave
-        if not slave.do_step(t, h):
-            n = slave._internal_steps(t, h)
-            slave.advance(slave._state, slave._unpack(slave._store.inputs), t, h / n, n)
-            self._refuse()
+        self._slave.step(t, h)
 
     def _refuse(self) -> None:
         """Raise what the component has logged, if it has refused something."""

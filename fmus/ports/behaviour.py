@@ -200,7 +200,9 @@ class Behaviour(NamedTuple):
     def takes(self, name: str, argument: str) -> bool:
         """Whether a hook takes an argument, or what it takes is made of it."""
         taken = {*self.arguments(name)}
-        if name in ("outputs", "update"):
+        if name == "outputs" and "parameters" in self.arguments("measured"):
+            taken.add("parameters")
+        if name in ("outputs", "update", "derive"):
             if "derived" in taken:
                 taken |= {*self.arguments("derive")}
             if "state" in taken:

@@ -48,6 +48,7 @@ class Store:
         ports: of the component, `fault` last.
         inputs, outputs: values of all but `fault`.
         input_references, output_references: of them, in the order of their values.
+        all_outputs: the references of all outputs but `fault`.
         real_outputs: the references of the Reals among them.
         free_inputs: the references of the Real inputs, if none of them has a range; else None.
         only_inputs, only_outputs: these, if there are no others; else None.
@@ -62,6 +63,7 @@ class Store:
         references.sort(key=lambda reference: ports[reference].type != "Real")
         self.input_references = [r for r in references if ports[r].causality == "input"]
         self.output_references = [r for r in references if ports[r].causality == "output"]
+        self.all_outputs = frozenset(self.output_references)
         real_inputs = [r for r in self.input_references if ports[r].type == "Real"]
         limits = [limit for r in real_inputs for limit in (ports[r].minimum, ports[r].maximum)]
         self.free_inputs = real_inputs if all(limit is None for limit in limits) else None
@@ -90,6 +92,16 @@ class Store:
     def no_outputs(self) -> list[Value]:
         """The outputs where there is no state."""
         return [MISSING[self.ports[reference].type] for reference in self.output_references]
+
+    def check_outputs(self, values: Sequence[Value]) -> None:
+        """Refuse outputs that are not finite.
+
+        Raises:
+            Refusal: one of them is not.
+
+        """
+        for reference, value in zip(self.output_references, values):
+            self.ports[reference].sound(value)
 
     def place(self, reference: int) -> int:
         """Where the value of an input or an output lies."""
@@ -138,8 +150,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**kwargs)
         self._store = Store(self.ports)
         self._mode = INSTANTIATED
-        #: Whether a value has changed that state and outputs at the start time depend on.
+        #: Whether a value has changed that the state at the start time depends on.
         self._stale = False
+        #: Whether the outputs are up to date: nothing has changed that they depend on.
+        self._fresh = True
         self._said: set[str] = set()
         self._has_loader = has_loader(self.resources)
         #: What no answer has told, where there is no loader.
@@ -147,16 +161,20 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     @abstractmethod
     def _refresh(self) -> str:
-        """Compute state and outputs at the start time, if a value they depend on has changed.
+        """Bring the outputs up to date, and before a run the state at the start time, too.
 
         Returns:
-            Why there are none; empty: there are.
+            Why that cannot be; empty: they are.
 
         """
 
     @abstractmethod
     def _retune(self, parameters: dict[str, Value]) -> None:
-        """Let parameters act from the next step; raise what speaks against them."""
+        """Let parameters act from now on; raise what speaks against them."""
+
+    @abstractmethod
+    def _forget(self, what: str) -> None:
+        """Discard what has been computed of `inputs` or `parameters`, which have changed."""
 
     # Refusals and messages
 
@@ -198,7 +216,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def get_real(self, vrs: list[int]) -> list[Any]:
         store = self._store
-        if self._stale:
+        if not self._fresh:
             self._refresh_outputs(vrs)
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
         if vrs == store.only_outputs:
@@ -206,13 +224,13 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         return store.outputs[: len(vrs)] if vrs == store.real_outputs else self._get(vrs, "Real")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        if self._stale:
+        if not self._fresh:
             self._refresh_outputs(vrs)
         return self._get(vrs, "Integer")
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         store = self._store
-        if self._stale:
+        if not self._fresh:
             self._refresh_outputs(vrs)
         return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
 
@@ -224,8 +242,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         # A sum is finite only if every value is; _set finds out which one was not.
         if vrs == store.only_inputs and self._mode == STEPPING and isfinite(sum(values)):
             store.inputs = values
+            self._forget("inputs")
         elif vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
             store.inputs = [*values, *store.inputs[len(values) :]]
+            self._forget("inputs")
         else:
             self._set(vrs, values, "Real")
 
@@ -239,7 +259,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._set(vrs, values, "String")
 
     def _refresh_outputs(self, vrs: list[int]) -> None:
-        if not set(self._store.output_references).isdisjoint(vrs):
+        if not self._store.all_outputs.isdisjoint(vrs):
             why = self._refresh()
             if why:
                 self._answer(Fmi2Status.error, why)
@@ -271,8 +291,6 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
             self._store.fault = True
             self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, describe_error(error))
-        else:
-            self._stale = self._stale or self._mode == INITIALISING
 
     def _take(self, ports: list[Port], vrs: list[int], values: Sequence[Value]) -> None:
         store = self._store
@@ -289,9 +307,14 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 inputs[store.place(reference)] = float(value) if port.type == "Real" else value
             else:
                 parameters = {**parameters, port.name: value}
-        if parameters is not store.parameters and self._mode == STEPPING:
-            self._retune(parameters)
-        store.inputs, store.parameters = inputs, parameters
+        if parameters is not store.parameters:
+            if self._mode == STEPPING:
+                self._retune(parameters)
+            store.parameters = parameters
+            self._forget("parameters")
+        if any(port.causality == "input" for port in ports):
+            store.inputs = inputs
+            self._forget("inputs")
 
 
 def describe_error(error: BaseException) -> str:

@@ -1,120 +1,122 @@
-"""The slave of a component, made from its ports and its behaviour.
+"""The slave of a component, made from its definition.
 
 Its methods are written out and compiled, because they run once a step: `advance` of a component
-that derives something of its state and may restart becomes
+that derives something of its state, may restart, and splits its steps becomes
 
-    def advance(self, state, inputs, t, h, n):
-        derived = self._derived
+    def advance(self, state, derived, inputs, t, h, n):
         if not credible(self.parameters, state, inputs):
             self.say(RESTARTED.format(t=t), warning, RESTARTED)
             state = restarted(self.parameters, state, inputs)
+        for i in range(n):
+            if derived is None:
+                derived = derive(self.parameters, state, inputs)
+            state = update(self.parameters, state, derived, inputs, t + i * h, h)
             derived = None
-        if derived is None:
-            derived = derive(self.parameters, state)
-        state, self._next, outputs = advance(self.parameters, state, derived, inputs, h)
-        return state, outputs
+        return state, derived
 
 and the method of a simpler one is shorter by what it lacks.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from functools import cache
 from math import isfinite
-from random import Random
-from types import ModuleType, new_class
+from types import ModuleType
 from typing import Any
 
+from pythonfmu import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
 from fmus.ports.behaviour import HOOKS, Behaviour
-from fmus.ports.definition import define
-from fmus.ports.groups import SCOPE, Nothing, gathered, hints_of, reals_first, scattered
-from fmus.ports.port import Port, Refusal
-from auv_fmu.quantities import group_name
-from fmus.python.component import Component, Inputs, Outputs, Parameters, State
-
-#: Numbers that are drawn between two notes of a generator's state.
-_MOST_DRAWN = 1_000
-
-
-class Noisy(Component[State, Inputs, Outputs, Parameters]):
-    """A component one of whose outputs has noise, which Python's generator makes.
-
-    To note the generator's state takes as long as a step. So it is noted once in many steps, and
-    what was drawn since then is counted, to be drawn again where a step is refused.
-    """
-
-    _draws: int  #: in each sample
-    _random: Random
-    _noted: Any  #: of its state
-    _drawn: int  #: since then
-
-    def _use(self, generator: Random) -> None:
-        self._random, self._noted, self._drawn = generator, generator.getstate(), 0
-
-    def unsample(self) -> None:
-        self._drawn -= self._draws
-        self._random.setstate(self._noted)
-        for _ in range(self._drawn):
-            self._random.gauss(0.0, 1.0)
-
-    def hidden_state(self) -> Any:
-        return self._random.getstate() if self._state is not None else None
-
-    def restore_hidden_state(self, hidden: Any) -> None:
-        generator = Random()
-        generator.setstate(hidden)
-        # Some of what setstate takes it changes in silence, or only gauss finds out about.
-        *_, following = hidden
-        if generator.getstate() != hidden or type(following) not in (float, type(None)):
-            raise Refusal("its noise generator has an invalid state")
-        if not isfinite(following or 0.0):
-            raise Refusal("its noise is not finite")
-        self._use(generator)
+from fmus.ports.definition import Definition, define
+from fmus.ports.groups import (
+    SCOPE,
+    Nothing,
+    gathered,
+    hints_of,
+    packing,
+    reals_first,
+    scattered,
+    unpacking,
+)
+from fmus.ports.port import Refusal
+from fmus.python.component import Component
+from fmus.python.state import measuring
 
 
 @cache
-def slave_of(name: str, *modules: ModuleType) -> type[Component[Any, Any, Any, Any]]:
+def slave_of(name: str, module: ModuleType) -> type[Component]:
     """The class of a component, the same each time: an FMU's script asks once an instance.
 
     Args:
         name: of the component.
-        modules: that define it.
+        module: that says it all.
 
     Raises:
-        TypeError: they do not go together.
+        Misdeclared: it is no component.
 
     """
-    definition = define(name, *modules)
+    definition = define(name, module)
     said = definition.behaviour
-    outputs = [port for port in definition.ports if port.causality == "output"]
+    inputs = [port for port in definition.ports if port.causality == "input"]
     members: dict[str, Any] = {
-        "__module__": modules[0].__package__ or modules[0].__name__,
+        "__module__": module.__package__ or module.__name__,
         "__doc__": definition.summary,
         **definition.about,
         "description": definition.description,
+        "default_experiment": DefaultExperiment(0.0, said.stop, said.step),
+        "definition": definition,
+        "behaviour": said,
         "ports": definition.ports,
-        "parameter_set": definition.parameters,
-        "group_of": definition.group_of,
-        "_draws": said.draws,
+        "outputs_of": _made_of(said, "outputs"),
+        "derived_of": _made_of(said, "derive"),
+        "is_prompt": not said.is_sampled and not said.takes("outputs", "inputs"),
+        "unpack": staticmethod(unpacking(said.inputs, inputs)),
+        "norm": staticmethod(measuring(said.state)),
     }
     scope: dict[str, Any] = {
         **SCOPE,
         **said.hooks,
-        "Random": Random,
+        "pack": packing(said.outputs),
+        "isfinite": isfinite,
         "nothing": Nothing(),
+        "Refusal": Refusal,
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
     }
-    for method in (*_steps(said), *_checks(said), *_noise(said, outputs, scope)):
+    methods = [
+        *(_method(hook, HOOKS[hook], _plain(said, hook)) for hook in _PLAIN if said.hooks[hook]),
+        _method("evaluate", _EVALUATE, _evaluate(definition, scope)),
+        _method("advance", _ADVANCE, _advance(said)),
+    ]
+    if said.hooks["start"] is None:
+        methods.append(_method("start", HOOKS["start"], ["return nothing"]))
+    for method in methods:
         exec(method, scope, members)
-    base: Any = Noisy if said.noisy else Component
-    types = (said.state, said.inputs, said.outputs, said.parameters)
-    made: type[Component[Any, Any, Any, Any]]
-    made = new_class(name, (base[types],), {}, lambda namespace: namespace.update(members))
+    made = type(name, (Component,), members)
+    # PythonFMU looks methods up by names that miss Python's cache: the first class has them.
+    for method in ("do_step", "get_real", "set_real", "get_boolean"):
+        setattr(made, method, getattr(made, method))
     return made
+
+
+#: Hooks that a method does nothing but call.
+_PLAIN = ("start", "check", "check_state", "seed")
+
+_EVALUATE = ("state", "derived", "inputs", "t", "draws")
+_ADVANCE = ("state", "derived", "inputs", "t", "h", "n")
+
+
+def _made_of(said: Behaviour, hook: str) -> frozenset[str]:
+    """What a hook's result changes with."""
+    known = ("inputs", "parameters", "t", "state")
+    return frozenset(argument for argument in known if said.takes(hook, argument))
+
+
+def _method(name: str, arguments: tuple[str, ...], lines: Iterator[str] | list[str]) -> str:
+    """The text of a method."""
+    return "\n    ".join([f"def {name}({', '.join(('self', *arguments))}):", *lines])
 
 
 def _call(said: Behaviour, hook: str, **given: str) -> str:
@@ -123,62 +125,64 @@ def _call(said: Behaviour, hook: str, **given: str) -> str:
     return f"{hook}({', '.join(given.get(name, name) for name in said.arguments(hook))})"
 
 
-def _steps(said: Behaviour) -> Iterator[str]:
-    """How a run begins and goes on."""
-    begin, advance = ["def begin(self, inputs, t):"], ["def advance(self, state, inputs, t, h, n):"]
-    if said.noisy:
-        # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
-        begin += [f"    self._use(Random({_call(said, 'seed')} % 2**32))"]
-    derives = said.hooks["derive"] is not None
-    if derives:
-        advance += ["    derived = self._derived"]
+def _plain(said: Behaviour, hook: str) -> Iterator[str]:
+    yield f"return {_call(said, hook, parameters='parameters')}"
+
+
+def _guard(said: Behaviour, *lines: str) -> Iterator[str]:
+    """How a run goes on from another state; the lines are executed where it does."""
     if said.hooks["credible"]:
-        advance += [
-            f"    if not {_call(said, 'credible')}:",
-            "        self.say(RESTARTED.format(t=t), warning, RESTARTED)",
-            f"        state = {_call(said, 'restarted')}",
-            *(["        derived = None"] if derives else []),
-        ]
-    if derives:
-        advance += ["    if derived is None:", f"        derived = {_call(said, 'derive')}"]
-    for lines, hook in ((begin, "begin"), (advance, "advance")):
-        if derives:
-            lines += [
-                f"    state, self._next, outputs = {_call(said, hook)}",
-                "    return state, outputs",
-            ]
-        else:
-            state = "nothing, " if said.is_stateless else ""
-            lines += [f"    return {state}{_call(said, hook)}"]
-        yield "\n".join(lines)
+        yield f"if not {_call(said, 'credible')}:"
+        yield from (f"    {line}" for line in (*lines, f"state = {_call(said, 'restarted')}"))
 
 
-def _checks(said: Behaviour) -> Iterator[str]:
-    """What is asked of parameters, and of a state that is restored."""
-    for hook in ("check", "expected"):
-        if said.hooks[hook]:
-            arguments = ", ".join(HOOKS[hook])
-            call = _call(said, hook, parameters="parameters")
-            yield f"def {hook}(self, {arguments}):\n    return {call}"
+def _derive(said: Behaviour, hook: str, t: str) -> Iterator[str]:
+    """How what a hook needs is derived, once."""
+    if "derived" in said.arguments(hook):
+        yield f"if derived is None: derived = {_call(said, 'derive', t=t)}"
 
 
-def _noise(said: Behaviour, outputs: Sequence[Port], scope: dict[str, Any]) -> Iterator[str]:
-    """How an output gets its noise; the names that it needs are put into the scope."""
-    if said.hooks["measured"] is None:
-        return
-    order = reals_first(outputs)
-    noisy = [port for port in outputs if group_name(port.name) == said.noisy]
-    values = [f"values[{order.index(port)}]" for port in noisy]
+def _advance(said: Behaviour) -> Iterator[str]:
+    """How a run goes on."""
+    yield from _guard(said, "self.say(RESTARTED.format(t=t), warning, RESTARTED)")
+    t, indent = "t", ""
+    if said.h_max is not None:
+        yield "for i in range(n):"
+        t, indent = "t + i * h", "    "
+    if said.hooks["update"]:
+        for line in _derive(said, "update", t):
+            yield indent + line
+        yield f"{indent}state = {_call(said, 'update', t=t)}"
+    if _made_of(said, "derive") & {"state", "t"}:
+        yield f"{indent}derived = None"
+    yield "return state, derived"
+
+
+def _evaluate(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
+    """How outputs are evaluated; the names that it needs are put into the scope."""
+    said = definition.behaviour
+    yield from _guard(said)
+    yield from _derive(said, "outputs", "t")
+    yield f"values = pack({_call(said, 'outputs')})"
+    # What is finite may still be too large to be added up.
+    yield "if not isfinite(sum(values)): self._store.check_outputs(values)"
+    if said.noisy:
+        yield from _measure(definition, scope)
+    yield "return derived, values"
+
+
+def _measure(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
+    """How an output gets its noise."""
+    said = definition.behaviour
+    order = [p.name for p in reals_first(definition.ports) if p.causality == "output"]
+    values = [f"values[{order.index(name)}]" for name in definition.noisy]
     hint = hints_of(said.outputs)[said.noisy]
-    drawn = iter(["gauss(0.0, 1.0)"] * said.draws)
+    drawn = iter([f"draws[{i}]" for i in range(said.draws)])
     n = gathered(hints_of(said.hooks["measured"])["n"], drawn, scope)
     before = gathered(hint, iter(values), scope)
     flat = ", ".join(text for text, _ in scattered(hint, "noisy"))
     after = "noisy" if flat == "*noisy" else f"({flat},)"
-    yield (
-        "def sample(self, values):\n"
-        f"    if self._drawn >= {_MOST_DRAWN}:\n        self._use(self._random)\n"
-        f"    self._drawn += {said.draws}\n    gauss = self._random.gauss\n"
-        f"    noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}\n"
-        f"    {', '.join(values)}, = noisy = {after}\n    return noisy"
-    )
+    yield f"noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}"
+    yield f"{', '.join(values)}, = noisy = {after}"
+    yield "if not isfinite(sum(noisy)) and not all(map(isfinite, noisy)):"
+    yield "    raise Refusal('a sampled output is not finite')"

@@ -1,7 +1,7 @@
 """The state of an FMU: complete, exact, in memory and as bytes, and checked before it is taken.
 
-The state of a component is a NamedTuple of numbers, truth values, text, tuples and NamedTuples, any
-of which may be optional. What is of another type is left as it is.
+The state of a component is a NamedTuple of numbers, truth values, members of enumerations, and of
+tuples, vectors, matrices and NamedTuples of them.
 """
 
 from __future__ import annotations
@@ -11,23 +11,20 @@ import sys
 from binascii import crc32
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from functools import partial
 from itertools import count
-from math import hypot, isclose
-from typing import Any, Callable, TypedDict, Union, get_args, get_origin
+from math import hypot, inf
+from types import GenericAlias
+from typing import Any, Callable, TypedDict
 
+from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import class_of, is_class, parts_of, whole
 from fmus.ports.port import Refusal, Value, is_int32
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
-
-_SCALARS = (float, int, bool, str, type(None))
+from fmus.python.noise import LARGEST_NORMAL
 
 #: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
 #: reported, so they are refused when they are set.
 _UNUSABLE = "unusable"
-
-#: How far results from the same numbers may differ between two machines.
-_ROUNDING = 1e-9
 
 #: Key of the checksum in the bytes of a state.
 _CHECKSUM = "checksum"
@@ -40,7 +37,7 @@ def measuring(hint: type) -> Callable[[Any], float]:
     integer that an FMU in C has no room for, and Refusal for one that its enumeration lacks.
     """
     names, floats, integers = (f"x{i}" for i in count()), [], []
-    scope: dict[str, Any] = {"hypot": hypot, "norm": _norm, "whole": whole, "member": _member}
+    scope: dict[str, Any] = {"hypot": hypot, "whole": whole, "member": _member}
 
     def target(hint: Any) -> str:
         hints = parts_of(hint)
@@ -55,8 +52,6 @@ def measuring(hint: type) -> Callable[[Any], float]:
             kind = f"kind{len(scope)}"
             scope[kind] = hint
             integers.append(f"member({name}, {kind}); ")
-        elif hint not in _SCALARS:
-            floats.append(f"norm({name})")
         return name
 
     pattern = target(hint)
@@ -72,12 +67,6 @@ def _member(value: int, kind: type[IntEnum]) -> IntEnum:
     if member is None:
         raise Refusal(f"{_shown(int(value))} is not of type {kind.__name__}")
     return member  # type: ignore[return-value]
-
-
-def _norm(value: Any) -> float:
-    if isinstance(value, (list, tuple)):
-        return hypot(*map(_norm, value))
-    return value if isinstance(value, float) else 0.0
 
 
 def restored(hint: Any, value: Any) -> Any:
@@ -98,8 +87,6 @@ def restored(hint: Any, value: Any) -> Any:
             raise Refusal(f"{_shown(value)} instead of {len(hints)} values")
         made = [*map(restored, hints, value)]
         return tuple.__new__(hint if is_class(hint, tuple) else tuple, made)
-    if _is_union(hint):
-        return _as_one_of(get_args(hint), value)
     if hint is float and type(value) in (float, int):
         if not abs(value) <= sys.float_info.max:
             raise Refusal("a value is not finite")
@@ -111,31 +98,11 @@ def restored(hint: Any, value: Any) -> Any:
     if hint is int and isinstance(value, int):
         # A bool, or a member of an enumeration, is an int.
         value = int(value)
-    if hint in _SCALARS and type(value) is not hint:
+    if type(value) is not hint:
         raise Refusal(f"{_shown(value)} is not of type {hint.__name__}")
     if hint is int and not is_int32(value):
         raise Refusal("an integer exceeds 32 bits")
-    return frozen(value)
-
-
-def _is_union(hint: Any) -> bool:
-    """Whether a type is `Union[A, B]`, `Optional[A]` or, from Python 3.10, `A | B`."""
-    return get_origin(hint) is Union or type(hint).__name__ == "UnionType"
-
-
-def _as_one_of(hints: tuple[Any, ...], value: Any) -> Any:
-    refusals = []
-    for hint in hints:
-        try:
-            return restored(hint, value)
-        except Refusal as refusal:
-            refusals.append(str(refusal))
-    raise Refusal(", ".join(refusals))
-
-
-def frozen(value: Any) -> Any:
-    """Lists, as JSON gives them, back to the tuples that states are made of."""
-    return tuple(map(frozen, value)) if isinstance(value, (list, tuple)) else value
+    return value
 
 
 def _shown(value: Any) -> str:
@@ -148,15 +115,18 @@ class Snapshot(TypedDict):
     identity: str  #: class and version that it is a state of
     mode: str
     start_time: float
+    time: float
     parameters: dict[str, Value]
     inputs: list[Value]
-    outputs: list[Value]
+    outputs: list[Value]  #: of a sampled component; others follow from what is here
+    fresh: bool  #: whether these are up to date
     state: Any  #: NamedTuple of the component, None before the initialisation
-    hidden: Any  #: what the component keeps outside its state
+    draws: tuple[float, ...]  #: what the noise of the outputs is made of
+    generator: Any  #: state of the generator of the noise, None without one
     fault: bool
 
 
-def unusable(why: str) -> dict[str, Any]:
+def _unusable(why: str) -> dict[str, Any]:
     """A stand-in for a state that cannot be had."""
     return {_UNUSABLE: why}
 
@@ -166,7 +136,7 @@ def to_bytes(snapshot: Mapping[str, Any]) -> bytes:
     try:
         return _text({**snapshot, _CHECKSUM: _checksum(snapshot)})
     except (TypeError, ValueError, RecursionError) as error:
-        return _text(unusable(f"it is not fit for JSON: {error}"))
+        return _text(_unusable(f"it is not fit for JSON: {error}"))
 
 
 def from_bytes(content: bytes) -> dict[str, Any]:
@@ -174,12 +144,12 @@ def from_bytes(content: bytes) -> dict[str, Any]:
     try:
         saved = json.loads(content)
         if not isinstance(saved, dict):
-            return unusable("the bytes are not a state")
+            return _unusable("the bytes are not a state")
         checksum = saved.pop(_CHECKSUM, None)
         if _UNUSABLE not in saved and checksum != _checksum(saved):
-            return unusable("the bytes were changed since they were written")
+            return _unusable("the bytes were changed since they were written")
     except (ValueError, RecursionError):
-        return unusable("the bytes are not a state")
+        return _unusable("the bytes are not a state")
     return saved
 
 
@@ -191,14 +161,14 @@ def _checksum(snapshot: Mapping[str, Any]) -> int:
     return crc32(_text(snapshot))
 
 
-def checked(saved: Mapping[str, Any], identity: str, store: Store, hint: type) -> Snapshot:
+def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behaviour) -> Snapshot:
     """A copy of a saved state, if it can be one of this component.
 
     Args:
         saved: in memory, or from bytes.
         identity: of the component.
         store: of an instance of it.
-        hint: of the type of its state.
+        said: how it runs.
 
     Raises:
         Refusal: it belongs to another component or version, or no run can have led to it.
@@ -210,12 +180,13 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, hint: type) -
         raise Refusal(f"not a state of {identity}")
     if saved.keys() != Snapshot.__annotations__.keys():
         raise Refusal("it has missing or unknown parts")
-    mode, state = saved["mode"], saved["state"]
+    mode, state, time = saved["mode"], saved["state"], saved["time"]
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
-    if not isinstance(saved["fault"], bool):
-        raise Refusal("its fault is neither true nor false")
-    outputs = _values(store, store.output_references, saved["outputs"])
+    for truth in ("fresh", "fault"):
+        if not isinstance(saved[truth], bool):
+            raise Refusal(f"its {truth} is neither true nor false")
+    outputs = _values(store, store.output_references if said.is_sampled else [], saved["outputs"])
     if mode == INSTANTIATED and state is not None:
         raise Refusal("it has a state before the initialisation")
     if state is None and (mode == STEPPING or any(outputs)):
@@ -228,13 +199,29 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, hint: type) -
         identity=identity,
         mode=mode,
         start_time=restored(float, saved["start_time"]),
+        # A time that is finite may have a step to one that is not.
+        time=time if time in (inf, -inf) else restored(float, time),
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=outputs,
-        state=None if state is None else restored(hint, state),
-        hidden=frozen(saved["hidden"]),
+        fresh=saved["fresh"] and said.is_sampled,
+        state=None if state is None else restored(said.state, state),
+        draws=_draws(saved["draws"], 0 if state is None else said.draws),
+        generator=_frozen(saved["generator"]),
         fault=saved["fault"],
     )
+
+
+def _draws(values: Any, count: int) -> tuple[float, ...]:
+    draws: tuple[float, ...] = restored(GenericAlias(tuple, (float,) * count), values)
+    if any(abs(draw) > LARGEST_NORMAL for draw in draws):
+        raise Refusal(f"its noise exceeds {LARGEST_NORMAL:g}")
+    return draws
+
+
+def _frozen(value: Any) -> Any:
+    """Lists, as JSON gives them, back to the tuples that a generator's state is made of."""
+    return tuple(map(_frozen, value)) if isinstance(value, (list, tuple)) else value
 
 
 def _values(store: Store, references: Sequence[int], values: Any) -> list[Value]:
@@ -245,8 +232,3 @@ def _values(store: Store, references: Sequence[int], values: Any) -> list[Value]
         # An output is in no range: no step looks at one.
         port.sound(value) if port.causality == "output" else port.checked(value)
     return [*values]
-
-
-def nearly_equal(one: Sequence[float], other: Sequence[float]) -> bool:
-    """Whether two lists of values differ by no more than what another machine's sine may."""
-    return all(map(partial(isclose, rel_tol=_ROUNDING, abs_tol=_ROUNDING), one, other))

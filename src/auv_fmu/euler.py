@@ -23,6 +23,9 @@ LARGEST_STATE = 1e100
 #: More internal steps than this in one step are taken for a mistake: in Python they take seconds.
 MOST_INTERNAL_STEPS = 100_000
 
+#: From this number of steps on a float does not tell a step from the next.
+MOST_COUNTED = 2.0**53
+
 
 def longest_step(h_max: float) -> float:
     """The longest step that is not split [s].
@@ -43,6 +46,21 @@ def internal_steps(h: float, longest: float) -> int:
 
     """
     return ceil(h / longest)
+
+
+def end_of_step(start: float, t: float, h: float) -> float:
+    """The end of a step: that of a host that counts them, where its beginning is.
+
+    Args:
+        start: of the run [s].
+        t: beginning of the step [s].
+        h: length of the step, more than 0 [s].
+
+    """
+    k = (t - start) / h
+    if abs(k) < MOST_COUNTED and t == start + round(k) * h:
+        return start + (round(k) + 1) * h
+    return t + h
 
 
 def advance_4(x: Vector4, dx: Vector4, h: float) -> Vector4:

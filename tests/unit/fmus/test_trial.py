@@ -39,6 +39,15 @@ def test_inputs_are_held_or_follow_the_time(lag):
     assert late["x"][3] == held["x"][1]
 
 
+def test_outputs_are_those_of_the_inputs_of_their_time(lag):
+    own = lag(
+        ("def outputs(state: State)", "def outputs(state: State, inputs: Inputs, t: float)"),
+        ("return Outputs(state.x)", "return Outputs(inputs.u + 100.0 * t + 0.0 * state.x)"),
+    )
+    result = run(own, {}, lambda t: {"u": t * t}, **ONCE)
+    assert result["x"] == [t * t + 100.0 * t for t in result["time"]]
+
+
 def test_the_run_may_begin_later(lag):
     result = run(lag(), stop_time=3.0, step=0.5, start_time=2.0)
     assert result["time"] == [2.0, 2.5, 3.0]
@@ -89,12 +98,15 @@ def test_too_few_elements_are_refused(lag):
         run(lag(*VECTOR), {}, {"u": (1.0,)}, **ONCE)
 
 
-@pytest.mark.parametrize("place", ["x = state.x", "return State(parameters.x0)"])
+@pytest.mark.parametrize("place", ["Outputs(state.x)", "State(parameters.x0)", "State(state.x - "])
 def test_what_a_component_raises_goes_on_to_the_caller(lag, place):
     own = lag((place, place.replace("state.x", "[][1]").replace("parameters.x0", "[][1]")))
     with pytest.raises(IndexError) as caught:
         run(own, **ONCE)
     assert caught.traceback[-1].path.name == "own_lag.py"
+
+
+STEP = "    return State(state.x - (inputs.u - state.x) * expm1(-h / parameters.T))"
 
 
 def test_a_debugger_stops_in_each_step_and_sees_the_values(lag):
@@ -108,6 +120,6 @@ def test_a_debugger_stops_in_each_step_and_sees_the_values(lag):
 
     lines = Path(own.__file__).read_text().splitlines()
     debugger = Debugger()
-    debugger.set_break(own.__file__, 1 + lines.index("    return State(x), Outputs(x)"))
+    debugger.set_break(own.__file__, 1 + lines.index(STEP))
     result = debugger.runcall(run, own, **ONCE)
     assert seen == [(x, 0.25) for x in result["x"][:-1]]
