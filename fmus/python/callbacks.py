@@ -37,6 +37,10 @@ MOST_MESSAGES = 100
 LONGEST_MESSAGE = 500
 
 
+class Illegal(Refusal):
+    """A value that the standard does not let a port be set to, now or ever."""
+
+
 class Store:
     """Values of all ports.
 
@@ -286,6 +290,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             return
         try:
             self._take(ports, vrs, values)
+        except Illegal as refusal:
+            self._fail(str(refusal))
         except BaseException as error:
             # A run with another parameter than the host asked for must not begin.
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
@@ -297,10 +303,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         inputs, parameters = list(store.inputs), store.parameters
         for port, reference, value in zip(ports, vrs, values):
             if port.causality == "output":
-                raise Refusal(f"{port.name} is an output and cannot be set")
+                raise Illegal(f"{port.name} is an output and cannot be set")
             if port.variability == "fixed" and self._mode == STEPPING:
                 if value != parameters[port.name]:
-                    raise Refusal(f"{port.name} is fixed and cannot change after initialisation")
+                    raise Illegal(f"{port.name} is fixed and cannot change after initialisation")
                 continue
             port.checked(value)
             if port.causality == "input":

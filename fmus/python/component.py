@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from random import Random
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
@@ -24,6 +24,7 @@ from auv_fmu.euler import (
     MOST_INTERNAL_STEPS,
     end_of_step,
     internal_steps,
+    latest_end,
     longest_step,
 )
 from fmus.ports.behaviour import Behaviour
@@ -99,8 +100,9 @@ class Component(Callbacks):
         self._derived: Any = None
         self._noise: Noise | None = None
         self._draws: tuple[float, ...] = ()
-        self._start_time = self._time = 0.0
         self._longest_step = 0.0
+        self._set_experiment(0.0, inf)
+        self._time = 0.0
 
     # Experiment
 
@@ -109,9 +111,15 @@ class Component(Callbacks):
     ) -> None:
         if self._follows("fmi2SetupExperiment", INSTANTIATED):
             if isfinite(start_time):
-                self._start_time = self._time = start_time
+                is_later = stop_time is not None and stop_time > start_time
+                self._set_experiment(start_time, stop_time if is_later else inf)
+                self._time = start_time
             else:
                 self._fail(f"start time {start_time}: must be finite")
+
+    def _set_experiment(self, start_time: float, stop_time: float) -> None:
+        self._start_time, self._stop_time = start_time, stop_time
+        self._latest_end = latest_end(start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
         if self._follows("fmi2EnterInitializationMode", INSTANTIATED):
@@ -205,6 +213,13 @@ class Component(Callbacks):
     def do_step(self, current_time: float, step_size: float) -> bool:
         if self._mode != STEPPING:
             return self._follows("fmi2DoStep", STEPPING)
+        end = current_time + step_size
+        if end > self._latest_end:
+            self._fail(
+                f"step from {current_time:g} s to {end:g} s: "
+                f"the stop time is {self._stop_time:g} s"
+            )
+            return False
         try:
             if self._untold:
                 raise Refusal(self._untold)
@@ -278,6 +293,7 @@ class Component(Callbacks):
             identity=self._identity(),
             mode=self._mode,
             start_time=self._start_time,
+            stop_time=self._stop_time,
             time=self._time,
             parameters=dict(store.parameters),
             inputs=list(store.inputs),
@@ -315,11 +331,8 @@ class Component(Callbacks):
         store.inputs, store.fault = wanted["inputs"], wanted["fault"]
         store.outputs = wanted["outputs"] or store.no_outputs()
         self._untold = ""
-        self._mode, self._start_time, self._time = (
-            wanted["mode"],
-            wanted["start_time"],
-            wanted["time"],
-        )
+        self._set_experiment(wanted["start_time"], wanted["stop_time"])
+        self._mode, self._time = wanted["mode"], wanted["time"]
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
         self._fresh = not self._stale and (self._state is None or wanted["fresh"])

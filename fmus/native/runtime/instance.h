@@ -87,8 +87,6 @@ typedef struct {
     uint32_t words[GENERATOR_WORDS];
 } generator;
 
-typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
-
 /* A communication point. */
 typedef struct {
     double time;
@@ -101,7 +99,7 @@ typedef struct {
 /* Everything that the rest of a run depends on. */
 typedef struct {
     mode mode;
-    double start_time;
+    double start_time, stop_time; /* infinite: there is none */
     parameter_values parameters; /* as they were set */
     input_values inputs;
     int begun;         /* whether there is a state */
