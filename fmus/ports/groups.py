@@ -142,7 +142,7 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
             raise Misdeclared(f"{where}{why}", *place)
     elif is_class(kind, IntEnum):
         for name, member in kind.__members__.items():
-            if not (name.isidentifier() and is_int32(member)):
+            if not (name.replace("-", "_").isidentifier() and is_int32(member)):
                 why = f"has the member {name!r:.40} = {member:d}; write a name and 32 bits"
                 raise Misdeclared(f"{kind.__name__} {why}", kind.__name__, name)
         if not kind.__members__:
@@ -219,18 +219,18 @@ def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
     return f"make({name}, {text})"
 
 
-def packing(given: type[T]) -> Callable[[T], list[Value]]:
-    """A function that makes the values of ports, Reals first, from groups.
+def packed(given: Any, text: str) -> str:
+    """The text of a list of the values of ports, Reals first, from that of groups.
 
     It raises OverflowError for an integer that FMI has no room for.
 
     Args:
         given: NamedTuple with a number or a tuple a group, in the order of the ports.
+        text: of a value of it.
 
     """
-    texts = [*scattered(given, "groups")]
-    values = ", ".join(text for text, _ in sorted(texts, key=lambda it: it[1] is not float))
-    return _compiled(f"return [{values}]", "groups", {**SCOPE})
+    texts = [*scattered(given, text)]
+    return f"[{', '.join(text for text, _ in sorted(texts, key=lambda it: it[1] is not float))}]"
 
 
 def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:

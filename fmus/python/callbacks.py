@@ -10,14 +10,16 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from fmus.ports.port import FAULT, Port, Refusal, Value
+from auv_fmu.variable import Refusal
+from fmus.ports.port import FAULT, Port, Value
 from fmus.python.loading import ANSWER, MISSING, has_loader, place
+from fmus.python.noise import Noise
 
 #: Types that can be read as numbers: hosts read all outputs with fmi2GetReal.
 _NUMBERS = ("Real", "Integer", "Boolean")
@@ -42,7 +44,7 @@ class Illegal(Refusal):
 
 
 class Store:
-    """Values of all ports.
+    """Values of all ports, and what else a run is made of.
 
     A port's value reference is its place among the ports. All inputs and all outputs lie in lists
     of their own, Reals first and in their order, so that a host that passes these all in one call
@@ -58,6 +60,11 @@ class Store:
         only_inputs, only_outputs: these, if there are no others; else None.
         parameters: by name.
         fault: whether a value or a step was discarded.
+        fresh: whether the outputs are up to date: nothing has changed that they depend on.
+        state: of the component; None before the initialisation.
+        derived: what was derived of it; None: it is to be derived when it is needed.
+        start_time, stop_time, time: where the run has begun, where it has to end, and where it is [s].
+        noise, draws: the generator of the noise of outputs, None without it, and what it has given.
 
     """
 
@@ -92,6 +99,13 @@ class Store:
             if port.causality == "parameter" and port.start is not None
         }
         self.fault = False
+        self.fresh = True
+        self.state: Any = None
+        self.derived: Any = None
+        self.start_time = self.time = 0.0
+        self.stop_time = inf  # there is none
+        self.noise: Noise | None = None
+        self.draws: tuple[float, ...] = ()
 
     def no_outputs(self) -> list[Value]:
         """The outputs where there is no state."""
@@ -156,9 +170,9 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._mode = INSTANTIATED
         #: Whether a value has changed that the state at the start time depends on.
         self._stale = False
-        #: Whether the outputs are up to date: nothing has changed that they depend on.
-        self._fresh = True
         self._said: set[str] = set()
+        #: Whether anything is computed of the inputs before the next step.
+        self._heeds_inputs = True
         self._has_loader = has_loader(self.resources)
         #: What no answer has told, where there is no loader.
         self._untold = ""
@@ -196,6 +210,12 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         if self._has_loader:
             self.log("", status, ANSWER)
 
+    def describe(self, error: BaseException) -> str:
+        """Give the reason in an exception; one that is not a Refusal is named by its type."""
+        if isinstance(error, Refusal):
+            return str(error)
+        return f"{place(error)}{type(error).__name__}: {error}"
+
     def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
         """Log a message only the first time that its key, or else its text, occurs.
 
@@ -220,7 +240,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def get_real(self, vrs: list[int]) -> list[Any]:
         store = self._store
-        if not self._fresh:
+        if not store.fresh:
             self._refresh_outputs(vrs)
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
         if vrs == store.only_outputs:
@@ -228,13 +248,13 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         return store.outputs[: len(vrs)] if vrs == store.real_outputs else self._get(vrs, "Real")
 
     def get_integer(self, vrs: list[int]) -> list[int]:
-        if not self._fresh:
+        if not self._store.fresh:
             self._refresh_outputs(vrs)
         return self._get(vrs, "Integer")
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         store = self._store
-        if not self._fresh:
+        if not store.fresh:
             self._refresh_outputs(vrs)
         return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
 
@@ -246,7 +266,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         # A sum is finite only if every value is; _set finds out which one was not.
         if vrs == store.only_inputs and self._mode == STEPPING and isfinite(sum(values)):
             store.inputs = values
-            self._forget("inputs")
+            if self._heeds_inputs:
+                self._forget("inputs")
         elif vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
             store.inputs = [*values, *store.inputs[len(values) :]]
             self._forget("inputs")
@@ -296,7 +317,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             # A run with another parameter than the host asked for must not begin.
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
             self._store.fault = True
-            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, describe_error(error))
+            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, self.describe(error))
 
     def _take(self, ports: list[Port], vrs: list[int], values: Sequence[Value]) -> None:
         store = self._store
@@ -321,10 +342,3 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         if any(port.causality == "input" for port in ports):
             store.inputs = inputs
             self._forget("inputs")
-
-
-def describe_error(error: BaseException) -> str:
-    """Give the reason in an exception; one that is not a Refusal is named by its type."""
-    if isinstance(error, Refusal):
-        return str(error)
-    return f"{place(error)}{type(error).__name__}: {error}"

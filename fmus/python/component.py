@@ -27,23 +27,22 @@ from auv_fmu.euler import (
     latest_end,
     longest_step,
 )
-from fmus.ports.behaviour import Behaviour
+from auv_fmu.variable import Refusal
 from fmus.ports.definition import Definition
 from fmus.ports.description import complete
-from fmus.ports.port import H_MAX, Refusal, Value
+from fmus.ports.port import H_MAX, Value
 from fmus.python.callbacks import (
     INITIALISING,
     INSTANTIATED,
     STEPPING,
     TERMINATED,
     Callbacks,
-    describe_error,
 )
 from fmus.python.noise import Noise
 from fmus.python.state import Snapshot, checked, from_bytes, to_bytes
 
 #: Longest step of a component that has no internal steps [s].
-_NO_LIMIT = 1e300
+_NO_LIMIT = inf
 
 
 class Component(Callbacks):
@@ -53,12 +52,9 @@ class Component(Callbacks):
     """
 
     definition: ClassVar[Definition]
-    behaviour: ClassVar[Behaviour]
     #: Of which of `inputs`, `parameters`, `t` and `state` outputs are made, and what is derived.
     outputs_of: ClassVar[frozenset[str]]
     derived_of: ClassVar[frozenset[str]]
-    #: Whether a step evaluates the outputs at its end: those that follow no inputs.
-    is_prompt: ClassVar[bool]
     #: What makes groups of the values of all inputs, and gives the norm of a state.
     unpack: Callable[[Sequence[Value]], Any]
     norm: Callable[[Any], float]
@@ -91,18 +87,17 @@ class Component(Callbacks):
     def advance(
         self, state: Any, derived: Any, inputs: Any, t: float, h: float, n: int
     ) -> tuple[Any, Any]:
-        """The state after n internal steps of h seconds, and what still is derived."""
+        """The state after n internal steps of h seconds, of a sound size, and its derived."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self._state: Any = None
-        #: What `derive` has returned; None: it is to be called.
-        self._derived: Any = None
-        self._noise: Noise | None = None
-        self._draws: tuple[float, ...] = ()
-        self._longest_step = 0.0
-        self._set_experiment(0.0, inf)
-        self._time = 0.0
+        said = self.definition.behaviour
+        self._longest_step, self._latest_end = 0.0, inf
+        self._heeds_inputs = "inputs" in self.outputs_of | self.derived_of
+        self._is_timed = "t" in self.outputs_of | self.derived_of
+        self._is_sampled = said.is_sampled
+        #: Whether a step evaluates the outputs at its end: no input changes them.
+        self._is_prompt = not said.is_sampled and "inputs" not in self.outputs_of
 
     # Experiment
 
@@ -113,18 +108,18 @@ class Component(Callbacks):
             if isfinite(start_time):
                 is_later = stop_time is not None and stop_time > start_time
                 self._set_experiment(start_time, stop_time if is_later else inf)
-                self._time = start_time
+                self._store.time = start_time
             else:
                 self._fail(f"start time {start_time}: must be finite")
 
     def _set_experiment(self, start_time: float, stop_time: float) -> None:
-        self._start_time, self._stop_time = start_time, stop_time
+        self._store.start_time, self._store.stop_time = start_time, stop_time
         self._latest_end = latest_end(start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
         if self._follows("fmi2EnterInitializationMode", INSTANTIATED):
             self._mode = INITIALISING
-            self._stale, self._fresh = True, False
+            self._stale, self._store.fresh = True, False
 
     def exit_initialization_mode(self) -> None:
         if self._follows("fmi2ExitInitializationMode", INITIALISING):
@@ -137,26 +132,22 @@ class Component(Callbacks):
     def terminate(self) -> None:
         self._mode = TERMINATED
 
-    def begin(self) -> None:
-        """Compute state and outputs at the start time; raise what speaks against them."""
-        store, t = self._store, self._start_time
+    def _begin(self) -> None:
+        """Compute state and outputs at the start time."""
+        store = self._store
         self._adopt(store.parameters, self._meaning(store.parameters))
-        noise = self._new_noise()
-        draws = noise.draw() if noise else ()
-        inputs = self.unpack(store.inputs)
-        state = self.start(self.parameters, inputs, t)
-        self._check_size(state)
-        self._derived, store.outputs = self.evaluate(state, None, inputs, t, draws)
-        self._state, self._noise, self._draws, self._time = state, noise, draws, t
-        self._stale, self._fresh = False, True
-
-    def _new_noise(self) -> Noise | None:
-        if not self.behaviour.draws:
-            return None
+        count = self.definition.behaviour.draws
         # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
-        return Noise(Random(self.seed(self.parameters) % 2**32), self.behaviour.draws)
+        noise = Noise(Random(self.seed(self.parameters) % 2**32), count) if count else None
+        draws = noise.draw() if noise else ()
+        inputs, t = self.unpack(store.inputs), store.start_time
+        state = self.start(self.parameters, inputs, t)
+        self.check_size(state)
+        store.derived, store.outputs = self.evaluate(state, None, inputs, t, draws)
+        store.state, store.noise, store.draws, store.time = state, noise, draws, t
 
-    def _check_size(self, state: Any) -> None:
+    def check_size(self, state: Any) -> None:
+        """Raise Refusal for a state that is too large, or not finite."""
         if not self.norm(state) <= LARGEST_STATE:
             raise Refusal(f"the state is not finite, or exceeds {LARGEST_STATE:g}")
 
@@ -177,94 +168,87 @@ class Component(Callbacks):
 
     def _refresh(self) -> str:
         store = self._store
-        if self._stale:
-            try:
-                self.begin()
-            except BaseException as error:
-                self._state, store.outputs = None, store.no_outputs()
-                return f"initialisation refused: {describe_error(error)}"
-        elif not self._fresh:
-            try:
-                self.renew_outputs()
-            except BaseException as error:
-                store.fault = True
-                return f"outputs refused: {describe_error(error)}"
+        if store.fresh:
+            return ""
+        try:
+            if self._stale:
+                self._begin()
+            else:
+                store.derived, store.outputs = self.evaluate(
+                    store.state, store.derived, self.unpack(store.inputs), store.time, store.draws
+                )
+        except BaseException as error:
+            why = self.describe(error)
+            if self._stale:
+                store.state, store.outputs = None, store.no_outputs()
+                return f"initialisation refused: {why}"
+            store.fault = True
+            return f"outputs refused: {why}"
+        self._stale, store.fresh = False, True
         return ""
-
-    def renew_outputs(self) -> None:
-        """Evaluate the outputs; raise what speaks against them."""
-        store = self._store
-        self._derived, store.outputs = self.evaluate(
-            self._state, self._derived, self.unpack(store.inputs), self._time, self._draws
-        )
-        self._fresh = True
 
     def _forget(self, what: str) -> None:
         if self._mode == STEPPING:
             if what in self.outputs_of:
-                self._fresh = False
+                self._store.fresh = False
             if what in self.derived_of:
-                self._derived = None
+                self._store.derived = None
         elif self._mode == INITIALISING:
-            self._stale, self._fresh = True, False
+            self._stale, self._store.fresh = True, False
 
     # Steps
 
     def do_step(self, current_time: float, step_size: float) -> bool:
+        """Advance by one communication step.
+
+        A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
+        is refused. After a refusal everything is as it was before the step.
+        """
         if self._mode != STEPPING:
             return self._follows("fmi2DoStep", STEPPING)
-        end = current_time + step_size
+        t, h, store = current_time, step_size, self._store
+        end = t + h
         if end > self._latest_end:
-            self._fail(
-                f"step from {current_time:g} s to {end:g} s: "
-                f"the stop time is {self._stop_time:g} s"
-            )
+            what = f"the stop time is {store.stop_time:g} s"
+            self._fail(f"step from {t:g} s to {end:g} s: {what}")
             return False
+        state, derived = store.state, store.derived
+        outputs, draws = store.outputs, store.draws
         try:
             if self._untold:
                 raise Refusal(self._untold)
-            self.step(current_time, step_size)
+            if 0.0 < h <= self._longest_step and isfinite(t):
+                n = 1
+            else:
+                n = self._internal_steps(t, h)
+                if n == 0:
+                    return True
+            fresh = store.fresh
+            if self._is_timed:
+                end = end_of_step(store.start_time, t, h)
+                if t != store.time:
+                    fresh = fresh and "t" not in self.outputs_of
+                    derived = None if "t" in self.derived_of else derived
+            inputs = self.unpack(store.inputs)
+            if self._is_sampled and not fresh:
+                derived, outputs = self.evaluate(state, derived, inputs, t, draws)
+            state, derived = self.advance(state, derived, inputs, t, h / n, n)
+            if store.noise:
+                draws = store.noise.draw()
+            if self._is_prompt:
+                derived, outputs = self.evaluate(state, derived, inputs, end, draws)
         except BaseException as error:
-            what = describe_error(error)
-            self._store.fault = True
-            said = f"step refused at t = {current_time:g} s: {what}"
+            if store.noise and draws is not store.draws:
+                store.noise.take_back()
+            what = self.describe(error)
+            store.fault = True
+            said = f"step refused at t = {t:g} s: {what}"
             self._answer(Fmi2Status.discard, said, key=what)
             return False
+        store.state, store.derived = state, derived
+        store.outputs, store.draws = outputs, draws
+        store.time, store.fresh = end, self._is_prompt or self._is_sampled
         return True
-
-    def step(self, t: float, h: float) -> None:
-        """Advance by one communication step; raise what speaks against it, and change nothing.
-
-        A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
-        is refused.
-        """
-        if 0.0 < h <= self._longest_step and isfinite(t):
-            n = 1
-        else:
-            n = self._internal_steps(t, h)
-            if n == 0:
-                return
-        store, noise = self._store, self._noise
-        derived, fresh, outputs = self._derived, self._fresh, store.outputs
-        if t != self._time:
-            fresh = fresh and "t" not in self.outputs_of
-            derived = None if "t" in self.derived_of else derived
-        inputs = self.unpack(store.inputs)
-        if self.behaviour.is_sampled and not fresh:
-            derived, outputs = self.evaluate(self._state, derived, inputs, t, self._draws)
-        state, derived = self.advance(self._state, derived, inputs, t, h / n, n)
-        self._check_size(state)
-        end = end_of_step(self._start_time, t, h)
-        draws = noise.draw() if noise else ()
-        if self.is_prompt:
-            try:
-                derived, outputs = self.evaluate(state, derived, inputs, end, draws)
-            except BaseException:
-                if noise:
-                    noise.take_back()
-                raise
-        self._state, self._derived, self._draws, self._time = state, derived, draws, end
-        store.outputs, self._fresh = outputs, self.is_prompt or self.behaviour.is_sampled
 
     def _internal_steps(self, t: float, h: float) -> int:
         if not isfinite(t) or not isfinite(h):
@@ -287,21 +271,22 @@ class Component(Callbacks):
     def _get_fmu_state(self) -> Mapping[str, Any]:
         if self._stale:
             self._refresh()
-        store = self._store
-        has_noise = self._noise is not None and self._state is not None
+        store, is_begun = self._store, self._store.state is not None
+        keeps = is_begun and self._is_sampled
+        noise = store.noise if is_begun else None
         return Snapshot(
             identity=self._identity(),
             mode=self._mode,
-            start_time=self._start_time,
-            stop_time=self._stop_time,
-            time=self._time,
+            start_time=store.start_time,
+            stop_time=store.stop_time,
+            time=store.time,
             parameters=dict(store.parameters),
             inputs=list(store.inputs),
-            outputs=list(store.outputs) if self.behaviour.is_sampled else [],
-            fresh=self.behaviour.is_sampled and self._fresh,
-            state=self._state,
-            draws=self._draws if has_noise else (),
-            generator=self._noise.state if has_noise else None,
+            outputs=list(store.outputs) if keeps else [],
+            fresh=keeps and store.fresh,
+            state=store.state,
+            draws=store.draws if noise else (),
+            generator=noise.state if noise else None,
             fault=store.fault,
         )
 
@@ -309,33 +294,32 @@ class Component(Callbacks):
         try:
             self._restore(state)
         except BaseException as error:
-            self._fail(f"state refused: {describe_error(error)}")
+            self._fail(f"state refused: {self.describe(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
-        store = self._store
-        wanted = checked(saved, self._identity(), store, self.behaviour)
-        noise = None
-        if wanted["state"] is None:
+        store, said = self._store, self.definition.behaviour
+        wanted = checked(saved, self._identity(), store, said)
+        state, noise = wanted["state"], None
+        if state is None:
             store.parameters = wanted["parameters"]
         else:
             meaning = self._meaning(wanted["parameters"])
-            if not self.norm(wanted["state"]) <= LARGEST_STATE:
+            if not self.norm(state) <= LARGEST_STATE:
                 raise Refusal(f"it exceeds {LARGEST_STATE:g}")
-            self.check_state(meaning[0], wanted["state"])
-            if self.behaviour.draws:
-                noise = Noise.restored(wanted["generator"], self.behaviour.draws)
+            self.check_state(meaning[0], state)
+            if said.draws:
+                noise = Noise.restored(wanted["generator"], said.draws)
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self._adopt(wanted["parameters"], meaning)
-        self._state, self._derived = wanted["state"], None
-        self._noise, self._draws = noise, wanted["draws"]
-        store.inputs, store.fault = wanted["inputs"], wanted["fault"]
-        store.outputs = wanted["outputs"] or store.no_outputs()
-        self._untold = ""
+        store.inputs, store.outputs = wanted["inputs"], wanted["outputs"] or store.no_outputs()
+        store.state, store.derived = state, None
         self._set_experiment(wanted["start_time"], wanted["stop_time"])
-        self._mode, self._time = wanted["mode"], wanted["time"]
+        store.time = wanted["time"]
+        store.noise, store.draws, store.fault = noise, wanted["draws"], wanted["fault"]
+        self._mode, self._untold = wanted["mode"], ""
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
-        self._fresh = not self._stale and (self._state is None or wanted["fresh"])
+        store.fresh = not self._stale and (state is None or wanted["fresh"])
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from math import isfinite
 from random import Random
 from typing import Any
 
-from fmus.ports.port import Refusal
+from auv_fmu.variable import Refusal
 
-#: Bound of the magnitude of a normal number: it is made of a uniform one that has 53 bits.
-LARGEST_NORMAL = 9.0
+#: No normal number that is drawn is larger: it is made of 53 bits.
+LARGEST_DRAW = 9.0
 
 #: Numbers that are drawn between two notes of a generator's state.
 _MOST_DRAWN = 1_000
+
+
+def check_draws(*numbers: float) -> None:
+    """Refuse numbers that are not drawn."""
+    if not all(abs(number) <= LARGEST_DRAW for number in numbers):
+        raise Refusal("its noise is none that can be drawn")
 
 
 class Noise:
@@ -47,8 +52,7 @@ class Noise:
         *_, following = state
         if generator.getstate() != state or type(following) not in (float, type(None)):
             raise Refusal("its noise generator has an invalid state")
-        if not isfinite(following or 0.0):
-            raise Refusal("its noise is not finite")
+        check_draws(following or 0.0)
         return cls(generator, count)
 
     @property

@@ -28,6 +28,8 @@ from typing import Any
 from pythonfmu import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
+from auv_fmu.euler import LARGEST_STATE
+from auv_fmu.variable import Refusal
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import Definition, define
 from fmus.ports.groups import (
@@ -35,12 +37,11 @@ from fmus.ports.groups import (
     Nothing,
     gathered,
     hints_of,
-    packing,
+    packed,
     reals_first,
     scattered,
     unpacking,
 )
-from fmus.ports.port import Refusal
 from fmus.python.component import Component
 from fmus.python.state import measuring
 
@@ -58,7 +59,7 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
 
     """
     definition = define(name, module)
-    said = definition.behaviour
+    said, norm = definition.behaviour, measuring(definition.behaviour.state)
     inputs = [port for port in definition.ports if port.causality == "input"]
     members: dict[str, Any] = {
         "__module__": module.__package__ or module.__name__,
@@ -67,19 +68,17 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
         "description": definition.description,
         "default_experiment": DefaultExperiment(0.0, said.stop, said.step),
         "definition": definition,
-        "behaviour": said,
         "ports": definition.ports,
         "outputs_of": _made_of(said, "outputs"),
         "derived_of": _made_of(said, "derive"),
-        "is_prompt": not said.is_sampled and not said.takes("outputs", "inputs"),
         "unpack": staticmethod(unpacking(said.inputs, inputs)),
-        "norm": staticmethod(measuring(said.state)),
+        "norm": staticmethod(norm),
     }
     scope: dict[str, Any] = {
         **SCOPE,
         **said.hooks,
-        "pack": packing(said.outputs),
         "isfinite": isfinite,
+        "norm": norm,
         "nothing": Nothing(),
         "Refusal": Refusal,
         "RESTARTED": said.restarted,
@@ -155,6 +154,7 @@ def _advance(said: Behaviour) -> Iterator[str]:
         yield f"{indent}state = {_call(said, 'update', t=t)}"
     if _made_of(said, "derive") & {"state", "t"}:
         yield f"{indent}derived = None"
+    yield f"if not norm(state) <= {LARGEST_STATE}: self.check_size(state)"
     yield "return state, derived"
 
 
@@ -163,7 +163,8 @@ def _evaluate(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
     said = definition.behaviour
     yield from _guard(said)
     yield from _derive(said, "outputs", "t")
-    yield f"values = pack({_call(said, 'outputs')})"
+    yield f"groups = {_call(said, 'outputs')}"
+    yield f"values = {packed(said.outputs, 'groups')}"
     # What is finite may still be too large to be added up.
     yield "if not isfinite(sum(values)): self._store.check_outputs(values)"
     if said.noisy:

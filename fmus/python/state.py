@@ -16,11 +16,12 @@ from math import hypot, inf
 from types import GenericAlias
 from typing import Any, Callable, TypedDict
 
+from auv_fmu.variable import Refusal
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import class_of, is_class, parts_of, whole
-from fmus.ports.port import Refusal, Value, is_int32
+from fmus.ports.port import Value, is_int32
 from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
-from fmus.python.noise import LARGEST_NORMAL
+from fmus.python.noise import check_draws
 
 #: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
 #: reported, so they are refused when they are set.
@@ -115,7 +116,6 @@ class Snapshot(TypedDict):
     identity: str  #: class and version that it is a state of
     mode: str
     start_time: float
-    stop_time: float  #: infinite: none
     time: float
     parameters: dict[str, Value]
     inputs: list[Value]
@@ -181,20 +181,22 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         raise Refusal(f"not a state of {identity}")
     if saved.keys() != Snapshot.__annotations__.keys():
         raise Refusal("it has missing or unknown parts")
-    mode, state = saved["mode"], saved["state"]
-    start_time, stop_time = restored(float, saved["start_time"]), _time(saved["stop_time"])
-    if not start_time < stop_time:
-        raise Refusal("its stop time is not after its start time")
+    mode, state, time = saved["mode"], saved["state"], saved["time"]
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
-    for truth in ("fresh", "fault"):
-        if not isinstance(saved[truth], bool):
-            raise Refusal(f"its {truth} is neither true nor false")
-    outputs = _values(store, store.output_references if said.is_sampled else [], saved["outputs"])
+    if not isinstance(saved["fault"], bool):
+        raise Refusal("its fault is neither true nor false")
+    if not isinstance(saved["fresh"], bool):
+        raise Refusal("its outputs are neither fresh nor not")
     if mode == INSTANTIATED and state is not None:
         raise Refusal("it has a state before the initialisation")
-    if state is None and (mode == STEPPING or any(outputs)):
-        raise Refusal("it has steps, or outputs, without a state")
+    if state is None and mode == STEPPING:
+        raise Refusal("it has steps without a state")
+    sampled = store.output_references if said.is_sampled and state is not None else []
+    draws = restored(
+        GenericAlias(tuple, (float,) * (state is not None) * said.draws), saved["draws"]
+    )
+    check_draws(*draws)
     parameters = saved["parameters"]
     declared = [port for port in store.ports if port.causality == "parameter"]
     if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
@@ -202,31 +204,18 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
     return Snapshot(
         identity=identity,
         mode=mode,
-        start_time=start_time,
-        stop_time=stop_time,
+        start_time=restored(float, saved["start_time"]),
         # A time that is finite may have a step to one that is not.
-        time=_time(saved["time"]),
+        time=time if time in (inf, -inf) else restored(float, time),
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
-        outputs=outputs,
-        fresh=saved["fresh"] and said.is_sampled,
+        outputs=_values(store, sampled, saved["outputs"]),
+        fresh=bool(sampled) and saved["fresh"],
         state=None if state is None else restored(said.state, state),
-        draws=_draws(saved["draws"], 0 if state is None else said.draws),
+        draws=draws,
         generator=_frozen(saved["generator"]),
         fault=saved["fault"],
     )
-
-
-def _time(value: Any) -> float:
-    """A time, which may be infinite."""
-    return value if value in (inf, -inf) else restored(float, value)
-
-
-def _draws(values: Any, count: int) -> tuple[float, ...]:
-    draws: tuple[float, ...] = restored(GenericAlias(tuple, (float,) * count), values)
-    if any(abs(draw) > LARGEST_NORMAL for draw in draws):
-        raise Refusal(f"its noise exceeds {LARGEST_NORMAL:g}")
-    return draws
 
 
 def _frozen(value: Any) -> Any:

@@ -6,7 +6,7 @@ module takes each state x to x + h dx/dt.
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, isfinite
 
 from auv_fmu.vectors import Vector4
 
@@ -23,9 +23,6 @@ LARGEST_STATE = 1e100
 
 #: More internal steps than this in one step are taken for a mistake: in Python they take seconds.
 MOST_INTERNAL_STEPS = 100_000
-
-#: From this number of steps on a float does not tell a step from the next.
-MOST_COUNTED = 2.0**53
 
 
 def longest_step(h_max: float) -> float:
@@ -70,9 +67,8 @@ def end_of_step(start: float, t: float, h: float) -> float:
 
     """
     k = (t - start) / h
-    if abs(k) < MOST_COUNTED and t == start + round(k) * h:
-        return start + (round(k) + 1) * h
-    return t + h
+    n = float(round(k)) if isfinite(k) else k
+    return start + (n + 1.0) * h if t == start + n * h else t + h
 
 
 def advance_4(x: Vector4, dx: Vector4, h: float) -> Vector4:

@@ -21,7 +21,7 @@ from fmus.python.slave import slave_of
 
 def component(name: str) -> type[Component[Any, Any, Any, Any]]:
     """The class of a component."""
-    return slave_of(name, *map(import_module, source_of(name).modules))
+    return slave_of(name, import_module(source_of(name).module))
 
 
 def messages_of(slave: Component[Any, Any, Any, Any]) -> list[str]:

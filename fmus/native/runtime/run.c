@@ -8,14 +8,11 @@
 #include <math.h>
 #include <string.h>
 
-/* Longest step of a component that has no internal steps [s]. */
-static const double NO_LIMIT = 1e300;
-
 /* Makes a run what it is after instantiation. */
 static void renew_run(run *it) {
     memset(it, 0, sizeof *it);
     it->stop_time = INFINITY;
-    it->parameters.h_max = NO_LIMIT;
+    it->parameters.h_max = INFINITY; /* unless there is such a parameter */
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER) {
             put_parameter(&it->parameters, &ports[i], ports[i].start);
@@ -202,10 +199,11 @@ static int internal_steps(double time, double step, double longest, message *why
     return -1;
 }
 
-/* The time after a step: the same as that of a host that counts steps of one length. */
+/* The end of a step: that of a host that counts them, where its beginning is. */
 static double end_of_step(double start, double time, double step) {
-    double n = nearbyint((time - start) / step);
-    return time == start + n * step ? start + (n + 1.0) * step : time + step;
+    double k = nearbyint((time - start) / step);
+    if (fabs(k) < MOST_COUNTED && time == start + k * step) return start + (k + 1.0) * step;
+    return time + step;
 }
 
 /* Computes the next moment, and makes it now if all of it is good. */
@@ -245,7 +243,7 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     if (!is_sound(&next->state, &error, why)) return 0;
     next->time = end_of_step(run->start_time, time, step);
-    if (!MODEL_SAMPLED) next->fresh = 0;
+    next->fresh = MODEL_SAMPLED;
     if (MODEL_DRAWS > 0) {
         copy_for(&before, &run->noise, MODEL_DRAWS);
         draw(&run->noise, next->draws);

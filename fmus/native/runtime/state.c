@@ -22,8 +22,8 @@ static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
 
-/* No normal number that is drawn is larger: it is made of 53 bits. */
-static const double LARGEST_DRAW = 9.0;
+/* Bound of the magnitude of a normal number: it is made of a uniform one that has 53 bits. */
+static const double LARGEST_NORMAL = 9.0;
 
 enum { CHECKSUM_SIZE = 4 };
 
@@ -136,7 +136,7 @@ static int take_state(reader *from, double values[], message *why) {
     return 1;
 }
 
-static int can_be_drawn(double number) { return fabs(number) <= LARGEST_DRAW; }
+static int is_normal(double number) { return fabs(number) <= LARGEST_NORMAL; }
 
 static int take_noise(reader *from, generator *noise, double draws[], message *why) {
     for (int i = 0; i < GENERATOR_WORDS; i++) noise->words[i] = take_word(from);
@@ -147,16 +147,16 @@ static int take_noise(reader *from, generator *noise, double draws[], message *w
     if (noise->place > GENERATOR_WORDS || noise->has_next < 0) {
         return compose(why, "its noise generator has an invalid state");
     }
-    int good = can_be_drawn(noise->next);
-    for (int i = 0; i < MODEL_DRAWS; i++) good &= can_be_drawn(draws[i]);
-    return good || compose(why, "its noise is none that can be drawn");
+    int good = is_normal(noise->next);
+    for (int i = 0; i < MODEL_DRAWS; i++) good &= is_normal(draws[i]);
+    return good || compose(why, "its noise exceeds %g", LARGEST_NORMAL);
 }
 
 /* The outputs that a sampled component keeps. */
 static int take_sample(reader *from, moment *it, message *why) {
     take_values(from, it->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     it->fresh = take_truth(from);
-    if (it->fresh < 0) return compose(why, "its outputs are neither fresh nor not");
+    if (it->fresh < 0) return compose(why, "its fresh is neither true nor false");
     return good_values(it->outputs.values, MODEL_OUTPUTS, output_references, why);
 }
 
