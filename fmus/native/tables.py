@@ -29,7 +29,6 @@ _HEAD = f"""\
 static const double ROUNDING = {euler.ROUNDING!r};
 static const double LARGEST_STATE = {euler.LARGEST_STATE!r};
 static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
-static const double MOST_COUNTED = {euler.MOST_COUNTED!r};
 
 #define PARAMETER_AT(member) offsetof(parameter_values, member)
 """

@@ -63,7 +63,7 @@ class Store:
         fresh: whether the outputs are up to date: nothing has changed that they depend on.
         state: of the component; None before the initialisation.
         derived: what was derived of it; None: it is to be derived when it is needed.
-        start_time, stop_time, time: where the run has begun, where it has to end, and where it is [s].
+        start_time, stop_time, time: where the run begins, where it ends, and where it is [s].
         noise, draws: the generator of the noise of outputs, None without it, and what it has given.
 
     """

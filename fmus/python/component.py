@@ -204,14 +204,10 @@ class Component(Callbacks):
         A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
         is refused. After a refusal everything is as it was before the step.
         """
-        if self._mode != STEPPING:
-            return self._follows("fmi2DoStep", STEPPING)
-        t, h, store = current_time, step_size, self._store
-        end = t + h
-        if end > self._latest_end:
-            what = f"the stop time is {store.stop_time:g} s"
-            self._fail(f"step from {t:g} s to {end:g} s: {what}")
-            return False
+        t, h, end = current_time, step_size, current_time + step_size
+        if self._mode != STEPPING or end > self._latest_end:
+            return self._fail_step(t, end)
+        store = self._store
         state, derived = store.state, store.derived
         outputs, draws = store.outputs, store.draws
         try:
@@ -249,6 +245,13 @@ class Component(Callbacks):
         store.outputs, store.draws = outputs, draws
         store.time, store.fresh = end, self._is_prompt or self._is_sampled
         return True
+
+    def _fail_step(self, t: float, end: float) -> bool:
+        """Fail a step in another mode, or beyond the stop time."""
+        if self._follows("fmi2DoStep", STEPPING):
+            stop = self._store.stop_time
+            self._fail(f"step from {t:g} s to {end:g} s: the stop time is {stop:g} s")
+        return False
 
     def _internal_steps(self, t: float, h: float) -> int:
         if not isfinite(t) or not isfinite(h):

@@ -202,7 +202,7 @@ static int internal_steps(double time, double step, double longest, message *why
 /* The end of a step: that of a host that counts them, where its beginning is. */
 static double end_of_step(double start, double time, double step) {
     double k = nearbyint((time - start) / step);
-    if (fabs(k) < MOST_COUNTED && time == start + k * step) return start + (k + 1.0) * step;
+    if (time == start + k * step) return start + (k + 1.0) * step;
     return time + step;
 }
 
