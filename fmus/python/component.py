@@ -106,8 +106,9 @@ class Component(Callbacks):
     ) -> None:
         if self._follows("fmi2SetupExperiment", INSTANTIATED):
             if isfinite(start_time):
-                is_later = stop_time is not None and stop_time > start_time
-                self._set_experiment(start_time, stop_time if is_later else inf)
+                if stop_time is None or not stop_time > start_time:
+                    stop_time = inf
+                self._set_experiment(start_time, stop_time)
                 self._store.time = start_time
             else:
                 self._fail(f"start time {start_time}: must be finite")
