@@ -240,7 +240,7 @@ def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:
         scalar = class_of(hint)
         yield f"whole({text})" if is_whole(scalar) else text, scalar
     elif is_record(class_of(hint)):
-        for name, part in hints_of(hint).items():
+        for name, part in hints_of(class_of(hint)).items():
             yield from scattered(part, f"{text}.{name}")
     elif parts and parts_of(parts[0]) is None and all(part is parts[0] for part in parts):
         scalar = class_of(parts[0])

@@ -87,13 +87,17 @@ typedef struct {
     uint32_t words[GENERATOR_WORDS];
 } generator;
 
+/* Of outputs. Those that are outdated are computed when they are read. A sampled component holds
+ * those of the beginning of a step after it; the next step computes its own. */
+typedef enum { OUTDATED, HELD, FRESH } freshness;
+
 /* A communication point. */
 typedef struct {
     double time;
     state_values state;
     double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* that the noise is made of */
     output_values outputs;
-    int fresh; /* whether they are what they have to be; else they are computed when they are read */
+    freshness outputs_are;
 } moment;
 
 /* Everything that the rest of a run depends on. */

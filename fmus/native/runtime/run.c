@@ -20,7 +20,7 @@ static void renew_run(run *it) {
             it->inputs.values[ports[i].place] = ports[i].start;
         }
     }
-    it->moments[it->now].fresh = 1;
+    it->moments[it->now].outputs_are = FRESH;
 }
 
 /* Makes everything what it is after instantiation. */
@@ -124,7 +124,7 @@ static int start(instance *it, message *why) {
     next->time = run->start_time;
     model_start(&it->meant.model, &run->inputs.groups, next->time, &next->state.groups, &error);
     if (!is_sound(&next->state, &error, why) || !evaluate(it, next, &next->outputs, why)) return 0;
-    next->fresh = 1;
+    next->outputs_are = FRESH;
     run->now = !run->now;
     run->begun = 1;
     return 1;
@@ -141,7 +141,7 @@ static int refresh(instance *it, message *why) {
             return compose(why, "outputs refused: %s", said.text);
         }
         now->outputs = *outputs;
-        now->fresh = 1;
+        now->outputs_are = FRESH;
         return 1;
     }
     it->stale = !start(it, &said);
@@ -202,8 +202,7 @@ static int internal_steps(double time, double step, double longest, message *why
 /* The end of a step: that of a host that counts them, where its beginning is. */
 static double end_of_step(double start, double time, double step) {
     double k = nearbyint((time - start) / step);
-    if (time == start + k * step) return start + (k + 1.0) * step;
-    return time + step;
+    return time == start + k * step ? start + (k + 1.0) * step : time + step;
 }
 
 /* Computes the next moment, and makes it now if all of it is good. */
@@ -224,10 +223,13 @@ static int advance(instance *it, double time, double step, message *why) {
     *next = run->moments[run->now];
     if (next->time != time) {
         next->time = time;
-        if (MODEL_OUTPUTS_TAKE_TIME) next->fresh = 0;
+        if (MODEL_OUTPUTS_TAKE_TIME) next->outputs_are = OUTDATED;
         if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
-    if (MODEL_SAMPLED && !next->fresh && !evaluate(it, next, &next->outputs, why)) return 0;
+    if (MODEL_SAMPLED && next->outputs_are != FRESH &&
+        !evaluate(it, next, &next->outputs, why)) {
+        return 0;
+    }
     error.raised = 0;
     if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
         compose(&said, MODEL_RESTARTED, time);
@@ -243,7 +245,7 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     if (!is_sound(&next->state, &error, why)) return 0;
     next->time = end_of_step(run->start_time, time, step);
-    next->fresh = MODEL_SAMPLED;
+    next->outputs_are = MODEL_SAMPLED ? HELD : OUTDATED;
     if (MODEL_DRAWS > 0) {
         copy_for(&before, &run->noise, MODEL_DRAWS);
         draw(&run->noise, next->draws);
@@ -253,7 +255,7 @@ static int advance(instance *it, double time, double step, message *why) {
             if (MODEL_DRAWS > 0) copy_for(&run->noise, &before, MODEL_DRAWS);
             return 0;
         }
-        next->fresh = 1;
+        next->outputs_are = FRESH;
     }
     run->now = !run->now;
     return 1;

@@ -6,7 +6,7 @@
  *     parameters in the order of their ports, inputs, Reals before others,
  *     whether there is a state, and if so: the numbers of the state; of the noise the words of the
  *     generator, the place of the next, whether there is a next number, and it, and what is drawn;
- *     of a sampled component the outputs, Reals before others, and whether they are fresh;
+ *     of a sampled component the outputs, Reals before others, and what they are;
  *     fault;
  *     the CRC-32 of all that.
  */
@@ -22,8 +22,8 @@ static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
 
-/* Bound of the magnitude of a normal number: it is made of a uniform one that has 53 bits. */
-static const double LARGEST_NORMAL = 9.0;
+/* No normal number that is drawn is larger: it is made of 53 bits. */
+static const double LARGEST_DRAW = 9.0;
 
 enum { CHECKSUM_SIZE = 4 };
 
@@ -63,7 +63,7 @@ static void put_run(writer *to, const run *it) {
         if (MODEL_DRAWS > 0) put_noise(to, &it->noise, now->draws);
         if (MODEL_SAMPLED) {
             put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
-            put_word(to, (uint32_t)now->fresh);
+            put_word(to, now->outputs_are);
         }
     }
     put_word(to, (uint32_t)it->fault);
@@ -136,7 +136,7 @@ static int take_state(reader *from, double values[], message *why) {
     return 1;
 }
 
-static int is_normal(double number) { return fabs(number) <= LARGEST_NORMAL; }
+static int can_be_drawn(double number) { return fabs(number) <= LARGEST_DRAW; }
 
 static int take_noise(reader *from, generator *noise, double draws[], message *why) {
     for (int i = 0; i < GENERATOR_WORDS; i++) noise->words[i] = take_word(from);
@@ -147,16 +147,17 @@ static int take_noise(reader *from, generator *noise, double draws[], message *w
     if (noise->place > GENERATOR_WORDS || noise->has_next < 0) {
         return compose(why, "its noise generator has an invalid state");
     }
-    int good = is_normal(noise->next);
-    for (int i = 0; i < MODEL_DRAWS; i++) good &= is_normal(draws[i]);
-    return good || compose(why, "its noise exceeds %g", LARGEST_NORMAL);
+    int good = can_be_drawn(noise->next);
+    for (int i = 0; i < MODEL_DRAWS; i++) good &= can_be_drawn(draws[i]);
+    return good || compose(why, "its noise is none that can be drawn");
 }
 
 /* The outputs that a sampled component keeps. */
 static int take_sample(reader *from, moment *it, message *why) {
     take_values(from, it->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
-    it->fresh = take_truth(from);
-    if (it->fresh < 0) return compose(why, "its fresh is neither true nor false");
+    uint32_t number = take_word(from);
+    if (number > FRESH) return compose(why, "its outputs are neither fresh nor not");
+    it->outputs_are = (freshness)number;
     return good_values(it->outputs.values, MODEL_OUTPUTS, output_references, why);
 }
 
@@ -194,7 +195,7 @@ static int take_run(reader *from, run *it, message *why) {
         return compose(why, "it has steps without a state");
     }
     if (it->begun) {
-        now->fresh = 0;
+        now->outputs_are = OUTDATED;
         if (!take_state(from, now->state.values, why)) return 0;
         if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, now->draws, why)) return 0;
         if (MODEL_SAMPLED && !take_sample(from, now, why)) return 0;

@@ -146,8 +146,8 @@ static int has_output(const uint32_t references[], size_t n) {
 static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     instance *it = this->instance;
     message why;
-    if (it->run.moments[it->run.now].fresh || !has_output(references, n)) return;
-    if (!refresh(it, &why)) refuse_to_get(this, &why);
+    if (it->run.moments[it->run.now].outputs_are != OUTDATED) return;
+    if (has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
 }
 
 static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
@@ -181,11 +181,11 @@ static void note_change(instance *it, int inputs, int parameters) {
     moment *now = &it->run.moments[it->run.now];
     if (it->run.mode == INITIALISING) {
         it->stale = 1;
-        now->fresh = 0;
+        now->outputs_are = OUTDATED;
     } else if (it->run.mode == STEPPING) {
-        if (inputs && MODEL_OUTPUTS_TAKE_INPUTS) now->fresh = 0;
+        if (inputs && MODEL_OUTPUTS_TAKE_INPUTS) now->outputs_are = OUTDATED;
         if (inputs && MODEL_DERIVE_TAKES_INPUTS) it->underived = 1;
-        if (parameters && MODEL_OUTPUTS_TAKE_PARAMETERS) now->fresh = 0;
+        if (parameters && MODEL_OUTPUTS_TAKE_PARAMETERS) now->outputs_are = OUTDATED;
     }
 }
 

@@ -441,6 +441,7 @@ calls = st.one_of(
 
 @given(before=st.lists(calls, max_size=4), after=st.lists(calls, max_size=25))
 @example(before=[("set_all", "Integer", {"k": MOST})], after=[("step", 0.02), ("look",)])
+@example(before=[], after=[("step", 0.02), ("look",), ("step", 0.02), ("look",)])
 @example(
     before=[],
     after=[
@@ -556,13 +557,13 @@ _STATE = _NOISE + 4 + 8 + 4 + 4 + 9 * 8 + 4 + 2 * 4 + 4 + 4 + 8 + 3 * 4
         (_STATE + 4 + 4, 1, "want = 1: use one of 0, 2, -7"),
         (_STATE + 4 + 4 * 4, 2, "go: must be a Boolean"),
         (_STATE + 4 + 5 * 4, -6, "k = -6: must be at least -5"),
-        (_OUTPUTS + 4, 0x40220001, "its noise exceeds 9"),
-        (_OUTPUTS + 4, 0x7FF80000, "its noise exceeds 9"),
-        (_OUTPUTS + 2 * 8 + 4, 0x7FF00000, "its noise exceeds 9"),
+        (_OUTPUTS + 4, 0x40220001, "its noise is none that can be drawn"),
+        (_OUTPUTS + 4, 0x7FF80000, "its noise is none that can be drawn"),
+        (_OUTPUTS + 2 * 8 + 4, 0x7FF00000, "its noise is none that can be drawn"),
         (_OUTPUTS + 2 * 8 + 8 + 4, 2, "its noise generator has an invalid state"),
         (_OUTPUTS - 4, 0x7FF00000, "x = inf: must be finite"),
         (4 + 4 + 4 + 4, 7, "flags[3]: must be a Boolean"),
-        (4 + 4 + 4, 2, "its fresh is neither true nor false"),
+        (4 + 4 + 4, 3, "its outputs are neither fresh nor not"),
         (4 + 4, 2, "its fault is neither true nor false"),
     ],
 )
