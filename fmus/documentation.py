@@ -28,7 +28,6 @@ _REFUSALS = """\
 The FMU answers with fmi2Discard if the host
 
 - sets a value that is not finite, out of its range or not one of the choices;
-- sets an output, or a fixed parameter to a new value during the run;
 - asks for a step whose size is negative or not finite, or whose result would not be finite.
 
 None of the values of such a call is taken, and such a step changes nothing, not even the noise. The
@@ -38,6 +37,8 @@ state without a fault is restored.
 The FMU answers with fmi2Error if the host
 
 - sets a parameter before the run to a value that cannot be taken, which also raises `fault`;
+- sets an output, or a fixed parameter to a new value during the run;
+- steps beyond a stop time that it has defined;
 - makes a call in the wrong mode;
 - uses a value reference that does not exist or is of another type;
 - restores a state that no run can have led to.
@@ -45,7 +46,7 @@ The FMU answers with fmi2Error if the host
 From then on it answers every call except a get with fmi2Error, until fmi2Reset or a good state. A
 refused get has no consequence. fmi2GetReal also gives the numbers of Integers and Booleans.
 
-The reason is logged, even with logging off. `docs/reference/fmi-answers.md` of the project has the
+The reason is logged, that of fmi2Error even with logging off. `docs/reference/fmi-answers.md` of the project has the
 complete table of calls, states and bad arguments."""
 
 #: The place in a list of things that have members.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from math import isfinite
+from math import inf, isfinite
 from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
@@ -47,6 +47,10 @@ MOST_MESSAGES = 100
 LONGEST_MESSAGE = 500
 
 
+class Illegal(Refusal):
+    """A value that the standard does not let a port be set to, now or ever."""
+
+
 class Store:
     """Values of all ports, and what else a run is made of.
 
@@ -68,7 +72,7 @@ class Store:
         held: whether they are those of the beginning of the last step; the next evaluates its own.
         state: of the component; None before the initialisation.
         derived: what was derived of it; None: it is to be derived when it is needed.
-        start_time, time: where the run has begun, and where it is [s].
+        start_time, stop_time, time: where the run begins, where it ends, and where it is [s].
         noise, draws: the generator of the noise of outputs, None without it, and what it has given.
 
     """
@@ -109,6 +113,7 @@ class Store:
         self.state: Any = None
         self.derived: Any = None
         self.start_time = self.time = 0.0
+        self.stop_time = inf  # there is none
         self.noise: Noise | None = None
         self.draws: tuple[float, ...] = ()
 
@@ -318,6 +323,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             return
         try:
             self._take(ports, vrs, values)
+        except Illegal as refusal:
+            self._fail(str(refusal))
         except BaseException as error:
             # A run with another parameter than the host asked for must not begin.
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
@@ -329,10 +336,10 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         inputs, parameters = list(store.inputs), store.parameters
         for port, reference, value in zip(ports, vrs, values):
             if port.causality == "output":
-                raise Refusal(f"{port.name} is an output and cannot be set")
+                raise Illegal(f"{port.name} is an output and cannot be set")
             if port.variability == "fixed" and self._mode == STEPPING:
                 if value != parameters[port.name]:
-                    raise Refusal(f"{port.name} is fixed and cannot change after initialisation")
+                    raise Illegal(f"{port.name} is fixed and cannot change after initialisation")
                 continue
             port.checked(value)
             if port.causality == "input":

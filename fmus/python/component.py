@@ -24,6 +24,7 @@ from auv_fmu.euler import (
     MOST_INTERNAL_STEPS,
     end_of_step,
     internal_steps,
+    latest_end,
     longest_step,
 )
 from auv_fmu.variable import Refusal
@@ -91,7 +92,7 @@ class Component(Callbacks):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         said = self.definition.behaviour
-        self._longest_step = 0.0
+        self._longest_step, self._latest_end = 0.0, inf
         self._heeds_inputs = "inputs" in self.outputs_of | self.derived_of
         self._is_timed = "t" in self.outputs_of | self.derived_of
         self._is_sampled = said.is_sampled
@@ -105,9 +106,16 @@ class Component(Callbacks):
     ) -> None:
         if self._follows("fmi2SetupExperiment", INSTANTIATED):
             if isfinite(start_time):
-                self._store.start_time = self._store.time = start_time
+                if stop_time is None or not stop_time > start_time:
+                    stop_time = inf
+                self._set_experiment(start_time, stop_time)
+                self._store.time = start_time
             else:
                 self._fail(f"start time {start_time}: must be finite")
+
+    def _set_experiment(self, start_time: float, stop_time: float) -> None:
+        self._store.start_time, self._store.stop_time = start_time, stop_time
+        self._latest_end = latest_end(start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
         if self._follows("fmi2EnterInitializationMode", INSTANTIATED):
@@ -197,9 +205,10 @@ class Component(Callbacks):
         A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
         is refused. After a refusal everything is as it was before the step.
         """
-        if self._mode != STEPPING:
-            return self._follows("fmi2DoStep", STEPPING)
-        t, h, store = current_time, step_size, self._store
+        t, h, end = current_time, step_size, current_time + step_size
+        if self._mode != STEPPING or end > self._latest_end:
+            return self._fail_step(t, end)
+        store = self._store
         state, derived = store.state, store.derived
         outputs, draws = store.outputs, store.draws
         try:
@@ -211,7 +220,7 @@ class Component(Callbacks):
                 n = self._internal_steps(t, h)
                 if n == 0:
                     return True
-            fresh, end = store.fresh, t + h
+            fresh = store.fresh
             if self._is_timed:
                 end = end_of_step(store.start_time, t, h)
                 if t != store.time:
@@ -238,6 +247,13 @@ class Component(Callbacks):
         store.time, store.held = end, self._is_sampled
         store.fresh = self._is_prompt or self._is_sampled
         return True
+
+    def _fail_step(self, t: float, end: float) -> bool:
+        """Fail a step in another mode, or beyond the stop time."""
+        if self._follows("fmi2DoStep", STEPPING):
+            stop = self._store.stop_time
+            self._fail(f"step from {t:g} s to {end:g} s: the stop time is {stop:g} s")
+        return False
 
     def _internal_steps(self, t: float, h: float) -> int:
         if not isfinite(t) or not isfinite(h):
@@ -267,6 +283,7 @@ class Component(Callbacks):
             identity=self._identity(),
             mode=self._mode,
             start_time=store.start_time,
+            stop_time=store.stop_time,
             time=store.time,
             parameters=dict(store.parameters),
             inputs=list(store.inputs),
@@ -302,7 +319,8 @@ class Component(Callbacks):
             self._adopt(wanted["parameters"], meaning)
         store.inputs, store.outputs = wanted["inputs"], wanted["outputs"] or store.no_outputs()
         store.state, store.derived = state, None
-        store.start_time, store.time = wanted["start_time"], wanted["time"]
+        self._set_experiment(wanted["start_time"], wanted["stop_time"])
+        store.time = wanted["time"]
         store.noise, store.draws, store.fault = noise, wanted["draws"], wanted["fault"]
         self._mode, self._untold = wanted["mode"], ""
         # Before the first step all follows from parameters and inputs, and is computed once more.

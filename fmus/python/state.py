@@ -116,6 +116,7 @@ class Snapshot(TypedDict):
     identity: str  #: class and version that it is a state of
     mode: str
     start_time: float
+    stop_time: float  #: infinite: there is none
     time: float
     parameters: dict[str, Value]
     inputs: list[Value]
@@ -182,9 +183,12 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         raise Refusal(f"not a state of {identity}")
     if saved.keys() != Snapshot.__annotations__.keys():
         raise Refusal("it has missing or unknown parts")
-    mode, state, time = saved["mode"], saved["state"], saved["time"]
+    mode, state = saved["mode"], saved["state"]
+    start_time, stop_time = restored(float, saved["start_time"]), _time(saved["stop_time"])
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
+    if not start_time < stop_time:
+        raise Refusal("its stop time is not after its start time")
     if not isinstance(saved["fault"], bool):
         raise Refusal("its fault is neither true nor false")
     if not (isinstance(saved["fresh"], bool) and isinstance(saved["held"], bool)):
@@ -205,9 +209,10 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
     return Snapshot(
         identity=identity,
         mode=mode,
-        start_time=restored(float, saved["start_time"]),
+        start_time=start_time,
+        stop_time=stop_time,
         # A time that is finite may have a step to one that is not.
-        time=time if time in (inf, -inf) else restored(float, time),
+        time=_time(saved["time"]),
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=_values(store, sampled, saved["outputs"]),
@@ -218,6 +223,11 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         generator=_frozen(saved["generator"]),
         fault=saved["fault"],
     )
+
+
+def _time(value: Any) -> Any:
+    """A time, which may be infinite."""
+    return value if value in (inf, -inf) else restored(float, value)
 
 
 def _frozen(value: Any) -> Any:

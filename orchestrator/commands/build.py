@@ -121,8 +121,8 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         "--base",
         choices=CONTROLLER_BASES,
         default=CONTROLLER_BASES[0],
-        help="base class of the controller: plain (PythonFMU only) or hardened (the base of the "
-        "bundle's components: checks values, saves states, survives exceptions); default: "
+        help="what the controller is: plain (a class of PythonFMU) or hardened (a component in the "
+        "form of the bundle's: checks values, saves states, survives exceptions); default: "
         f"{CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)

@@ -13,7 +13,8 @@ from auv_fmu.vectors import Vector4
 #: The time step h of section 4.1 [s].
 STEP = 0.02
 
-#: A step may exceed the largest internal one by this share without being split: hosts round time.
+#: A step may exceed the largest internal one, and its end the stop time, by this share: hosts round
+#: time.
 ROUNDING = 1e-9
 
 #: Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
@@ -32,6 +33,17 @@ def longest_step(h_max: float) -> float:
 
     """
     return h_max * (1.0 + ROUNDING)
+
+
+def latest_end(start: float, stop: float) -> float:
+    """The latest end of a step: hosts that add their steps up reach a stop time nearly [s].
+
+    Args:
+        start: of the run [s].
+        stop: of the run; infinite: none [s].
+
+    """
+    return stop + ROUNDING * max(abs(start), abs(stop))
 
 
 def internal_steps(h: float, longest: float) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cache
+from math import inf
 from random import Random
 
 from fuzz.model import Model, keep
@@ -110,6 +111,7 @@ class _World:
             foreign if others else [],
             freed,
             0.0 if known is None else known.time,
+            inf if known is None else known.stop,
             f"{name}.",
             {} if known is None else known.values,
         )

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from math import inf
 from typing import Any
 
-from support.calls import ODD_TRUTH, SAME, Call
+from support.calls import BEYOND, ODD_TRUTH, SAME, Call
 from support.raw import Description, Status, Variable
 from support.settings import trials_of
 from support.status_table import ERROR, MODES, Cell, rows
 
-_FIXED = "a fixed parameter"
+_FIXED, _STEP = "a fixed parameter", "a step"
+
+#: By which share of a time a step may end after the stop time.
+ROUNDING = 1e-9
 
 #: Beyond these sizes values are legal, but where the equations lead with them is not foretold.
 LARGEST_TAME, SMALLEST_TAME = 1e4, 1e-6
@@ -29,6 +33,7 @@ class Model:
         wild: whether it was told values that the equations may overflow with, or that may not go
             with others.
         time: where the next step begins [s].
+        start, stop: of the run; infinite: no stop time [s].
 
     """
 
@@ -39,6 +44,8 @@ class Model:
     values: Mapping[str, Any] = field(default_factory=dict)
     wild: bool = False
     time: float = 0.0
+    start: float = 0.0
+    stop: float = inf
 
     @property
     def state(self) -> str:
@@ -53,6 +60,8 @@ class Model:
             port = self._port_of(call, item.reference)
             same = _meant(port, item.value) == self.values.get(port.name, port.start)
             case = SAME if same else _FIXED
+        if call.function == "fmi2DoStep" and (case == BEYOND or self._is_beyond(call)):
+            case = BEYOND if self._is_beyond(call) else _STEP
         return rows()[call.function, case].cells[self.state]
 
     def after(self, call: Call, saved: Mapping[str, Model]) -> Model:
@@ -81,13 +90,19 @@ class Model:
         fails = status == Status.Error and not call.function.startswith("fmi2Get")
         return replace(self, in_error=self.in_error or fails)
 
+    def _is_beyond(self, call: Call) -> bool:
+        end = call.arguments["time"] + call.arguments["h"]
+        return bool(end > self.stop + ROUNDING * max(abs(self.start), abs(self.stop)))
+
     def _port_of(self, call: Call, reference: int) -> Variable:
         kind = call.function.removeprefix("fmi2Set")
         return self.description.find(self.description.names[reference, kind])
 
     def _take(self, call: Call) -> None:
         if call.function == "fmi2SetupExperiment":
-            self.time = call.arguments["start"]
+            start, stop = call.arguments["start"], call.arguments["stop"]
+            self.time = self.start = start
+            self.stop = stop if stop is not None and stop > start else inf
         elif call.function == "fmi2DoStep":
             self.time = call.arguments["time"] + call.arguments["h"]
         elif call.function.startswith("fmi2Set") and "items" in call.arguments:

@@ -117,6 +117,8 @@ class Draw:
     others: list[str] = field(default_factory=list)
     freed: list[str] = field(default_factory=list)
     time: float = 0.0
+    #: Stop time; infinite: the host has not defined one.
+    stop: float = inf
     #: What slots of this instance begin with.
     prefix: str = ""
     #: Values of parameters that are others than at the start, by name.
@@ -164,6 +166,9 @@ class Draw:
 
 #: The case of a Boolean that is no truth value of C.
 ODD_TRUTH = "neither 0 nor 1, which is true"
+
+#: The case of a step that ends too late.
+BEYOND = "a step beyond the stop time"
 
 #: The case of a fixed parameter that keeps its value.
 SAME = "a fixed parameter, to the value that it has"
@@ -429,7 +434,7 @@ _setup("start", start=(0.0, 1.5, -3.0))
 _setup("start, stop, tolerance", stop=10.0, tolerance=1e-6)
 _setup("stop infinite", stop=inf)
 _setup(
-    "stop NaN or before start, tolerance NaN, which nothing uses",
+    "stop NaN or not after start, which stands for none, tolerance NaN",
     stop=(nan, -1.0, -inf),
     tolerance=nan,
 )
@@ -471,6 +476,13 @@ _step("a step of zero, which changes nothing", h=(0.0, -0.0))
 _step("a step that is negative", h=(-0.02, -1e-300, -1e300))
 _step("a step that is NaN or infinite", h=(nan, inf, -inf))
 _step("a time that is NaN or infinite", time=(nan, inf, -inf))
+
+
+@_case("fmi2DoStep", BEYOND)
+def _beyond(draw: Draw) -> Arguments:
+    if draw.stop == inf:
+        raise Lacking
+    return {"time": draw.time, "h": draw.stop - draw.time + draw.random.choice((0.02, 1e3))}
 
 
 @_case("fmi2DoStep", "more than 100,000 times h_max")

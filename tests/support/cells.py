@@ -12,13 +12,16 @@ from fmus.discovery import source_of
 from fmus.kinds import PYTHON
 from fmus.ports.description import fmi2_description
 from support import states
-from support.calls import CASES, Call, Draw, Saved, make
+from support.calls import BEYOND, CASES, Call, Draw, Saved, make
 from support.raw import Description, Host, Library, Status, Variable, description_in, instance
 from support.settings import Setting, Trials, trials_of
 from support.status_table import ERROR, Cell, Row, rows
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
+
+#: Stop time where one is defined [s].
+STOP = 1.0
 
 #: The rows that need values of their own.
 _SETTINGS: Mapping[tuple[str, str], Callable[[Trials], Setting | None]] = {
@@ -49,7 +52,7 @@ def _description(name: str) -> Description:
 
 
 def _draw(description: Description, time: float = 0.0) -> Draw:
-    return Draw(Random(1), description, ["own"], ["other"], ["freed"], time)
+    return Draw(Random(1), description, ["own"], ["other"], ["freed"], time, STOP)
 
 
 def company_of(library: Library, other: Library) -> Company:
@@ -115,7 +118,7 @@ class Trial:
         host = self.host
         if state == "instantiated":
             return
-        assert host.setup() == Status.OK
+        assert host.setup(stop=STOP if self.row.case == BEYOND else None) == Status.OK
         if self.setting is not None:
             self._set(self.setting.at_start)
         assert host.enter() == Status.OK

@@ -300,8 +300,13 @@ class Host:
 
     # Good calls, in short
 
-    def setup(self, start: float = 0.0) -> Status:
-        return self.call("fmi2SetupExperiment", 0, c_double(0.0), c_double(start), 0, c_double(0.0))
+    def setup(self, start: float = 0.0, stop: float | None = None) -> Status:
+        return self.call(
+            "fmi2SetupExperiment",
+            0, c_double(0.0),
+            c_double(start),
+            int(stop is not None), c_double(stop or 0.0),
+        )  # fmt: skip
 
     def enter(self) -> Status:
         return self.call("fmi2EnterInitializationMode")

@@ -29,6 +29,7 @@ _NOT_UTF_8 = b"ta\xffnh"
 CREATIONS: dict[str, dict[str, Any]] = {
     "everything as it should be": {},
     "a name that is empty": {"name": b""},
+    "a name of white space": {"name": b" \t\n"},
     "a name of 100,000 characters": {"name": b"n" * MANY},
     "a name that is NULL": {"name": None},
     "a name that is not UTF-8": {"name": _NOT_UTF_8},

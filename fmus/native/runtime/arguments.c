@@ -1,4 +1,10 @@
-/* What can be wrong with arrays of arguments; NULL: nothing. */
+/* What can be wrong with texts and arrays of arguments. */
+#include <string.h>
+
+/* Whether a text is not there, or has nothing but white space. */
+static int is_blank(string text) {
+    return text == NULL || text[strspn(text, " \t\n\v\f\r")] == '\0';
+}
 
 /* More values in one call than any FMU has. */
 enum { MOST_VALUES = 1 << 20 };

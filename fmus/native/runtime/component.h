@@ -3,7 +3,7 @@
  * Such a file includes this one first, and component.c, so that all is one translation unit; it
  * defines what is declared under "The version". A function of FMI is then
  *
- *     call this = begin(handle, "fmi2Terminate", NOT_AFTER_ERROR);
+ *     call this = begin(handle, "fmi2Terminate", MASK_Terminate);
  *     if (GOES_ON(this, NULL)) terminate(&this);
  *     return end(&this);
  *
@@ -15,6 +15,7 @@
 #include "platform.h"
 
 #include "host.h"
+#include "modes.h"
 
 typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION } fmi_type;
 
@@ -24,6 +25,7 @@ typedef struct instance instance;
 typedef struct {
     instance *instance; /* NULL: the handle belongs to no live instance */
     string function;
+    int allowed; /* the modes that it may come in, of modes.h */
     int status;  /* what the call is answered with */
     void *entry; /* of the instance in the table of handles */
 } call;
@@ -53,27 +55,28 @@ static void free_instance(void *handle, string function);
 
 /* The frame of every other call */
 
-/* Whether a call is let through in FMI's error state. */
-typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
-
 /* Waits until no other thread is in a call of the instance. */
-static call begin(void *handle, string function, when when);
+static call begin(void *handle, string function, int allowed);
 
-/* Whether a call goes on: only then are its arguments checked. */
-#define GOES_ON(call, wrong) ((call).status == FMI_OK && sound(&(call), wrong))
+/* Whether a call goes on: only then are its arguments checked, and after them its time. */
+#define GOES_ON(call, wrong)                                                                     \
+    ((call).status == FMI_OK && sound(&(call), wrong) && is_allowed(&(call)))
 
 /* What is wrong, unless it is NULL, is told, and leads to FMI's error state. */
 static int sound(call *this, string wrong);
 
+/* Whether a call may come in the mode of the instance; else it fails. */
+static int is_allowed(call *this);
+
 /* Lets the next call of the instance begin; the status of this one. */
 static int end(call *this);
 
-/* Messages: refusals are logged even if logging is off; no categories: all. */
+/* Messages: errors are logged even if logging is off; no categories: all. */
 static void choose_messages(call *this, int logging, size_t n, const string categories[]);
 static void tell(instance *it, int status, string text);
 
-/* Modes. What comes in the wrong mode fails. */
-static void set_experiment(call *this, double start);
+/* Modes; a stop time that is not after the start stands for none. */
+static void set_experiment(call *this, double start, double stop);
 static void enter_initialisation(call *this);
 static void exit_initialisation(call *this);
 static void terminate(call *this);

@@ -5,6 +5,7 @@
  */
 #include "component.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -62,9 +63,9 @@ static void deliver(const logger *host, string instance_name, int status, string
 }
 
 /* A function that does something unless anything is wrong with its arguments. */
-#define ANSWER(name, when, wrong, parameters, action)                                            \
+#define ANSWER(name, allowed, wrong, parameters, action)                                         \
     EXPORT int FMI2(name) parameters {                                                           \
-        call this = begin(c, #name, when);                                                       \
+        call this = begin(c, #name, allowed);                                                    \
         if (GOES_ON(this, wrong)) {                                                              \
             action;                                                                              \
         }                                                                                        \
@@ -90,20 +91,22 @@ EXPORT void *FMI2(fmi2Instantiate)(string name, int type, string guid, string lo
 
 EXPORT void FMI2(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }
 
-ANSWER(fmi2Reset, ALWAYS, NULL, (void *c), reset(&this))
-ANSWER(fmi2SetDebugLogging, ALWAYS, NULL,
+ANSWER(fmi2Reset, MASK_Reset, NULL, (void *c), reset(&this))
+ANSWER(fmi2SetDebugLogging, MASK_SetDebugLogging, NULL,
        (void *c, int on, size_t n, const string categories[]),
        choose_messages(&this, on, n, categories))
 
 /* Modes and steps */
 
-ANSWER(fmi2SetupExperiment, NOT_AFTER_ERROR, NULL,
+ANSWER(fmi2SetupExperiment, MASK_SetupExperiment, NULL,
        (void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop),
-       set_experiment(&this, start))
-ANSWER(fmi2EnterInitializationMode, NOT_AFTER_ERROR, NULL, (void *c), enter_initialisation(&this))
-ANSWER(fmi2ExitInitializationMode, NOT_AFTER_ERROR, NULL, (void *c), exit_initialisation(&this))
-ANSWER(fmi2Terminate, NOT_AFTER_ERROR, NULL, (void *c), terminate(&this))
-ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, int no_set),
+       set_experiment(&this, start, has_stop ? stop : INFINITY))
+ANSWER(fmi2EnterInitializationMode, MASK_EnterInitializationMode, NULL, (void *c),
+       enter_initialisation(&this))
+ANSWER(fmi2ExitInitializationMode, MASK_ExitInitializationMode, NULL, (void *c),
+       exit_initialisation(&this))
+ANSWER(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
+ANSWER(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int no_set),
        take_step(&this, time, step))
 
 /* Values */
@@ -112,7 +115,7 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
     for (size_t i = 0; i < n; i++) action
 
 #define GET(name, type, action)                                                                  \
-    ANSWER(name, ALWAYS, wrong_values(n, r, v),                                                  \
+    ANSWER(name, MASK_Get, wrong_values(n, r, v),                                                \
            (void *c, const uint32_t r[], size_t n, type v[]), action)
 #define GET_EACH(name, type, get)                                                                \
     GET(name, type, {                                                                            \
@@ -120,7 +123,7 @@ ANSWER(fmi2DoStep, NOT_AFTER_ERROR, NULL, (void *c, double time, double step, in
         FOR_EACH(v[i] = get(&this, r[i]));                                                       \
     })
 #define SET(name, type, wrong, action)                                                           \
-    ANSWER(name, NOT_AFTER_ERROR, wrong,                                                         \
+    ANSWER(name, MASK_Set, wrong,                                                                \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
 #define SET_EACH(name, c_type, type, number)                                                     \
     SET(name, c_type, wrong_values(n, r, v), {                                                   \
@@ -145,14 +148,15 @@ SET(fmi2SetString, string, wrong_strings(n, r, v), set_unknown(&this, "String", 
 
 /* States */
 
-ANSWER(fmi2GetFMUstate, ALWAYS, NULL, (void *c, void **state), get_state(&this, state))
-ANSWER(fmi2SetFMUstate, ALWAYS, NULL, (void *c, void *state), set_state(&this, state))
-ANSWER(fmi2FreeFMUstate, ALWAYS, NULL, (void *c, void **state), free_state(&this, state))
-ANSWER(fmi2SerializedFMUstateSize, ALWAYS, NULL, (void *c, void *state, size_t *size),
+ANSWER(fmi2GetFMUstate, MASK_FMUstate, NULL, (void *c, void **state), get_state(&this, state))
+ANSWER(fmi2SetFMUstate, MASK_FMUstate, NULL, (void *c, void *state), set_state(&this, state))
+ANSWER(fmi2FreeFMUstate, MASK_FMUstate, NULL, (void *c, void **state), free_state(&this, state))
+ANSWER(fmi2SerializedFMUstateSize, MASK_FMUstate, NULL, (void *c, void *state, size_t *size),
        size_of_state(&this, state, size))
-ANSWER(fmi2SerializeFMUstate, ALWAYS, NULL, (void *c, void *state, char bytes[], size_t size),
+ANSWER(fmi2SerializeFMUstate, MASK_FMUstate, NULL,
+       (void *c, void *state, char bytes[], size_t size),
        serialise_state(&this, state, (unsigned char *)bytes, size))
-ANSWER(fmi2DeSerializeFMUstate, ALWAYS, NULL,
+ANSWER(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
        (void *c, const char bytes[], size_t size, void **state),
        deserialise_state(&this, (const unsigned char *)bytes, size, state))
 
@@ -165,32 +169,32 @@ static int not_supported(call *this, int status) {
     return status;
 }
 
-#define NOT_SUPPORTED(name, when, wrong, answer, parameters)                                     \
-    ANSWER(name, when, wrong, parameters, this.status = not_supported(&this, answer))
+#define NOT_SUPPORTED(name, wrong, answer, parameters)                                           \
+    ANSWER(name, MASK_NotSupported, wrong, parameters, this.status = not_supported(&this, answer))
 
-NOT_SUPPORTED(fmi2GetDirectionalDerivative, ALWAYS, NULL, FMI_ERROR,
+NOT_SUPPORTED(fmi2GetDirectionalDerivative, NULL, FMI_ERROR,
               (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,
                const double dk[], double du[]))
-NOT_SUPPORTED(fmi2SetRealInputDerivatives, NOT_AFTER_ERROR, NULL, FMI_ERROR,
+NOT_SUPPORTED(fmi2SetRealInputDerivatives, NULL, FMI_ERROR,
               (void *c, const uint32_t r[], size_t n, const int order[], const double v[]))
-NOT_SUPPORTED(fmi2GetRealOutputDerivatives, ALWAYS, NULL, FMI_ERROR,
+NOT_SUPPORTED(fmi2GetRealOutputDerivatives, NULL, FMI_ERROR,
               (void *c, const uint32_t r[], size_t n, const int order[], double v[]))
-NOT_SUPPORTED(fmi2CancelStep, NOT_AFTER_ERROR, NULL, FMI_ERROR, (void *c))
+NOT_SUPPORTED(fmi2CancelStep, NULL, FMI_ERROR, (void *c))
 
 static string wrong_place_of(const void *value) { return value == NULL ? "NULL" : NULL; }
 
-NOT_SUPPORTED(fmi2GetStatus, ALWAYS, wrong_place_of(v), FMI_ERROR, (void *c, int kind, int *v))
-NOT_SUPPORTED(fmi2GetIntegerStatus, ALWAYS, wrong_place_of(v), FMI_DISCARD,
+NOT_SUPPORTED(fmi2GetStatus, wrong_place_of(v), FMI_ERROR, (void *c, int kind, int *v))
+NOT_SUPPORTED(fmi2GetIntegerStatus, wrong_place_of(v), FMI_DISCARD,
               (void *c, int kind, int *v))
-NOT_SUPPORTED(fmi2GetStringStatus, ALWAYS, wrong_place_of(v), FMI_DISCARD,
+NOT_SUPPORTED(fmi2GetStringStatus, wrong_place_of(v), FMI_DISCARD,
               (void *c, int kind, string *v))
 
 #define OF_MODEL_EXCHANGE(name, parameters)                                                      \
-    NOT_SUPPORTED(name, NOT_AFTER_ERROR, NULL, FMI_ERROR, parameters)
+    NOT_SUPPORTED(name, NULL, FMI_ERROR, parameters)
 
 MODEL_EXCHANGE_FUNCTIONS(OF_MODEL_EXCHANGE)
 
-ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double *v), {
+ANSWER(fmi2GetRealStatus, MASK_Get, wrong_place_of(v), (void *c, int kind, double *v), {
     if (kind == LAST_SUCCESSFUL_TIME) {
         *v = time_of(&this);
     } else {
@@ -201,7 +205,7 @@ ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double 
 
 /* No answer: with "true" hosts would end the run as a success, and with "false" FMPy would repeat a
  * refused step without end. */
-ANSWER(fmi2GetBooleanStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, int *v), {
+ANSWER(fmi2GetBooleanStatus, MASK_Get, wrong_place_of(v), (void *c, int kind, int *v), {
     *v = 0;
     this.status = FMI_DISCARD;
 })

@@ -8,6 +8,8 @@
  */
 #include "component.h"
 
+#include <math.h>
+
 static const names version = {
     .types = {"Float64", "Int32", "Boolean", "Enumeration"},
     .token = "instantiation token",
@@ -69,7 +71,7 @@ static void switch_categories(call *this, int on, size_t n, const string names[]
 }
 
 EXPORT int FMI3(fmi3SetDebugLogging)(void *handle, boolean on, size_t n, const string names[]) {
-    call this = begin(handle, "fmi3SetDebugLogging", ALWAYS);
+    call this = begin(handle, "fmi3SetDebugLogging", MASK_SetDebugLogging);
     if (GOES_ON(this, wrong_texts(n, names))) switch_categories(&this, on, n, names);
     return end(&this);
 }
@@ -110,31 +112,31 @@ EXPORT void FMI3(fmi3FreeInstance)(void *handle) { free_instance(handle, "fmi3Fr
 
 EXPORT int FMI3(fmi3EnterInitializationMode)(void *handle, boolean has_tolerance, double tolerance,
                                              double start, boolean has_stop, double stop) {
-    call this = begin(handle, "fmi3EnterInitializationMode", NOT_AFTER_ERROR);
+    call this = begin(handle, "fmi3EnterInitializationMode", MASK_EnterInitializationMode);
     if (GOES_ON(this, NULL)) {
-        set_experiment(&this, start);
+        set_experiment(&this, start, has_stop ? stop : INFINITY);
         if (this.status == FMI_OK) enter_initialisation(&this);
     }
     return end(&this);
 }
 
-#define MODE(name, when, action)                                                                 \
+#define MODE(name, allowed, action)                                                              \
     EXPORT int FMI3(name)(void *handle) {                                                        \
-        call this = begin(handle, #name, when);                                                  \
+        call this = begin(handle, #name, allowed);                                               \
         if (GOES_ON(this, NULL)) action(&this);                                                  \
         return end(&this);                                                                       \
     }
 
-MODE(fmi3ExitInitializationMode, NOT_AFTER_ERROR, exit_initialisation)
-MODE(fmi3Terminate, NOT_AFTER_ERROR, terminate)
-MODE(fmi3Reset, ALWAYS, reset)
+MODE(fmi3ExitInitializationMode, MASK_ExitInitializationMode, exit_initialisation)
+MODE(fmi3Terminate, MASK_Terminate, terminate)
+MODE(fmi3Reset, MASK_Reset, reset)
 
 /* Steps */
 
 EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_set,
                             boolean *event_handling_needed, boolean *terminate_simulation,
                             boolean *early_return, double *last_successful_time) {
-    call this = begin(handle, "fmi3DoStep", NOT_AFTER_ERROR);
+    call this = begin(handle, "fmi3DoStep", MASK_DoStep);
     int complete = event_handling_needed && terminate_simulation && early_return &&
                    last_successful_time;
     if (GOES_ON(this, complete ? NULL : "NULL")) {
@@ -153,7 +155,7 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
 
 #define GET(name, type, get)                                                                     \
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
-        call this = begin(handle, #name, ALWAYS);                                                \
+        call this = begin(handle, #name, MASK_Get);                                              \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
             prepare_to_get(&this, r, n);                                                         \
             for (size_t i = 0; i < n; i++) v[i] = get(&this, r[i]);                              \
@@ -164,7 +166,7 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
 #define SET(name, c_type, type, number)                                                          \
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const c_type v[],         \
                           size_t n_v) {                                                          \
-        call this = begin(handle, #name, NOT_AFTER_ERROR);                                       \
+        call this = begin(handle, #name, MASK_Set);                                              \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
             setting it = begin_setting(&this, type, r, n);                                       \
             for (size_t i = 0; i < n; i++) set_value(&it, r[i], (double)(number));               \
@@ -182,7 +184,7 @@ SET(fmi3SetInt64, int64_t, ENUMERATION, v[i])
 
 EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
                                 size_t n_v) {
-    call this = begin(handle, "fmi3GetFloat64", ALWAYS);
+    call this = begin(handle, "fmi3GetFloat64", MASK_Get);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {
         for (size_t i = 0, from = 0; i <= n; i++) {
             if (i < n && r[i] != TIME) continue;
@@ -196,7 +198,7 @@ EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, doub
 
 EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, const double v[],
                                 size_t n_v) {
-    call this = begin(handle, "fmi3SetFloat64", NOT_AFTER_ERROR);
+    call this = begin(handle, "fmi3SetFloat64", MASK_Set);
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(&this, r, n, v);
     return end(&this);
 }
@@ -205,14 +207,14 @@ EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, cons
 
 static int get_none(void *handle, string function, string type, const uint32_t r[], size_t n,
                     string wrong) {
-    call this = begin(handle, function, ALWAYS);
+    call this = begin(handle, function, MASK_Get);
     if (GOES_ON(this, wrong)) get_unknown(&this, type, r, n);
     return end(&this);
 }
 
 static int set_none(void *handle, string function, string type, const uint32_t r[], size_t n,
                     string wrong) {
-    call this = begin(handle, function, NOT_AFTER_ERROR);
+    call this = begin(handle, function, MASK_Set);
     if (GOES_ON(this, wrong)) set_unknown(&this, type, r, n);
     return end(&this);
 }
@@ -286,7 +288,7 @@ EXPORT int FMI3(fmi3SetClock)(void *handle, const uint32_t r[], size_t n, const 
 
 #define STATE_FUNCTION(name, parameters, action)                                                 \
     EXPORT int FMI3(name) parameters {                                                           \
-        call this = begin(handle, #name, ALWAYS);                                                \
+        call this = begin(handle, #name, MASK_FMUstate);                                         \
         if (GOES_ON(this, NULL)) action;                                                         \
         return end(&this);                                                                       \
     }
@@ -305,7 +307,7 @@ STATE_FUNCTION(fmi3DeserializeFMUState,
 /* What is not supported */
 
 static int unsupported(void *handle, string function) {
-    call this = begin(handle, function, ALWAYS);
+    call this = begin(handle, function, MASK_NotSupported);
     if (GOES_ON(this, NULL)) {
         message why;
         compose(&why, "FMI function not supported: %s", function);

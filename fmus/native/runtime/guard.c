@@ -5,8 +5,8 @@
 
 /* Calls */
 
-static call begin(void *handle, string function, when when) {
-    call this = {NULL, function, FMI_ERROR, NULL};
+static call begin(void *handle, string function, int allowed) {
+    call this = {NULL, function, allowed, FMI_ERROR, NULL};
     int inside;
     entry *it = hold(handle, INSTANCE, &inside);
     if (it == NULL) {
@@ -17,7 +17,7 @@ static call begin(void *handle, string function, when when) {
     }
     this.entry = it;
     this.instance = it->thing;
-    if (!this.instance->in_error || when == ALWAYS) this.status = FMI_OK;
+    if (!this.instance->in_error || allowed & WHEN(AFTER_ERROR)) this.status = FMI_OK;
     return this;
 }
 
@@ -28,6 +28,19 @@ static int sound(call *this, string wrong) {
     this->status = FMI_ERROR;
     this->instance->in_error = 1;
     tell(this->instance, FMI_ERROR, why.text);
+    return 0;
+}
+
+static APART void come_at_the_wrong_time(call *this) {
+    static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
+    message why;
+    compose(&why, "%s is not allowed when %s", this->function, names[this->instance->run.mode]);
+    fail(this, &why);
+}
+
+static int is_allowed(call *this) {
+    if (this->allowed & WHEN(this->instance->run.mode)) return 1;
+    come_at_the_wrong_time(this);
     return 0;
 }
 
@@ -80,7 +93,7 @@ static int same_token(string one, string other) {
 }
 
 static int can_be_made(string wrong, string name, string token, message *why) {
-    if (name == NULL) {
+    if (is_blank(name)) {
         compose(why, "the instance has no name");
     } else if (!is_utf8(name)) {
         compose(why, "the name of the instance is not UTF-8");
@@ -132,7 +145,7 @@ static void *instantiate(string function, string wrong, string name, string toke
 
 static void free_instance(void *handle, string function) {
     if (handle == NULL) return;
-    call this = begin(handle, function, ALWAYS);
+    call this = begin(handle, function, MASK_FreeInstance);
     void *state;
     int inside;
     if (this.instance == NULL) return;

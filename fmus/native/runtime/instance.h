@@ -87,8 +87,6 @@ typedef struct {
     uint32_t words[GENERATOR_WORDS];
 } generator;
 
-typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
-
 /* Of outputs. Those that are outdated are computed when they are read. A sampled component holds
  * those of the beginning of a step after it; the next step computes its own. */
 typedef enum { OUTDATED, HELD, FRESH } freshness;
@@ -105,7 +103,7 @@ typedef struct {
 /* Everything that the rest of a run depends on. */
 typedef struct {
     mode mode;
-    double start_time;
+    double start_time, stop_time; /* infinite: there is none */
     parameter_values parameters; /* as they were set */
     input_values inputs;
     int begun;         /* whether there is a state */

@@ -1,4 +1,5 @@
-/* What the host wants to hear, and how it is told. Refusals are told even where logging is off. */
+/* What the host wants to hear, and how it is told. Errors are told even where logging is off, as
+ * FMI 2.0.4 and 3.0.3 have it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -45,7 +46,7 @@ static int choose(listener *it, int logging, size_t n, const string categories[]
 }
 
 static int wanted(const listener *it, int status, string category) {
-    if (status >= FMI_DISCARD || (it->logging && it->n == 0)) return 1;
+    if (status >= FMI_ERROR || (it->logging && it->n == 0)) return 1;
     for (size_t i = 0; it->logging && i < it->n; i++) {
         if (strcmp(it->categories[i], category) == 0) return 1;
     }

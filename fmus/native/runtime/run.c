@@ -11,6 +11,7 @@
 /* Makes a run what it is after instantiation. */
 static void renew_run(run *it) {
     memset(it, 0, sizeof *it);
+    it->stop_time = INFINITY;
     it->parameters.h_max = INFINITY; /* unless there is such a parameter */
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER) {
@@ -150,22 +151,12 @@ static int refresh(instance *it, message *why) {
     return compose(why, "initialisation refused: %s", said.text);
 }
 
-static int follows(call *this, mode mode) {
-    static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
-    instance *it = this->instance;
-    message why;
-    if (it->run.mode == mode) return 1;
-    compose(&why, "%s is not allowed when %s", this->function, names[it->run.mode]);
-    fail(this, &why);
-    return 0;
-}
-
-static void set_experiment(call *this, double start) {
+static void set_experiment(call *this, double start, double stop) {
     run *run = &this->instance->run;
     message why;
-    if (!follows(this, INSTANTIATED)) return;
     if (isfinite(start)) {
         run->start_time = run->moments[run->now].time = start;
+        run->stop_time = stop > start ? stop : INFINITY;
     } else {
         compose(&why, "start time %r: must be finite", start);
         fail(this, &why);
@@ -173,14 +164,12 @@ static void set_experiment(call *this, double start) {
 }
 
 static void enter_initialisation(call *this) {
-    if (!follows(this, INSTANTIATED)) return;
     this->instance->run.mode = INITIALISING;
     note_change(this->instance, 0, 0);
 }
 
 static void exit_initialisation(call *this) {
     message why;
-    if (!follows(this, INITIALISING)) return;
     if (this->instance->stale && !refresh(this->instance, &why)) {
         fail(this, &why);
     } else {
@@ -277,11 +266,19 @@ static double time_of(const call *this) {
     return run->moments[run->now].time;
 }
 
+/* The latest end of a step: a host that adds its steps up reaches a stop time nearly. */
+static double latest_end(double start, double stop) {
+    return stop + ROUNDING * fmax(fabs(start), fabs(stop));
+}
+
 static void take_step(call *this, double time, double step) {
     instance *it = this->instance;
     message why, said;
-    if (!follows(this, STEPPING)) return;
-    if (!advance(it, time, step, &why)) {
+    if (time + step > latest_end(it->run.start_time, it->run.stop_time)) {
+        compose(&why, "step from %g s to %g s: the stop time is %g s", time, time + step,
+                it->run.stop_time);
+        fail(this, &why);
+    } else if (!advance(it, time, step, &why)) {
         it->underived = 1;
         compose(&said, "step refused at t = %g s: %s", time, why.text);
         discard(this, &said, why.text);

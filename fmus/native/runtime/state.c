@@ -2,7 +2,7 @@
  *
  * It is held in memory as the bytes that it is serialised to:
  *
- *     MAGIC, identity, mode, start time, time,
+ *     MAGIC, identity, mode, start time, stop time, time,
  *     parameters in the order of their ports, inputs, Reals before others,
  *     whether there is a state, and if so: the numbers of the state; of the noise the words of the
  *     generator, the place of the next, whether there is a next number, and it, and what is drawn;
@@ -49,6 +49,7 @@ static void put_run(writer *to, const run *it) {
     put_text(to, IDENTITY);
     put_word(to, it->mode);
     put_real(to, it->start_time);
+    put_real(to, it->stop_time);
     put_real(to, now->time);
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality != PARAMETER) continue;
@@ -163,9 +164,13 @@ static int take_run(reader *from, run *it, message *why) {
     if (number > TERMINATED) return compose(why, "%u is not a mode", number);
     it->mode = (mode)number;
     it->start_time = take_real(from);
+    it->stop_time = take_real(from);
     now->time = take_real(from);
     if (!isfinite(it->start_time) || isnan(now->time)) {
         return compose(why, "a value is not finite");
+    }
+    if (!(it->stop_time > it->start_time)) {
+        return compose(why, "its stop time is not after its start time");
     }
     if (it->mode < STEPPING && now->time != it->start_time) {
         return compose(why, "its time is not its start time");

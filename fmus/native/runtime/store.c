@@ -10,9 +10,6 @@
 /* Lets parameters act from the next step, if they fit together. */
 static int adopt(instance *it, const parameter_values *values, message *why);
 
-/* Whether a call comes in the one mode that it is allowed in; else it fails. */
-static int follows(call *this, mode mode);
-
 /* Computes the outputs, and before them the state at the start time if a value has changed that it
  * depends on. */
 static int refresh(instance *it, message *why);
@@ -173,11 +170,6 @@ static void note_change(instance *it, int inputs, int parameters) {
     }
 }
 
-/* Only after its end a run takes no values. */
-static int can_set(call *this) {
-    return this->instance->run.mode != TERMINATED || follows(this, STEPPING);
-}
-
 /* The values of a call, which the instance keeps until all of them are found good. */
 struct setting {
     call *call;
@@ -188,14 +180,14 @@ struct setting {
 
 static void set_unknown(call *this, string type, const uint32_t references[], size_t n) {
     message why;
-    if (n == 0 || !can_set(this)) return;
+    if (n == 0) return;
     compose(&why, NO_PORT, type, references[0]);
     fail(this, &why);
 }
 
 static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n) {
     instance *instance = this->instance;
-    setting it = {this, can_set(this), 0, 0, 0};
+    setting it = {this, 1, 0, 0, 0};
     for (size_t i = 0; i < n && it.good; i++) {
         const port *port = port_at(references[i]);
         if (port != NULL && passes_as(port, type)) {
@@ -210,16 +202,22 @@ static setting begin_setting(call *this, fmi_type type, const uint32_t reference
     return it;
 }
 
-static int take_value(setting *it, const port *port, double number, message *why) {
-    instance *instance = it->call->instance;
-    const run *run = &instance->run;
+static int is_settled(const run *run, const port *port) {
+    return port->variability == FIXED && run->mode == STEPPING;
+}
+
+/* Whether the standard lets a port be set to any value now; a host may tell a fixed one again. */
+static int can_be_set(const run *run, const port *port, double number, message *why) {
     if (port->causality == OUTPUT) {
         return compose(why, "%s is an output and cannot be set", port->name);
     }
-    if (port->variability == FIXED && run->mode == STEPPING) {
-        return number == parameter(&run->parameters, port) ||
-               compose(why, "%s is fixed and cannot change after initialisation", port->name);
-    }
+    return !is_settled(run, port) || number == parameter(&run->parameters, port) ||
+           compose(why, "%s is fixed and cannot change after initialisation", port->name);
+}
+
+static int take_value(setting *it, const port *port, double number, message *why) {
+    instance *instance = it->call->instance;
+    if (is_settled(&instance->run, port)) return 1;
     if (!in_range(port, number, why)) return 0;
     if (port->causality == INPUT) {
         instance->set_inputs.values[port->place] = number;
@@ -244,7 +242,14 @@ static void give_up(setting *it, message *why) {
 
 static void set_value(setting *it, uint32_t reference, double number) {
     message why;
-    if (it->good && !take_value(it, port_at(reference), number, &why)) give_up(it, &why);
+    const port *port = port_at(reference);
+    if (!it->good) return;
+    if (!can_be_set(&it->call->instance->run, port, number, &why)) {
+        it->good = 0;
+        fail(it->call, &why);
+    } else if (!take_value(it, port, number, &why)) {
+        give_up(it, &why);
+    }
 }
 
 static void end_setting(setting *it) {

@@ -33,13 +33,13 @@ static const size_t MOST_BYTES = (size_t)1 << 30;
     } while (0)
 
 /* A function that is forwarded as it is if nothing is wrong with its arguments. */
-#define FORWARD(name, when, wrong, parameters, arguments)                                        \
+#define FORWARD(name, allowed, wrong, parameters, arguments)                                     \
     EXPORT int name parameters {                                                                 \
-        call this = begin(c, #name, when);                                                       \
+        call this = begin(c, #name, allowed);                                                    \
         if (GOES_ON(this, wrong)) {                                                              \
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
-            take_answer(&this, when == NOT_AFTER_ERROR);                                         \
+            take_answer(&this, !((allowed) & WHEN(AFTER_ERROR)));                                  \
         }                                                                                        \
         return end(&this);                                                                       \
     }
@@ -87,7 +87,7 @@ static component new_component(instance *it, string guid, string path, int visib
 EXPORT component fmi2Instantiate(string name, int type, string guid, string location,
                                  const callbacks *functions, int visible, int logging) {
     char why[WHY] = "the slave cannot be created", *path = NULL;
-    string wrong = name == NULL              ? "the instance has no name"
+    string wrong = is_blank(name)            ? "the instance has no name"
                    : !is_utf8(name)          ? "the name of the instance is not UTF-8"
                    : type != CO_SIMULATION   ? "this FMU is for co-simulation only"
                    : location == NULL        ? "there is no resource location"
@@ -124,7 +124,7 @@ static int free_state(instance *it, void *state) {
 
 EXPORT void fmi2FreeInstance(component c) {
     if (c == NULL) return;
-    call this = begin(c, "fmi2FreeInstance", ALWAYS);
+    call this = begin(c, "fmi2FreeInstance", MASK_FreeInstance);
     void *state;
     if (this.instance == NULL) return;
     /* PythonFMU may have freed parts of a lost instance: it is not touched. */
@@ -142,7 +142,7 @@ EXPORT void fmi2FreeInstance(component c) {
 }
 
 EXPORT int fmi2Reset(component c) {
-    call this = begin(c, "fmi2Reset", ALWAYS);
+    call this = begin(c, "fmi2Reset", MASK_Reset);
     if (GOES_ON(this, NULL)) {
         TO_PYTHONFMU(this, fmi2Reset, (component), (this.instance->slave));
         if (this.status == FMI_OK) {
@@ -155,7 +155,7 @@ EXPORT int fmi2Reset(component c) {
 
 /* Messages are chosen here: PythonFMU would keep errors back, too. */
 EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names[]) {
-    call this = begin(c, "fmi2SetDebugLogging", ALWAYS);
+    call this = begin(c, "fmi2SetDebugLogging", MASK_SetDebugLogging);
     if (GOES_ON(this, wrong_texts(n, names)) && !choose(&this.instance->host, on, n, names)) {
         refuse(&this, "out of memory");
     }
@@ -165,9 +165,9 @@ EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names
 /* Modes and steps */
 
 /* A function that is forwarded, and after which steps have come to a time. */
-#define FORWARD_TO(time_after, name, parameters, arguments)                                      \
+#define FORWARD_TO(time_after, name, allowed, parameters, arguments)                             \
     EXPORT int name parameters {                                                                 \
-        call this = begin(c, #name, NOT_AFTER_ERROR);                                            \
+        call this = begin(c, #name, allowed);                                                    \
         if (GOES_ON(this, NULL)) {                                                               \
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
@@ -177,24 +177,24 @@ EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names
         return end(&this);                                                                       \
     }
 
-FORWARD_TO(start, fmi2SetupExperiment,
+FORWARD_TO(start, fmi2SetupExperiment, MASK_SetupExperiment,
            (component c, int has_tolerance, double tolerance, double start, int has_stop,
             double stop),
            (c, has_tolerance, tolerance, start, has_stop, stop))
-FORWARD(fmi2EnterInitializationMode, NOT_AFTER_ERROR, NULL, (component c), (c))
-FORWARD(fmi2ExitInitializationMode, NOT_AFTER_ERROR, NULL, (component c), (c))
-FORWARD(fmi2Terminate, NOT_AFTER_ERROR, NULL, (component c), (c))
-FORWARD_TO(time + step, fmi2DoStep, (component c, double time, double step, int no_set),
-           (c, time, step, no_set))
-FORWARD(fmi2CancelStep, NOT_AFTER_ERROR, NULL, (component c), (c))
+FORWARD(fmi2EnterInitializationMode, MASK_EnterInitializationMode, NULL, (component c), (c))
+FORWARD(fmi2ExitInitializationMode, MASK_ExitInitializationMode, NULL, (component c), (c))
+FORWARD(fmi2Terminate, MASK_Terminate, NULL, (component c), (c))
+FORWARD_TO(time + step, fmi2DoStep, MASK_DoStep,
+           (component c, double time, double step, int no_set), (c, time, step, no_set))
+FORWARD(fmi2CancelStep, MASK_NotSupported, NULL, (component c), (c))
 
 /* Values */
 
 #define GET(name, type)                                                                          \
-    FORWARD(name, ALWAYS, wrong_values(n, r, v),                                                 \
+    FORWARD(name, MASK_Get, wrong_values(n, r, v),                                               \
             (component c, const reference r[], size_t n, type v[]), (c, r, n, v))
 #define SET(name, type, wrong)                                                                   \
-    FORWARD(name, NOT_AFTER_ERROR, wrong, (component c, const reference r[], size_t n, type v[]), \
+    FORWARD(name, MASK_Set, wrong, (component c, const reference r[], size_t n, type v[]),       \
             (c, r, n, v))
 
 GET(fmi2GetReal, double)
@@ -231,7 +231,7 @@ static void hand_over(call *this, component owner, void *made, void **state) {
 }
 
 EXPORT int fmi2GetFMUstate(component c, void **state) {
-    call this = begin(c, "fmi2GetFMUstate", ALWAYS);
+    call this = begin(c, "fmi2GetFMUstate", MASK_FMUstate);
     if (GOES_ON(this, wrong_place(state))) {
         void *made = NULL;
         TO_PYTHONFMU(this, fmi2GetFMUstate, (component, void **), (this.instance->slave, &made));
@@ -241,7 +241,7 @@ EXPORT int fmi2GetFMUstate(component c, void **state) {
 }
 
 EXPORT int fmi2SetFMUstate(component c, void *state) {
-    call this = begin(c, "fmi2SetFMUstate", ALWAYS);
+    call this = begin(c, "fmi2SetFMUstate", MASK_FMUstate);
     if (GOES_ON(this, wrong_state(state))) {
         TO_PYTHONFMU(this, fmi2SetFMUstate, (component, void *),
                      (this.instance->slave, thing_of(state, STATE)));
@@ -252,7 +252,7 @@ EXPORT int fmi2SetFMUstate(component c, void *state) {
 }
 
 EXPORT int fmi2FreeFMUstate(component c, void **state) {
-    call this = begin(c, "fmi2FreeFMUstate", ALWAYS);
+    call this = begin(c, "fmi2FreeFMUstate", MASK_FMUstate);
     if (GOES_ON(this, wrong_place(state)) && *state != NULL) {
         void *object = thing_of(*state, STATE);
         drop(*state);
@@ -271,7 +271,7 @@ static size_t size_of_state(call *this, void *object) {
 }
 
 EXPORT int fmi2SerializedFMUstateSize(component c, void *state, size_t *size) {
-    call this = begin(c, "fmi2SerializedFMUstateSize", ALWAYS);
+    call this = begin(c, "fmi2SerializedFMUstateSize", MASK_FMUstate);
     if (GOES_ON(this, size == NULL ? "NULL" : wrong_state(state))) {
         *size = size_of_state(&this, thing_of(state, STATE));
     }
@@ -280,7 +280,7 @@ EXPORT int fmi2SerializedFMUstateSize(component c, void *state, size_t *size) {
 
 /* PythonFMU copies as many bytes as it is told, however many there are. */
 EXPORT int fmi2SerializeFMUstate(component c, void *state, char bytes[], size_t size) {
-    call this = begin(c, "fmi2SerializeFMUstate", ALWAYS);
+    call this = begin(c, "fmi2SerializeFMUstate", MASK_FMUstate);
     if (GOES_ON(this, bytes == NULL ? "NULL" : wrong_state(state))) {
         void *object = thing_of(state, STATE);
         py.Py_IncRef(object);
@@ -295,7 +295,7 @@ EXPORT int fmi2SerializeFMUstate(component c, void *state, char bytes[], size_t 
 }
 
 EXPORT int fmi2DeSerializeFMUstate(component c, const char bytes[], size_t size, void **state) {
-    call this = begin(c, "fmi2DeSerializeFMUstate", ALWAYS);
+    call this = begin(c, "fmi2DeSerializeFMUstate", MASK_FMUstate);
     if (GOES_ON(this, bytes == NULL ? "NULL" : wrong_place(state)) &&
         GOES_ON(this, size == 0 || size > MOST_BYTES ? "no state has that size" : NULL)) {
         void *made = NULL;
@@ -308,19 +308,20 @@ EXPORT int fmi2DeSerializeFMUstate(component c, const char bytes[], size_t size,
 
 /* What PythonFMU has no answer to, or hardly one */
 
-FORWARD(fmi2GetDirectionalDerivative, ALWAYS, NULL,
+FORWARD(fmi2GetDirectionalDerivative, MASK_NotSupported, NULL,
         (component c, const reference u[], size_t nu, const reference k[], size_t nk,
          const double dk[], double du[]),
         (c, u, nu, k, nk, dk, du))
-FORWARD(fmi2SetRealInputDerivatives, NOT_AFTER_ERROR, NULL,
+FORWARD(fmi2SetRealInputDerivatives, MASK_NotSupported, NULL,
         (component c, const reference r[], size_t n, const int order[], const double v[]),
         (c, r, n, order, v))
-FORWARD(fmi2GetRealOutputDerivatives, ALWAYS, NULL,
+FORWARD(fmi2GetRealOutputDerivatives, MASK_NotSupported, NULL,
         (component c, const reference r[], size_t n, const int order[], double v[]),
         (c, r, n, order, v))
 
 #define STATUS(name, type)                                                                       \
-    FORWARD(name, ALWAYS, v == NULL ? "NULL" : NULL, (component c, int kind, type *v), (c, kind, v))
+    FORWARD(name, MASK_Get, v == NULL ? "NULL" : NULL, (component c, int kind, type *v),         \
+            (c, kind, v))
 
 STATUS(fmi2GetStatus, int)
 STATUS(fmi2GetIntegerStatus, int)
@@ -328,7 +329,7 @@ STATUS(fmi2GetStringStatus, string)
 
 /* PythonFMU's time is also that of a step that was refused, and of the run before a reset. */
 EXPORT int fmi2GetRealStatus(component c, int kind, double *v) {
-    call this = begin(c, "fmi2GetRealStatus", ALWAYS);
+    call this = begin(c, "fmi2GetRealStatus", MASK_Get);
     if (GOES_ON(this, v == NULL ? "NULL" : NULL)) {
         if (kind == LAST_SUCCESSFUL_TIME) {
             *v = this.instance->last_successful_time;
@@ -343,7 +344,7 @@ EXPORT int fmi2GetRealStatus(component c, int kind, double *v) {
 /* No answer: PythonFMU's own is "true" after each refused step, and hosts would end the run as a
  * success; with "false" FMPy would repeat the step without end. */
 EXPORT int fmi2GetBooleanStatus(component c, int kind, int *v) {
-    call this = begin(c, "fmi2GetBooleanStatus", ALWAYS);
+    call this = begin(c, "fmi2GetBooleanStatus", MASK_Get);
     (void)kind;
     if (GOES_ON(this, v == NULL ? "NULL" : NULL)) {
         *v = 0;
@@ -353,7 +354,7 @@ EXPORT int fmi2GetBooleanStatus(component c, int kind, int *v) {
 }
 
 static int not_supported(component c, string function) {
-    call this = begin(c, function, NOT_AFTER_ERROR);
+    call this = begin(c, function, MASK_NotSupported);
     if (GOES_ON(this, NULL)) {
         complain(this.instance, FMI_ERROR, "FMI function not supported: %s", function);
         this.status = FMI_ERROR;

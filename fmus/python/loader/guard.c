@@ -79,7 +79,7 @@ static int lets_go(string function) {
     return strcmp(function, "fmi2Terminate") == 0 || strcmp(function, "fmi2FreeInstance") == 0;
 }
 
-call begin(component handle, string function, when when) {
+call begin(component handle, string function, int allowed) {
     call this = {.function = function, .status = FMI_ERROR, .handle = handle};
     string wrong = "not a live instance of this FMU";
     instance *it = NULL;
@@ -103,7 +103,7 @@ call begin(component handle, string function, when when) {
     it->thread = pthread_self();
     if (it->condition == LOST) {
         this.status = FMI_FATAL;
-    } else if (it->condition == SOUND || when == ALWAYS) {
+    } else if (it->condition == SOUND || allowed & WHEN(AFTER_ERROR)) {
         this.status = FMI_OK;
     }
     return this;

@@ -16,6 +16,7 @@
 #include <pthread.h>
 
 #include "../../native/runtime/host.h"
+#include "../../native/runtime/modes.h"
 
 #define EXPORT __attribute__((visibility("default")))
 
@@ -147,16 +148,13 @@ typedef struct {
     int lock;
 } call;
 
-/* Whether a call is let through in FMI's error state. */
-typedef enum { NOT_AFTER_ERROR, ALWAYS } when;
-
 /* Whether a call may be forwarded: only then are its arguments checked. */
 #define GOES_ON(call, wrong)                                                                    \
     ((call).instance != NULL && (call).status == FMI_OK && sound(&(call), wrong))
 
 instance *new_instance(string name, const callbacks *functions, int logging);
 void release_instance(instance *it);
-call begin(component handle, string function, when when);
+call begin(component handle, string function, int allowed);
 int sound(call *this, string wrong);
 int refuse(call *this, string wrong);
 void take_answer(call *this, int ends_in_error);
