@@ -8,9 +8,9 @@ from typing import Annotated, NamedTuple, TypedDict
 import pytest
 
 from auv_fmu.linear_algebra import Matrix, Vector
+from auv_fmu.quantities import NU, POSITION, TAU, per_axis
 from fmus.ports.groups import Nothing, ParameterSet, packing, slices, unpacking
 from fmus.ports.port import Port, inputs, outputs, parameter, parameters, setting
-from auv_fmu.quantities import NU, POSITION, TAU, per_axis
 from fmus.python.component import Component
 
 Vector3 = tuple[float, float, float]

@@ -7,7 +7,6 @@ from math import inf, nan
 
 import pytest
 
-from fmus.ports.port import Misdeclared, Port, Refusal, inputs, parameter, parameters
 from auv_fmu.quantities import (
     ETA_WITHOUT_ROLL,
     TAU,
@@ -17,6 +16,7 @@ from auv_fmu.quantities import (
     member_of,
     per_axis,
 )
+from fmus.ports.port import Misdeclared, Port, Refusal, inputs, parameter, parameters
 
 REAL = parameter("k", 1.0, "1", "Gain", 0.5, 2.5)
 UNBOUNDED = parameter("k", 1.0, "1", "Gain")

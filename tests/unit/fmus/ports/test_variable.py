@@ -13,13 +13,13 @@ from fmpy.validation import validate_fmu
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu import POSITIVE, Variable, declared
 from auv_fmu.linear_algebra import Matrix, Vector
 from fmus.discovery import source_of
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_description
 from fmus.ports.groups import ParameterSet, ports_in
 from fmus.ports.port import Misdeclared, Port
-from auv_fmu import POSITIVE, Variable, declared
 
 
 class Mode(IntEnum):

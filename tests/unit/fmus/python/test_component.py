@@ -505,7 +505,7 @@ def test_long_step_is_as_many_short_ones_with_held_inputs(name):
     assert long.step(0.1)
     for _ in range(5):
         assert short.step(0.1 / 5)
-    assert long.slave._state == short.slave._state
+    assert long.slave._store.state == short.slave._store.state
 
 
 @pytest.mark.parametrize("name", WITH_STEP_LIMIT)
