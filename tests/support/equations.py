@@ -93,10 +93,13 @@ def is_series(kind: Any) -> bool:
     return parts_of(kind) is not None and not is_record(kind)
 
 
-@cache
 def structure(kind: Any) -> Any:
     """A type of the equations as ctypes has it."""
-    kind = form(kind)
+    return _structure(form(kind))
+
+
+@cache
+def _structure(kind: Any) -> Any:
     if kind is float:
         return c_double
     if not is_series(kind) and not is_record(kind):
