@@ -54,7 +54,7 @@ def components() -> dict[str, str]:
     """The name of every component, and its module."""
     return {
         name_of(file.parent.name): f"fmus.{file.parent.name}.component"
-        for file in sorted(package_folder("fmus").glob("*/component.py"))
+        for file in sorted(package_folder("fmus").glob("*/page.md"))
     }
 
 

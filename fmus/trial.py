@@ -105,6 +105,9 @@ class _Trial:
             for port, one in zip(ports, given):
                 put = getattr(self._slave, f"set_{port.type.lower()}")
                 put([self._references[port.name]], [_meant(port, one)])
+        if causality == "input":
+            # Those that stay as they are belong to another time.
+            self._slave._forget("inputs")
 
     def get(self, port: Port) -> Any:
         """The value of an output."""

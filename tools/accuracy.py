@@ -19,6 +19,7 @@ from auv_fmu.attitude import normalised, rotation_from_quaternion
 from auv_fmu.blocks import Scene
 from auv_fmu.closed_loop import Setting, Vehicles, blocks_of
 from auv_fmu.euler import STEP
+from auv_fmu.output_feedback import ControllerState
 from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
@@ -203,7 +204,10 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     assert isinstance(own, plant.Parameters)
     assert isinstance(settings, motion_planner.Parameters)
     begun = closed_loop.begin(setting, blocks, (0.0, 0.0, 0.0))
-    start = begun.vehicles.plant, begun.vehicles.planner, begun.controller_state
+    assert isinstance(begun.controller_state, ControllerState)
+    # Its steps are all of one length, which so does not change.
+    control_begun = begun.controller_state._replace(h=h)
+    start = begun.vehicles.plant, begun.vehicles.planner, control_begun
 
     def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Scene]:
         state, planner, control = like(start, iter(x.tolist()))
@@ -215,12 +219,13 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         vehicles, control, seen = unpacked(t, x)
         measured = law.measurement(seen)
-        control, signals = law.command(setting.controller, control, measured, 0.0)
+        control = law.gated(setting.controller, control, measured)
+        signals = law.evaluate(setting.controller, control, measured, 0.0)
         tau = plant.applied(own, signals.tau)
         state, rotation = vehicles.plant, vehicles.rotation
         moving = plant.rates(own.vehicle, own.roll, state, rotation, tau, seen.tau_w)
         planned = motion_planner.step(vehicles.planner, vehicles.moving, h)
-        control_later = law.steps(setting.controller, control, signals, measured, h, 1)
+        control_later = law.step(control, signals, h)
         rest = np.subtract(flat((planned, control_later)), flat((vehicles.planner, control))) / h
         return np.array([*flat(moving), *(0.0 for _ in flat((state.tau, state.water))), *rest])
 

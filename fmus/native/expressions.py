@@ -328,13 +328,12 @@ class Expressions:
         key = constant_of(place)
         if key is None and not (isinstance(code.shape, Structure) and code.shape.is_array):
             key = self.size(place)
-        if isinstance(key, float) or (isinstance(key, str) and _fields(code.shape)):
+        if isinstance(key, (float, str)):
             raise self.fail(node, f"there is no element {ast.unparse(place)} here")
-        key = in_c(key) if isinstance(key, str) else key
         if isinstance(key, int) and key < 0:
             key += len(parts)
         for i, (suffix, part) in enumerate(parts):
-            if key is not None and key in (i, suffix[1:]):
+            if key == i:
                 return Code(f"{code.within(POSTFIX)}{suffix}", part)
         if key is not None:
             raise self.fail(node, f"there is no element {ast.unparse(place)} here")
@@ -403,19 +402,6 @@ class Expressions:
         if not is_dotted_name(node):
             raise self.fail(node, "a star before something that has no name")
         return self.parts(node, self.code(node))
-
-    def _dict(self, node: ast.Dict, wanted: Shape | None) -> Code:
-        if not isinstance(wanted, Structure):
-            raise self.fail(node, "a dict that is not a result: write a NamedTuple")
-        keys = [in_c(ast.literal_eval(key)) for key in node.keys if key is not None]
-        given = dict(zip(keys, node.values))
-        for suffix, _ in wanted.parts:
-            if suffix[1:] not in given:
-                raise self.fail(node, f"{suffix[1:]} is missing in {wanted.word}")
-        if len(node.keys) != len(wanted.parts):
-            raise self.fail(node, f"{len(node.keys)} values for {len(wanted.parts)} keys")
-        codes = [self.fitting(given[suffix[1:]], part) for suffix, part in wanted.parts]
-        return self.literal(wanted, codes)
 
     def literal(self, shape: Structure, codes: Sequence[Code]) -> Code:
         """A structure with these values."""

@@ -46,35 +46,27 @@ class Passage:
 
     Attributes:
         type: of the equations, in C.
-        declaration: of its member or type in the runtime, before its name and after it.
-        array: what the runtime's pointer is followed by to be an array; empty: it is none.
-        gather, scatter: names of the functions between the two forms.
+        declaration: of the type in the runtime.
+        gather, scatter: names of the functions between the two forms; empty: both are the same.
         functions: their texts.
 
     """
 
     type: str
-    declaration: tuple[str, str]
-    array: str = ""
+    declaration: str
     gather: str = ""
     scatter: str = ""
     functions: Sequence[str] = ()
 
-    def got(self, whole: str, pointer: str) -> str:
-        """The structure of the equations, from what the runtime points at.
+    def got(self, pointer: str) -> str:
+        """The structure of the equations, from where the runtime has it."""
+        return f"{self.gather}({pointer}->v)" if self.gather else f"*{pointer}"
 
-        Args:
-            whole: how it is written where it is that structure.
-            pointer: to where the numbers are.
-
-        """
-        return f"{self.gather}({pointer}{self.array})" if self.gather else whole
-
-    def put(self, whole: str, pointer: str, value: str) -> str:
+    def put(self, pointer: str, value: str) -> str:
         """The statement that hands a structure over to the runtime."""
         if self.scatter:
-            return f"{self.scatter}({value}, {pointer}{self.array});"
-        return f"{whole} = {value};"
+            return f"{self.scatter}({value}, {pointer}->v);"
+        return f"*{pointer} = {value};"
 
 
 def passage(program: Program, what: str, shape: Shape, is_state: bool = False) -> Passage:
@@ -88,7 +80,7 @@ def passage(program: Program, what: str, shape: Shape, is_state: bool = False) -
 
     """
     if has_only_doubles(shape):
-        return Passage(shape.name, (shape.name, ""))
+        return Passage(shape.name, shape.name)
     n = count(shape)
     places = [*range(n)] if is_state else _reals_first(shape)
     owner: Hashable = ("passage", what)
@@ -101,8 +93,7 @@ def passage(program: Program, what: str, shape: Shape, is_state: bool = False) -
         f"    {shape.name} it;\n{gathered}\n    return it;\n}}",
         f"static void {scatter}({shape.name} it, double to[]) {{\n{scattered}\n}}",
     )
-    declared = ("double", f"[{n}]") if is_state else (f"struct {{\n    double v[{n}];\n}}", "")
-    return Passage(shape.name, declared, "" if is_state else "->v", gather, scatter, functions)
+    return Passage(shape.name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
 
 
 def _lines(

@@ -101,7 +101,7 @@ INSTEAD = {
     ":=": "write the assignment on a line of its own",
     "** with other than a whole constant": "write math.pow(x, y), or sqrt(x)",
     "a comparison other than of size": "write == or <, or an or of them",
-    "a dict whose keys are not constants": "write if and elif, or a tuple and a place in it",
+    "a dict": "use a NamedTuple",
     "a dict with a for": "use a NamedTuple",
     "a line that does nothing": "leave it out",
     "a list": "write a tuple, or Vector((...))",
@@ -163,7 +163,7 @@ INSTEAD = {
 #: Packages whose functions, tuples and constants equations share.
 _PACKAGES = frozenset(("auv_fmu", "fmus"))
 
-_BASES = frozenset(("NamedTuple", "TypedDict", "ArithmeticError", "IntEnum"))
+_BASES = frozenset(("NamedTuple", "ArithmeticError", "IntEnum"))
 _OPERATORS = (
     ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.MatMult, ast.USub,
     ast.Not,
@@ -409,7 +409,7 @@ def _raised(node: ast.Raise) -> _Found:
 #: What expressions consist of.
 _EXPRESSIONS = (
     ast.Constant, ast.Name, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Tuple,
-    ast.Dict, ast.Attribute, ast.Starred, ast.Subscript, ast.Slice, ast.Call,
+    ast.Attribute, ast.Starred, ast.Subscript, ast.Slice, ast.Call,
 )  # fmt: skip
 
 
@@ -466,8 +466,6 @@ def _wrong(node: ast.expr) -> str | None:
         wrong = "** with other than a whole constant"
     elif isinstance(node, ast.Compare) and not all(isinstance(o, _COMPARISONS) for o in node.ops):
         wrong = "a comparison other than of size"
-    elif isinstance(node, ast.Dict) and not all(isinstance(k, ast.Constant) for k in node.keys):
-        wrong = "a dict whose keys are not constants"
     elif isinstance(node, ast.Call) and any(keyword.arg is None for keyword in node.keywords):
         wrong = "a call with **"
     elif isinstance(node, ast.Call) and _reduces(node):

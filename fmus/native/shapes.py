@@ -14,7 +14,7 @@ from unicodedata import category
 
 from auv_fmu import vectors
 from auv_fmu.arrays import Matrix, Vector
-from fmus.ports.groups import hints_of, is_class
+from fmus.ports.groups import hints_of, is_class, is_record
 
 #: What all components share in C.
 RUNTIME = Path(__file__).parent / "runtime"
@@ -70,7 +70,7 @@ class Structure:
     Attributes:
         name: of the structure in C.
         parts: how each element is written after a name, and its shape.
-        made: the NamedTuple or TypedDict, Vector or Matrix; None: a plain tuple.
+        made: the NamedTuple, Vector or Matrix; None: a plain tuple.
 
     """
 
@@ -191,7 +191,7 @@ def shape_of(hint: Any) -> Shape:
         return structure([shape_of(part) for part in get_args(hint)], _NAMES.get(hint))
     if is_class(hint, IntEnum):
         return INTEGER
-    if isinstance(hint, type) and hasattr(hint, "__annotations__"):
+    if is_record(hint):
         fields = hints_of(hint).items()
         parts = [(f".{in_c(name)}", _field(hint, name, part)) for name, part in fields]
         name = _without_marks(hint.__name__)

@@ -40,7 +40,7 @@ _TYPES = {float: "REAL", int: "INTEGER", bool: "BOOLEAN"}
 def tables(definition: Definition) -> str:
     """The file ports.h of a component."""
     ports = (*definition.ports, FAULT)
-    places = {FAULT.name: "0", H_MAX.name: "PARAMETER_AT(h_max)"}
+    places = {FAULT.name: "0", H_MAX: "PARAMETER_AT(h_max)"}
     parameters = shape_of(definition.behaviour.parameters)
     for name, path in definition.parameters.paths.items():
         places[name] = f"PARAMETER_AT(model{_member(parameters, path)})"

@@ -16,6 +16,7 @@ from fmus.native.shapes import Shape, Structure, closed, in_c
 from fmus.native.stack import NUMBER, deepest
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
+from fmus.ports.groups import Nothing
 
 _HEAD = """\
 /* {title}
@@ -32,10 +33,24 @@ _MOST_ON_STACK = 384 * 1024
 
 _P, _S, _I = (
     "const model_parameters *parameters",
-    "model_state *state",
+    "const model_state *state",
     "const model_inputs *inputs",
 )
-_O, _E = "model_outputs *outputs", "Error *error"
+_D, _O, _E = "const model_derived *derived", "model_outputs *outputs", "Error *error"
+_NEXT = "model_state *state"
+
+
+#: What the runtime asks of hooks: whether they take an argument.
+_TAKES = {
+    "OUTPUTS_TAKE_PARAMETERS": ("outputs", "parameters"),
+    "OUTPUTS_TAKE_DERIVED": ("outputs", "derived"),
+    "OUTPUTS_TAKE_INPUTS": ("outputs", "inputs"),
+    "OUTPUTS_TAKE_TIME": ("outputs", "t"),
+    "UPDATE_TAKES_DERIVED": ("update", "derived"),
+    "DERIVE_TAKES_STATE": ("derive", "state"),
+    "DERIVE_TAKES_INPUTS": ("derive", "inputs"),
+    "DERIVE_TAKES_TIME": ("derive", "t"),
+}
 
 
 @cache
@@ -76,56 +91,47 @@ def _glue(program: Program, said: Behaviour) -> str:
             ("inputs", said.inputs), ("outputs", said.outputs), ("state", said.state),
         )
     }  # fmt: skip
-    state, outputs = passages["state"], passages["outputs"]
     given = {
         "parameters": "*parameters",
-        "inputs": passages["inputs"].got("*inputs", "inputs"),
-        "outputs": outputs.got("*outputs", "outputs"),
-        "state": state.got("state->state", "state->state"),
-        "derived": "state->derived",
+        "inputs": passages["inputs"].got("inputs"),
+        "state": passages["state"].got("state"),
+        "derived": "*derived",
     }
     calls = {
         name: function.call([given.get(argument, argument) for argument in function.arguments])
         for name, function in functions.items()
     }
-    derive = [f"state->derived = {calls['derive']};"] if said.derived else []
-    restart: list[str] = []
-    if said.restarted:
-        restart = [state.put("state->state", "state->state", calls["restarted"]), *derive]
-    steps = f"{_P}, {_S}, {_I}, double t, double h, int n, {_O}, {_E}"
-    expects = f"{_P}, const {_S}, const {_O}, model_outputs *expected, {_E}"
-    expected = ["*expected = *outputs;"]
-    if "expected" in calls:
-        expected = [outputs.put("*expected", "expected", calls["expected"])]
+
+    def put(what: str, hook: str) -> list[str]:
+        """What hands the result of a hook over."""
+        return [passages[what].put(what, calls[hook])] if hook in calls else []
+
     # A negative seed is the number 2^32 above it.
     seed = [f"return (unsigned int){calls.get('seed', 0)};"]
+    credible = [f"return {calls.get('credible', 1)};"]
+    derive = [f"*derived = {calls['derive']};"] if said.derived else []
+    measure = _measured(said, passages["outputs"], functions["measured"]) if said.noisy else []
     parts = [
-        f"enum {{ MODEL_EXPECTS = {int('expected' in calls)}, MODEL_DRAWS = {said.draws} }};\n"
-        f"#define MODEL_RESTARTED {quoted(_directives(said.restarted))}",
-        _defined(
-            "void begin",
-            f"{_P}, {_I}, double t, {_S}, {_O}, {_E}",
-            _moved(said, passages, functions["begin"], calls["begin"]),
-        ),
-        _defined(
-            "void advance",
-            steps,
-            _moved(said, passages, functions["advance"], calls["advance"]),
-        ),
-        _defined("void check", f"{_P}, {_E}", [f"{calls['check']};"] if "check" in calls else []),
-        _defined("void derive", f"{_P}, {_S}, {_E}", derive),
-        _defined("void expected", expects, expected),
-        _defined(
-            "int credible", f"{_P}, const {_S}, {_I}, {_E}", [f"return {calls.get('credible', 1)};"]
-        ),
-        _defined("void restart", f"{_P}, {_S}, {_I}, {_E}", restart),
+        _constants(said),
+        _defined("void check", f"{_P}, {_E}", _statement(calls, "check")),
+        _defined("void check_state", f"{_P}, {_S}, {_E}", _statement(calls, "check_state")),
         _defined("unsigned long seed", f"{_P}, {_E}", seed),
+        _defined("void start", f"{_P}, {_I}, double t, {_NEXT}, {_E}", put("state", "start")),
+        _defined("int credible", f"{_P}, {_S}, {_I}, {_E}", credible),
+        _defined("void restart", f"{_P}, {_NEXT}, {_I}, {_E}", put("state", "restarted")),
         _defined(
-            "void measure",
-            f"{_P}, const double draws[], {_O}, {_E}",
-            _measured(said, outputs, functions["measured"]) if said.noisy else [],
+            "void derive", f"{_P}, {_S}, {_I}, double t, model_derived *derived, {_E}", derive
         ),
-    ]
+        _defined(
+            "void evaluate", f"{_P}, {_S}, {_D}, {_I}, double t, {_O}, {_E}",
+            put("outputs", "outputs"),
+        ),
+        _defined(
+            "void update", f"{_P}, {_NEXT}, {_D}, {_I}, double t, double h, {_E}",
+            put("state", "update"),
+        ),
+        _defined("void measure", f"{_P}, const double draws[], {_O}, {_E}", measure),
+    ]  # fmt: skip
     text = "\n\n".join(parts)
     # One that nothing calls would be a warning.
     moving = [
@@ -138,6 +144,23 @@ def _glue(program: Program, said: Behaviour) -> str:
     return "\n\n".join([*head, text])
 
 
+def _statement(calls: dict[str, str], hook: str) -> list[str]:
+    """The call of a hook that returns nothing."""
+    return [f"{calls[hook]};"] if hook in calls else []
+
+
+def _constants(said: Behaviour) -> str:
+    """What follows from the hooks before any of them is called."""
+    constants = {
+        "DRAWS": said.draws,
+        "SAMPLED": said.is_sampled,
+        "HAS_GUARD": said.hooks["credible"] is not None,
+        **{name: said.takes(*question) for name, question in _TAKES.items()},
+    }
+    rows = "".join(f"    MODEL_{name} = {int(value)},\n" for name, value in constants.items())
+    return f"enum {{\n{rows}}};\n#define MODEL_RESTARTED {quoted(_directives(said.restarted))}"
+
+
 def _directives(text: str) -> str:
     """A text for `str.format` that names the time, as one for `compose`."""
     return "".join(
@@ -147,41 +170,15 @@ def _directives(text: str) -> str:
 
 
 def _types(program: Program, said: Behaviour, passages: dict[str, Passage]) -> str:
-    inputs, outputs, state = (
-        "".join((before, " ", name, after))
-        for name, (before, after) in (
-            ("model_inputs", passages["inputs"].declaration),
-            ("model_outputs", passages["outputs"].declaration),
-            ("state", passages["state"].declaration),
-        )
-    )
-    numbers = [count(program.shape(hint)) for hint in (said.inputs, said.outputs, said.state)]
-    derived = f"    {program.shape(said.derived).name} derived;\n" if said.derived else ""
-    return (
-        f"typedef {program.shape(said.parameters).name} model_parameters;\n"
-        f"typedef {inputs};\n"
-        f"typedef {outputs};\n"
-        f"typedef struct {{\n    {state};\n{derived}}} model_state;\n\n"
-        f"enum {{ MODEL_INPUTS = {numbers[0]}, "
-        f"MODEL_OUTPUTS = {numbers[1]}, MODEL_STATE = {numbers[2]} }};"
-    )
-
-
-def _moved(
-    said: Behaviour, passages: dict[str, Passage], function: Function, call: str
-) -> list[str]:
-    """What takes over the state and the outputs that a function gives."""
-    assert isinstance(function.returns, Structure)
-    if said.is_stateless:
-        nothing = "memset(state, 0, sizeof *state);"
-        return [passages["outputs"].put("*outputs", "outputs", call), nothing]
-    (state, _), *derived, (outputs, _) = function.returns.parts
-    return [
-        f"const {function.returns.name} result = {call};",
-        passages["state"].put("state->state", "state->state", f"result{state}"),
-        *(f"state->derived = result{part};" for part, _ in derived),
-        passages["outputs"].put("*outputs", "outputs", f"result{outputs}"),
-    ]
+    defined = {
+        "model_parameters": program.shape(said.parameters).name,
+        **{f"model_{what}": passage.declaration for what, passage in passages.items()},
+        "model_derived": program.shape(said.derived or Nothing).name,
+    }
+    hints = {"INPUTS": said.inputs, "OUTPUTS": said.outputs, "STATE": said.state}
+    counts = [f"MODEL_{what} = {count(program.shape(hint))}" for what, hint in hints.items()]
+    types = "".join(f"typedef {text} {name};\n" for name, text in defined.items())
+    return f"{types}\nenum {{ {', '.join(counts)} }};"
 
 
 def _measured(said: Behaviour, outputs: Passage, function: Function) -> list[str]:
@@ -197,9 +194,9 @@ def _measured(said: Behaviour, outputs: Passage, function: Function) -> list[str
     if not outputs.gather:
         return [change]
     return [
-        f"{outputs.type} groups = {outputs.got('', 'outputs')};",
+        f"{outputs.type} groups = {outputs.got('outputs')};",
         change,
-        outputs.put("", "outputs", "groups"),
+        outputs.put("outputs", "groups"),
     ]
 
 

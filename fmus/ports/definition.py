@@ -117,6 +117,7 @@ def _fed_through(
             initial = (name for one in port.initially for name in names[one])
             yield replace(
                 port,
+                variability="discrete" if said.is_sampled else port.variability,
                 feedthrough=direct,
                 initially=tuple(name for name in initial if name not in direct),
             )

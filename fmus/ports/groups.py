@@ -142,7 +142,7 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
             raise Misdeclared(f"{where}{why}", *place)
     elif is_class(kind, IntEnum):
         for name, member in kind.__members__.items():
-            if not (name.isidentifier() and is_int32(member)):
+            if not (name.replace("-", "_").isidentifier() and is_int32(member)):
                 why = f"has the member {name!r:.40} = {member:d}; write a name and 32 bits"
                 raise Misdeclared(f"{kind.__name__} {why}", kind.__name__, name)
         if not kind.__members__:
@@ -240,7 +240,7 @@ def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:
         scalar = class_of(hint)
         yield f"whole({text})" if is_whole(scalar) else text, scalar
     elif is_record(class_of(hint)):
-        for name, part in hints_of(hint).items():
+        for name, part in hints_of(class_of(hint)).items():
             yield from scattered(part, f"{text}.{name}")
     elif parts and parts_of(parts[0]) is None and all(part is parts[0] for part in parts):
         scalar = class_of(parts[0])

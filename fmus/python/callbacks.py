@@ -57,6 +57,7 @@ class Store:
         parameters: by name.
         fault: whether a value or a step was discarded.
         fresh: whether the outputs are up to date: nothing has changed that they depend on.
+        held: whether they are those of the beginning of the last step; the next evaluates its own.
         state: of the component; None before the initialisation.
         derived: what was derived of it; None: it is to be derived when it is needed.
         start_time, time: where the run has begun, and where it is [s].
@@ -96,6 +97,7 @@ class Store:
         }
         self.fault = False
         self.fresh = True
+        self.held = False
         self.state: Any = None
         self.derived: Any = None
         self.start_time = self.time = 0.0

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from random import Random
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
@@ -41,7 +41,7 @@ from fmus.python.noise import Noise
 from fmus.python.state import Snapshot, checked, from_bytes, to_bytes
 
 #: Longest step of a component that has no internal steps [s].
-_NO_LIMIT = 1e300
+_NO_LIMIT = inf
 
 
 class Component(Callbacks):
@@ -177,7 +177,7 @@ class Component(Callbacks):
                 return f"initialisation refused: {why}"
             store.fault = True
             return f"outputs refused: {why}"
-        self._stale, store.fresh = False, True
+        self._stale, store.fresh, store.held = False, True, False
         return ""
 
     def _forget(self, what: str) -> None:
@@ -218,7 +218,7 @@ class Component(Callbacks):
                     fresh = fresh and "t" not in self.outputs_of
                     derived = None if "t" in self.derived_of else derived
             inputs = self.unpack(store.inputs)
-            if self._is_sampled and not fresh:
+            if self._is_sampled and (store.held or not fresh):
                 derived, outputs = self.evaluate(state, derived, inputs, t, draws)
             state, derived = self.advance(state, derived, inputs, t, h / n, n)
             if store.noise:
@@ -235,7 +235,8 @@ class Component(Callbacks):
             return False
         store.state, store.derived = state, derived
         store.outputs, store.draws = outputs, draws
-        store.time, store.fresh = end, self._is_prompt or self._is_sampled
+        store.time, store.held = end, self._is_sampled
+        store.fresh = self._is_prompt or self._is_sampled
         return True
 
     def _internal_steps(self, t: float, h: float) -> int:
@@ -271,6 +272,7 @@ class Component(Callbacks):
             inputs=list(store.inputs),
             outputs=list(store.outputs) if keeps else [],
             fresh=keeps and store.fresh,
+            held=keeps and store.held,
             state=store.state,
             draws=store.draws if noise else (),
             generator=noise.state if noise else None,
@@ -306,6 +308,7 @@ class Component(Callbacks):
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
         store.fresh = not self._stale and (state is None or wanted["fresh"])
+        store.held = wanted["held"]
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

@@ -121,6 +121,7 @@ class Snapshot(TypedDict):
     inputs: list[Value]
     outputs: list[Value]  #: of a sampled component; others follow from what is here
     fresh: bool  #: whether these are up to date
+    held: bool  #: whether they are those of the last step
     state: Any  #: NamedTuple of the component, None before the initialisation
     draws: tuple[float, ...]  #: what the noise of the outputs is made of
     generator: Any  #: state of the generator of the noise, None without one
@@ -186,7 +187,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         raise Refusal(f"{mode!r:.40} is not a mode")
     if not isinstance(saved["fault"], bool):
         raise Refusal("its fault is neither true nor false")
-    if not isinstance(saved["fresh"], bool):
+    if not (isinstance(saved["fresh"], bool) and isinstance(saved["held"], bool)):
         raise Refusal("its outputs are neither fresh nor not")
     if mode == INSTANTIATED and state is not None:
         raise Refusal("it has a state before the initialisation")
@@ -211,6 +212,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=_values(store, sampled, saved["outputs"]),
         fresh=bool(sampled) and saved["fresh"],
+        held=bool(sampled) and saved["held"],
         state=None if state is None else restored(said.state, state),
         draws=draws,
         generator=_frozen(saved["generator"]),

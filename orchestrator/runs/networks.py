@@ -43,7 +43,7 @@ _FLOATS = {1: np.float32, 11: np.float64}
 _OLDEST_OPSET = 7
 
 #: Ports that every component has, or any may have.
-_PORTS_OF_ALL = (FAULT.name, H_MAX.name, TIME.name)
+_PORTS_OF_ALL = (FAULT.name, H_MAX, TIME.name)
 
 _WIDTH = 98
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.observer import EXACT, FORMS, exact_gain
+from auv_fmu.observer import exact_gain
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from auv_fmu.vehicle import Vehicle
 from orchestrator.master.observers.observer import Ending, Header
@@ -96,8 +96,7 @@ def values_of(system: System) -> ValueOf:
 def gain_of_a_step(value: ValueOf, h: float, controller: str = STANDARD.controller) -> float:
     """k_d as a step of h seconds takes it [1/s]: the form of the observer may change it."""
     k_d = float(value(f"{controller}.k_d") or 0.0)
-    is_exact = FORMS.get(str(value(f"{controller}.observer"))) == EXACT
-    return exact_gain(k_d, h) if is_exact else k_d
+    return exact_gain(k_d, h) if value(f"{controller}.observer") == "exact" else k_d
 
 
 def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution]:

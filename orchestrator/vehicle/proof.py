@@ -18,7 +18,7 @@ from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.gain_conditions import observer_rate
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
+from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.vehicle import Vehicle
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.files import CsvLines
@@ -204,7 +204,7 @@ def _rows(loop: Loop, start: Table, end: Table) -> Iterator[list[float]]:
     *K2_names, lambda_name, saturation = _gains(loop)
     ell, lambda_ = real_parameter(start, loop.ell), real_parameter(start, lambda_name)
     K2_x, K2_y, K2_z = (real_parameter(start, name) for name in K2_names)
-    s = SATURATIONS[str(value_of(start, saturation))]
+    s = Saturation[str(value_of(start, saturation)).upper()]
     lower, upper = limits(start, loop)
 
     y, dy = true_control_point(start, loop), start.group(*loop.dy)

@@ -19,7 +19,11 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
 from auv_fmu.random_numbers import MESSAGE_LOSSES, start, uniform
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, distance
+
+#: Shortest period [s]: no modem is so quick.
+_QUICKEST = 0.01
 
 #: Most messages that are under way at the same time.
 PLACES = 16
@@ -42,13 +46,18 @@ class BadLink(ArithmeticError):
 class Parameters(NamedTuple):
     """Of the link; the defaults are a quick modem that loses nothing."""
 
-    period: float = 1.0  #: between messages [s]
-    sound_speed: float = 1500.0  #: in water [m/s]
-    latency: float = 0.2  #: of both modems together [s]
-    loss: float = 0.0  #: probability that a message is lost
-    seed: int = 1  #: of the losses
-    outage_start: float = 0.0  #: from when on all messages are lost [s]
-    outage_duration: float = 0.0  #: and for how long [s]; 0: never
+    period: Annotated[float, Variable("s", "Time between two messages", _QUICKEST)] = 1.0
+    sound_speed: Annotated[float, Variable("m/s", "Speed of sound in water", POSITIVE)] = 1500.0
+    latency: Annotated[float, Variable("s", "Delay by both modems together", 0.0)] = 0.2
+    loss: Annotated[float, Variable("1", "Probability that a message is lost", 0.0, 1.0)] = 0.0
+    seed: Annotated[int, Variable("1", "Seed of the random numbers that decide what is lost")] = 1
+    outage_start: Annotated[
+        float, Variable("s", "From when on all messages are lost", name="outage.start")
+    ] = 0.0
+    outage_duration: Annotated[
+        float,
+        Variable("s", "How long all messages are lost; 0: never", 0.0, name="outage.duration"),
+    ] = 0.0
 
 
 class Message(NamedTuple):
@@ -140,8 +149,6 @@ def advance(
         BadLink: the step has too many messages.
 
     """
-    if h == 0.0:
-        return state
     before, end = t + h - _ROUNDING * h, t + h + _ROUNDING * h
     due = (before - next_time(parameters, state)) / parameters.period
     if not due <= MOST_IN_A_STEP:

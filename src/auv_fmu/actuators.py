@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from math import exp, expm1
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from auv_fmu.quantities import TAU
+from auv_fmu.variable import Variable
 from auv_fmu.vectors import Vector3, difference, scaled
 
 
 class Limits(NamedTuple):
     """Limits of (3) for u, q, r, with the values of section 4.1."""
 
-    tau_min: Vector3 = (-80.0, -80.0, -80.0)  #: lower limits [N, N.m]
-    tau_max: Vector3 = (80.0, 80.0, 80.0)  #: upper limits [N, N.m]
+    tau_min: Annotated[Vector3, Variable(TAU, "Lower limit of the actuators (3)", maximum=0.0)] = (
+        -80.0,
+        -80.0,
+        -80.0,
+    )
+    tau_max: Annotated[Vector3, Variable(TAU, "Upper limit of the actuators (3)", 0.0)] = (
+        80.0,
+        80.0,
+        80.0,
+    )
 
 
 def limit(tau_k: float, tau_min: float, tau_max: float) -> float:

@@ -3,8 +3,31 @@
 from __future__ import annotations
 
 from math import tanh
+from typing import Annotated
 
+from auv_fmu.quantities import THETA
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, Vector4, norm
+
+#: Parameters of the adaptive law; Gamma and Sigma are multiples of the identity.
+Gamma = Annotated[
+    float, Variable("1", "Gain of the adaptation, in SI units (gamma)", 0.0, tunable=True)
+]
+Sigma = Annotated[
+    float, Variable("1/s", "Rate at which the adaptation forgets (sigma)", 0.0, tunable=True)
+]
+Prior = Annotated[Vector4, Variable(THETA, "Prior estimate of the parameters (theta_0)")]
+Layer = Annotated[
+    float,
+    Variable(
+        "W", "Width of the boundary layer of the robust force (eps_t)", POSITIVE, tunable=True
+    ),
+]
+
+#: What it estimates [N, kg/s, kg/m, kg].
+Estimate = Annotated[
+    Vector4, Variable(THETA, "Estimated parameters of the bounding function (theta_hat)")
+]
 
 #: The constant of Lemma 2, nu = exp(-(nu + 1)), with the digits the paper gives (reading 9).
 NU = 0.2785

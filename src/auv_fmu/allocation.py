@@ -7,26 +7,52 @@ without a flow past it, so what a moment needs depends on the speed through the 
 from __future__ import annotations
 
 from math import copysign, pi, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu.actuators import limit
-from auv_fmu.tail import FASTEST, Tail, fin_lift, forces, thrust_at_rest, thrust_loss
+from auv_fmu.quantities import NU, TAU
+from auv_fmu.tail import ACTUATOR, FASTEST, Tail, fin_lift, forces, thrust_at_rest, thrust_loss
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3
 
 
 class Parameters(NamedTuple):
     """All parameters of the allocation."""
 
-    tail: Tail = Tail()
-    speed: float = 1.5  #: nominal speed through the water [m/s]
-    measured: bool = False  #: whether the speed is an input instead
+    tail: Annotated[Tail, Variable(name="")] = Tail()
+    speed: Annotated[
+        float,
+        Variable(
+            "m/s",
+            "Nominal speed through the water; used if not `measured`",
+            POSITIVE,
+            FASTEST,
+            tunable=True,
+        ),
+    ] = 1.5
+    measured: Annotated[
+        bool, Variable("1", "Whether nu_r gives the speed; if not, it is the nominal one")
+    ] = False
+
+
+class Wanted(NamedTuple):
+    """What is wanted, and how fast the vehicle is."""
+
+    tau: Annotated[Vector3, Variable(TAU, "Wanted force and moments")]
+    nu_r: Annotated[
+        Vector3,
+        Variable(
+            {"u": NU["u"], "v": NU["v"], "w": NU["w"]},
+            "Velocity through the water in the body frame; used if `measured`",
+        ),
+    ]
 
 
 class Allocated(NamedTuple):
     """What to command, and what comes of it."""
 
-    command: Vector3  #: (delta_r, delta_s, n) [rad, rad, rad/s]
-    attained: Vector3  #: (tau_u, tau_q, tau_r) of it [N, N.m]
+    command: Annotated[Vector3, Variable(ACTUATOR, "Command of rudder, stern planes and propeller")]
+    tau_attained: Annotated[Vector3, Variable(TAU, "Force and moments that the command gives")]
 
 
 def fin_angle(moment: float, effect: float, largest: float) -> float:

@@ -24,10 +24,11 @@ from auv_fmu import (
 )
 from auv_fmu.actuators import Limits
 from auv_fmu.allocation import Allocated
+from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.motion_planner import Motion, PlannerState, Reference
 from auv_fmu.ocean_current import Variation
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
-from auv_fmu.path_planner import Corner, PathState
+from auv_fmu.path_planner import PathState
 from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
 from auv_fmu.plant import PlantOutputs, PlantState
 from auv_fmu.remus100 import RemusState
@@ -65,13 +66,14 @@ class Scene(NamedTuple):
 class Law(NamedTuple):
     """A controller in the loop: what it is told, how it starts, what it commands, how it goes on.
 
-    What it goes by is what it has estimated, or been told.
+    Before it commands, it may restart. What it goes by is what it has estimated, or been told.
     """
 
     measurement: Callable[[Scene], Any]
     start: Callable[[Any, Any], Any]
-    command: Callable[[Any, Any, Any, float], tuple[Any, Any]]
-    steps: Callable[[Any, Any, Any, Any, float, int], Any]
+    gated: Callable[[Any, Any, Any], Any]
+    evaluate: Callable[[Any, Any, Any, float], Any]
+    step: Callable[[Any, Any, float], Any]
     estimates: Callable[[Scene, Any, Any], tuple[Vector3, Vector4]]
 
 
@@ -86,12 +88,9 @@ def start(gains: Gains, measured: Measurement) -> ControllerState:
     return output_feedback.initial_state(gains, measured.y)
 
 
-def command(
-    gains: Gains, state: ControllerState, measured: Measurement, h: float
-) -> tuple[ControllerState, Signals]:
-    """What the proposed controller goes on from at an instant, and its signals."""
-    state = output_feedback.gated(gains, state, measured.y)
-    return state, output_feedback.evaluate(gains, state, measured, h)
+def gated(gains: Gains, state: ControllerState, measured: Measurement) -> ControllerState:
+    """What the proposed controller goes on from at an instant."""
+    return output_feedback.gated(gains, state, measured.y)
 
 
 def estimates(seen: Scene, state: ControllerState, signals: Signals) -> tuple[Vector3, Vector4]:
@@ -110,11 +109,14 @@ def pd_start(gains: PdGains, measured: PdMeasurement) -> Vector4:
     return gains.theta_0
 
 
-def pd_command(
-    gains: PdGains, theta_hat: Vector4, measured: PdMeasurement, h: float
-) -> tuple[Vector4, PdSignals]:
-    """What the PD controller goes on from at an instant, and its signals."""
-    return theta_hat, pd.evaluate(gains, theta_hat, measured)
+def pd_gated(gains: PdGains, theta_hat: Vector4, measured: PdMeasurement) -> Vector4:
+    """The PD controller has no gate."""
+    return theta_hat
+
+
+def pd_evaluate(gains: PdGains, theta_hat: Vector4, measured: PdMeasurement, h: float) -> PdSignals:
+    """The signals of the PD controller, which know no step."""
+    return pd.evaluate(gains, theta_hat, measured)
 
 
 def pd_estimates(seen: Scene, theta_hat: Vector4, signals: PdSignals) -> tuple[Vector3, Vector4]:
@@ -124,8 +126,10 @@ def pd_estimates(seen: Scene, theta_hat: Vector4, signals: PdSignals) -> tuple[V
 
 #: The controller that goes with a set of gains.
 LAWS: dict[type, Law] = {
-    Gains: Law(measurement, start, command, output_feedback.steps, estimates),
-    PdGains: Law(pd_measurement, pd_start, pd_command, pd.steps, pd_estimates),
+    Gains: Law(
+        measurement, start, gated, output_feedback.evaluate, output_feedback.step, estimates
+    ),
+    PdGains: Law(pd_measurement, pd_start, pd_gated, pd_evaluate, pd.step, pd_estimates),
 }
 
 
@@ -135,24 +139,26 @@ LAWS: dict[type, Law] = {
 class PlannerBlock(NamedTuple):
     """A planner in the loop; what follows from its state goes along with it.
 
-    All take its parameters first. A step is one of h seconds from a time on, in n parts.
+    All take its parameters first. A step is one of h seconds from a time on.
     """
 
     begin: Callable[[Any], tuple[Any, Any]]
-    steps: Callable[[Any, Any, Any, float, float, int], tuple[Any, Any]]
+    step: Callable[[Any, Any, Any, float, float], tuple[Any, Any]]
     reference: Callable[[Any, Any, Any], Reference]
 
 
-def helix_steps(
-    parameters: motion_planner.Parameters,
-    state: PlannerState,
-    moving: Motion,
-    t: float,
-    h: float,
-    n: int,
+def helix_begin(parameters: motion_planner.Parameters) -> tuple[PlannerState, Motion]:
+    """The reference vehicle at the start, and its motion."""
+    state = motion_planner.initial_state(parameters.eta0, parameters.nu0)
+    return state, motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
+
+
+def helix_step(
+    parameters: motion_planner.Parameters, state: PlannerState, moving: Motion, t: float, h: float
 ) -> tuple[PlannerState, Motion]:
     """The reference vehicle after a step, and its motion."""
-    return motion_planner.steps(parameters, state, moving, h / n, n)
+    state = motion_planner.step(state, moving, h)
+    return state, motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
 
 
 def helix_reference(
@@ -162,36 +168,29 @@ def helix_reference(
     return motion_planner.reference(state, moving, parameters.ell)
 
 
-def path_begin(parameters: path_planner.Parameters) -> tuple[PathState, Corner]:
-    """The start of a path, and the corner ahead."""
-    first = path_planner.first_corner(parameters.waypoints, 0.0)
-    return PathState(0.0, 0.0), path_planner.corner_ahead(parameters.waypoints, first, 0.0)
+def path_begin(parameters: path_planner.Parameters) -> tuple[PathState, Nothing]:
+    """The start of a path."""
+    return path_planner.initial_state(parameters.waypoints, 0.0), ()
 
 
-def path_steps(
-    parameters: path_planner.Parameters,
-    state: PathState,
-    ahead: Corner,
-    t: float,
-    h: float,
-    n: int,
-) -> tuple[PathState, Corner]:
-    """The reference on a path after a step, whatever its parts, and the corner ahead."""
-    later = PathState(state.start, t + h)
-    return later, path_planner.corner_ahead(parameters.waypoints, ahead, later.t)
+def path_step(
+    parameters: path_planner.Parameters, state: PathState, derived: Nothing, t: float, h: float
+) -> tuple[PathState, Nothing]:
+    """The reference on a path after a step."""
+    return path_planner.advance(parameters.waypoints, state, t + h), derived
 
 
 def path_reference(
-    parameters: path_planner.Parameters, state: PathState, ahead: Corner
+    parameters: path_planner.Parameters, state: PathState, derived: Nothing
 ) -> Reference:
     """The reference on a path."""
-    return path_planner.reference(parameters.waypoints, ahead, state.t)
+    return path_planner.reference(parameters.waypoints, state.ahead, state.t)
 
 
 #: The planner that goes with a set of parameters.
 PLANNERS: dict[type, PlannerBlock] = {
-    motion_planner.Parameters: PlannerBlock(motion_planner.begin, helix_steps, helix_reference),
-    path_planner.Parameters: PlannerBlock(path_begin, path_steps, path_reference),
+    motion_planner.Parameters: PlannerBlock(helix_begin, helix_step, helix_reference),
+    path_planner.Parameters: PlannerBlock(path_begin, path_step, path_reference),
 }
 
 
@@ -268,34 +267,33 @@ class VehicleBlock(NamedTuple):
     outputs are what is allocated. What drives the vehicle follows from either.
 
     Attributes:
-        begin: state at the start, from what drives it and the velocity of the water.
+        begin: state at the start, from the velocity of the water.
         outputs: what is seen of it.
         disturbed: the velocity that the disturbance is told, of that through the water.
         idle: what is allocated before the first instant.
         allocate: of a command, with the velocity through the water.
         driving: what drives it, from the command that reaches it and what is allocated.
-        steps: n steps of h seconds, with what drives it, the disturbance and the water.
-        acting: force and moments (tau_u, tau_q, tau_r) that act [N, N.m].
+        step: one of h seconds, with what drives it, the disturbance and the water.
+        acting: force and moments (tau_u, tau_q, tau_r) that act, with what drives it [N, N.m].
         limits: of a command.
 
     """
 
-    begin: Callable[[Any, Vector3, Vector3], tuple[Any, Any]]
+    begin: Callable[[Any, Vector3], tuple[Any, Any]]
     outputs: Callable[[Any, Any, Any], PlantOutputs]
     disturbed: Callable[[Vector6], Vector6]
     idle: Callable[[], Any]
     allocate: Callable[[Any, Vector3, Vector6], Any]
     driving: Callable[[Any, Vector3, Any], Vector3]
-    steps: Callable[[Any, Any, Any, Vector3, Vector6, WaterMotion, float, int], tuple[Any, Any]]
-    acting: Callable[[Any, Any], Vector3]
+    step: Callable[[Any, Any, Any, Vector3, Vector6, WaterMotion, float], tuple[Any, Any]]
+    acting: Callable[[Any, Any, Vector3], Vector3]
     limits: Callable[[Any], Limits]
 
 
-def plant_begin(
-    parameters: plant.Parameters, tau: Vector3, water: Vector3
-) -> tuple[PlantState, Rotation]:
+def plant_begin(parameters: plant.Parameters, water: Vector3) -> tuple[PlantState, Rotation]:
     """The paper's vehicle at the start, and its attitude."""
-    return plant.begin(parameters, tau, plant.flow(parameters, water))
+    state = plant.begin(parameters, plant.flow(parameters, water))
+    return state, rotation_from_quaternion(state.quaternion)
 
 
 def plant_outputs(
@@ -325,7 +323,7 @@ def plant_driving(parameters: plant.Parameters, tau: Vector3, allocated: Nothing
     return plant.applied(parameters, tau)
 
 
-def plant_steps(
+def plant_step(
     parameters: plant.Parameters,
     state: PlantState,
     rotation: Rotation,
@@ -333,16 +331,16 @@ def plant_steps(
     tau_w: Vector6,
     water: WaterMotion,
     h: float,
-    n: int,
 ) -> tuple[PlantState, Rotation]:
-    """The paper's vehicle after n steps of h seconds, and its attitude."""
+    """The paper's vehicle after a step, and its attitude."""
     flow, dwater = plant.flow(parameters, water.velocity), water.acceleration
-    return plant.steps(parameters, state, rotation, tau, tau_w, flow, dwater, h, n)
+    state = plant.advance(parameters, state, rotation, tau, tau_w, flow, dwater, h)
+    return state, rotation_from_quaternion(state.quaternion)
 
 
-def plant_acting(parameters: plant.Parameters, state: PlantState) -> Vector3:
+def plant_acting(parameters: plant.Parameters, state: PlantState, tau: Vector3) -> Vector3:
     """What the actuators of the paper's vehicle give."""
-    return state.tau
+    return plant.actuation(parameters, state, tau)
 
 
 def plant_limits(parameters: plant.Parameters) -> Limits:
@@ -350,10 +348,8 @@ def plant_limits(parameters: plant.Parameters) -> Limits:
     return parameters.limits
 
 
-def remus_begin(
-    parameters: remus100.Parameters, drive: Vector3, water: Vector3
-) -> tuple[RemusState, Nothing]:
-    """The REMUS 100 at the start; fins and propeller are at rest, whatever they are to do."""
+def remus_begin(parameters: remus100.Parameters, water: Vector3) -> tuple[RemusState, Nothing]:
+    """The REMUS 100 at the start."""
     return remus100.begin(parameters, water), ()
 
 
@@ -385,7 +381,7 @@ def remus_driving(parameters: remus100.Parameters, tau: Vector3, allocated: Allo
     return allocated.command
 
 
-def remus_steps(
+def remus_step(
     parameters: remus100.Parameters,
     state: RemusState,
     derived: Nothing,
@@ -393,14 +389,13 @@ def remus_steps(
     tau_w: Vector6,
     water: WaterMotion,
     h: float,
-    n: int,
 ) -> tuple[RemusState, Nothing]:
-    """The REMUS 100 after n steps of h seconds; no disturbance acts on it."""
+    """The REMUS 100 after a step; no disturbance acts on it."""
     flow, dwater = water.velocity, water.acceleration
-    return remus100.steps(parameters, state, drive, flow, dwater, h, n), derived
+    return remus100.advance(parameters, state, drive, flow, dwater, h), derived
 
 
-def remus_acting(parameters: remus100.Parameters, state: RemusState) -> Vector3:
+def remus_acting(parameters: remus100.Parameters, state: RemusState, drive: Vector3) -> Vector3:
     """What fins and propeller give."""
     tau = remus100.tail_forces(parameters.tail, state)
     return tau[0], tau[4], tau[5]
@@ -420,7 +415,7 @@ VEHICLES: dict[type, VehicleBlock] = {
         plant_idle,
         plant_allocate,
         plant_driving,
-        plant_steps,
+        plant_step,
         plant_acting,
         plant_limits,
     ),
@@ -431,7 +426,7 @@ VEHICLES: dict[type, VehicleBlock] = {
         remus_idle,
         remus_allocate,
         remus_driving,
-        remus_steps,
+        remus_step,
         remus_acting,
         remus_limits,
     ),

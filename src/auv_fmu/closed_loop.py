@@ -26,7 +26,10 @@ _UNDISTURBED: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class LongestSteps(NamedTuple):
-    """Largest internal step of each component [s]; a longer step is split evenly."""
+    """Largest internal step of each component [s]; a longer step is split evenly.
+
+    A path planner splits none: it knows the reference at any time.
+    """
 
     plant: float = STEP
     controller: float = STEP
@@ -75,10 +78,11 @@ class Splits(NamedTuple):
 def splits(setting: Setting, h: float) -> Splits:
     """How a step of h seconds is split."""
     longest = setting.h_max
+    is_path = isinstance(setting.planner, path_planner.Parameters)
     return Splits(
         internal_steps(h, longest_step(longest.plant)),
         internal_steps(h, longest_step(longest.controller)),
-        internal_steps(h, longest_step(longest.planner)),
+        1 if is_path else internal_steps(h, longest_step(longest.planner)),
     )
 
 
@@ -88,7 +92,7 @@ class Vehicles(NamedTuple):
     plant: Any  #: state of the vehicle: a PlantState or a RemusState
     rotation: Any  #: attitude of a plant, body to earth; of a REMUS 100 there is nothing here
     planner: Any  #: a PlannerState or a PathState
-    moving: Any  #: motion of the reference vehicle, or the corner ahead
+    moving: Any  #: motion of the reference vehicle; on a path there is nothing here
     water: Any  #: the Variation of a sea; of steady water there is nothing here
 
 
@@ -106,7 +110,7 @@ def vehicles_at_start(setting: Setting, blocks: Blocks) -> Vehicles:
     varying = blocks.water.begin(setting.water)
     x, y, z, _, _, _ = setting.plant.eta0
     water = blocks.water.motion(setting.water, varying, (x, y, z), 0.0)
-    state, derived = blocks.vehicle.begin(setting.plant, _NO_COMMAND, water.velocity)
+    state, derived = blocks.vehicle.begin(setting.plant, water.velocity)
     planned, moving = blocks.planner.begin(setting.planner)
     return Vehicles(state, derived, planned, moving, varying)
 
@@ -157,12 +161,14 @@ def move(
         parts: that the step is split into.
 
     """
-    _, rotation, planner, moving, water = vehicles
-    n, n_d = parts.plant, parts.planner
-    state, rotation = blocks.vehicle.steps(
-        setting.plant, vehicles.plant, rotation, drive, sent.tau_w, sent.water, h / n, n
-    )
-    planner, moving = blocks.planner.steps(setting.planner, planner, moving, t, h, n_d)
+    state, rotation, planner, moving, water = vehicles
+    h_a, h_d = h / parts.plant, h / parts.planner
+    for _ in range(parts.plant):
+        state, rotation = blocks.vehicle.step(
+            setting.plant, state, rotation, drive, sent.tau_w, sent.water, h_a
+        )
+    for i in range(parts.planner):
+        planner, moving = blocks.planner.step(setting.planner, planner, moving, t + i * h_d, h_d)
     return Vehicles(state, rotation, planner, moving, blocks.water.later(setting.water, water, h))
 
 
@@ -230,7 +236,8 @@ def act(
     law, vehicle = blocks.controller, blocks.vehicle
     h_c = h / parts.controller
     measured = law.measurement(scene)
-    state, signals = law.command(setting.controller, controller_state, measured, h_c)
+    state = law.gated(setting.controller, controller_state, measured)
+    signals = law.evaluate(setting.controller, state, measured, h_c)
     late = delayed and t > 0.0
     told = before.tau if late else signals.tau
     allocated = vehicle.allocate(setting.allocation, told, scene.plant.nu_r)
@@ -261,11 +268,15 @@ def step(
         n: three independent standard normal numbers, for what is measured then.
 
     """
-    t, vehicles, _, measured, controller_state, signals, now, acts, _, tau, _ = instant
-    law, n_c = blocks.controller, parts.controller
-    state = law.steps(setting.controller, controller_state, signals, measured, h / n_c, n_c)
-    vehicles = move(setting, blocks, vehicles, t, tau, acts, h, parts)
-    return Moment(end, vehicles, scene(setting, blocks, vehicles, end, n), state, now)
+    gains, measured, h_c = setting.controller, instant.measured, h / parts.controller
+    law = blocks.controller
+    state = law.step(instant.controller_state, instant.signals, h_c)
+    for _ in range(parts.controller - 1):
+        state = law.step(state, law.evaluate(gains, state, measured, h_c), h_c)
+    vehicles = move(
+        setting, blocks, instant.vehicles, instant.t, instant.tau, instant.acts, h, parts
+    )
+    return Moment(end, vehicles, scene(setting, blocks, vehicles, end, n), state, instant.now)
 
 
 def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> Iterator[Instant]:

@@ -7,11 +7,22 @@ at zero roll. Written with the full R the same three lines hold for a vehicle th
 
 from __future__ import annotations
 
+from typing import Annotated
+
 from auv_fmu.attitude import rotate, rotate_back
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Rotation, Vector3, Vector6, plus_scaled, scaled
 
-#: Distance of the control point from the centre of mass in section 4.1 [m].
+#: How far ahead of the centre of mass the control point is, and its value in section 4.1 [m].
+Distance = Annotated[
+    float, Variable("m", "Distance of the control point from the centre of mass (ell)", POSITIVE)
+]
 ELL = 0.35
+
+#: Whether controllers take the roll to be zero (reading 3).
+WithoutRoll = Annotated[
+    bool, Variable("1", "Use (11) as printed, for zero roll, instead of the full attitude")
+]
 
 
 def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:

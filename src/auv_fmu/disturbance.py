@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 from math import copysign, sin
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from auv_fmu.variable import Variable
 from auv_fmu.vectors import Vector6
 
 
 class Disturbance(NamedTuple):
     """Parameters of (56), with the values of section 4.1."""
 
-    A_f: float = 0.5  #: amplitude of the friction [N, N.m]
-    A_d: float = 1.0  #: amplitude of the waves and currents [N, N.m]
-    omega_d: float = 0.1  #: their frequency [rad/s]
+    A_f: Annotated[
+        float, Variable("N", "Amplitude of the friction, in N.m for moments (A_f)", tunable=True)
+    ] = 0.5
+    A_d: Annotated[
+        float,
+        Variable("N", "Amplitude of waves and currents, in N.m for moments (A_d)", tunable=True),
+    ] = 1.0
+    omega_d: Annotated[
+        float, Variable("rad/s", "Angular frequency of the waves (omega_d)", tunable=True)
+    ] = 0.1
 
 
 def sign(x: float) -> float:

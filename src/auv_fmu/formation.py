@@ -29,14 +29,18 @@ with R = R_z(chi), S d = (-d_y, d_x, 0) and d_h = (d_x, d_y, 0): exact derivativ
 
 from __future__ import annotations
 
+from enum import IntEnum
 from math import atan2, cos, exp, pi, sin, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu import observer, path_planner
 from auv_fmu.actuators import Limits
-from auv_fmu.control_point import ELL
+from auv_fmu.control_point import ELL, Distance
 from auv_fmu.motion_planner import Reference
-from auv_fmu.saturation import TANH, saturation
+from auv_fmu.observer import Form
+from auv_fmu.quantities import ACCELERATION, POSITION, VELOCITY
+from auv_fmu.saturation import Saturation, saturation
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import (
     Vector3,
     Vector4,
@@ -51,35 +55,11 @@ from auv_fmu.vectors import (
 )
 from auv_fmu.vehicle import Vehicle
 
-#: The shape of a formation as a value: one of these.
-Shape = int
-
-#: Abreast: places 2, 4, 6 ... to starboard of the leader, 3, 5, 7 ... to port.
-LINE: Shape = 0
-
-#: Astern, one after the other.
-COLUMN: Shape = 1
-
-#: As in a line, and as far astern as to the side.
-V: Shape = 2
-
-#: Around the leader's reference, on which nobody is; place 1 is ahead, the next to starboard of it.
-CIRCLE: Shape = 3
-
-#: Wherever the offset says.
-TABLE: Shape = 4
-
-#: All by the names users select them with.
-SHAPES: dict[str, Shape] = {
-    "line": LINE,
-    "column": COLUMN,
-    "v": V,
-    "circle": CIRCLE,
-    "table": TABLE,
-}
-
 #: Most stages, as many as a Vector4 holds.
 MOST = 4
+
+#: Most vehicles of a formation.
+_CROWD = 64
 
 #: Largest first and second derivative of a change, over its mean speed, and over that and its time.
 PEAK_SPEED = 1.875
@@ -95,53 +75,124 @@ class ImpossibleFormation(ArithmeticError):
     """The vehicle cannot keep its place."""
 
 
+class Shape(IntEnum):
+    """The shape of a formation."""
+
+    LINE = 0  #: abreast: places 2, 4, 6 ... to starboard of the leader, 3, 5, 7 ... to port
+    COLUMN = 1  #: astern, one after the other
+    V = 2  #: as in a line, and as far astern as to the side
+    CIRCLE = 3  #: around the leader's reference; place 1 is ahead, the next to starboard of it
+    TABLE = 4  #: wherever the offset says
+
+
 class Stages(NamedTuple):
     """Formations, one after the other; the first one holds from the start."""
 
-    n: int = 1  #: how many
-    shape: tuple[Shape, Shape, Shape, Shape] = (LINE, LINE, LINE, LINE)
-    spacing: Vector4 = (5.0, 5.0, 5.0, 5.0)  #: from one vehicle to its neighbours [m]
-    x: Vector4 = (0.0, 0.0, 0.0, 0.0)  #: of a table: forward [m]
-    y: Vector4 = (0.0, 0.0, 0.0, 0.0)  #: of a table: to starboard [m]
-    z: Vector4 = (0.0, 0.0, 0.0, 0.0)  #: of a table: down [m]
-    t: Vector3 = (30.0, 60.0, 90.0)  #: when the change to the second, third, fourth begins [s]
-    duration: Vector3 = (20.0, 20.0, 20.0)  #: of that change [s]
+    n: Annotated[
+        int, Variable("1", "Number of stages; later ones are not used", 1, MOST, name="stages")
+    ] = 1
+    shape: Annotated[
+        tuple[Shape, Shape, Shape, Shape],
+        Variable(
+            "1",
+            "Shape: line (abreast), column (astern), v, circle, or table (the offset)",
+            name="stage[{}].shape",
+        ),
+    ] = (Shape.LINE, Shape.LINE, Shape.LINE, Shape.LINE)
+    spacing: Annotated[
+        Vector4,
+        Variable("m", "Distance of neighbours, except in a table", 0.0, name="stage[{}].spacing"),
+    ] = (5.0, 5.0, 5.0, 5.0)
+    x: Annotated[
+        Vector4, Variable("m", "Offset of a table: forward", name="stage[{}].offset.x")
+    ] = (0.0, 0.0, 0.0, 0.0)
+    y: Annotated[
+        Vector4, Variable("m", "Offset of a table: to starboard", name="stage[{}].offset.y")
+    ] = (0.0, 0.0, 0.0, 0.0)
+    z: Annotated[Vector4, Variable("m", "Offset of a table: down", name="stage[{}].offset.z")] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    t: Annotated[
+        Vector3,
+        Variable("s", "When the change to the stage begins", members=(2, 3, 4), name="stage[{}].t"),
+    ] = (30.0, 60.0, 90.0)
+    duration: Annotated[
+        Vector3,
+        Variable(
+            "s",
+            "How long the change takes",
+            POSITIVE,
+            members=(2, 3, 4),
+            name="stage[{}].duration",
+        ),
+    ] = (20.0, 20.0, 20.0)
 
 
 class Estimator(NamedTuple):
     """Of the leader's reference, from messages; the defaults suit one every second or two."""
 
-    lambda_: float = 0.5  #: Lambda = lambda I [m/s]
-    k_d: float = 0.5  #: observer gain [1/s]
-    age_max: float = 4.0  #: oldest message that is used [s]
-    z_max: float = 2.0  #: largest z that is corrected, in each direction [m]
+    lambda_: Annotated[
+        float,
+        Variable(
+            "m/s",
+            "Bound of the speed that corrects the estimate on each axis (lambda)",
+            POSITIVE,
+            name="lambda",
+        ),
+    ] = 0.5
+    k_d: Annotated[float, Variable("1/s", "Gain of the observer (k_d)", POSITIVE)] = 0.5
+    age_max: Annotated[float, Variable("s", "Age from which y_0 is not used any more", 0.0)] = 4.0
+    z_max: Annotated[
+        float, Variable("m", "Largest error that is corrected at once, on each axis", POSITIVE)
+    ] = 2.0
 
 
 class Parameters(NamedTuple):
     """All parameters of the planner."""
 
-    number: int = 2  #: place of this vehicle, from 1
-    vehicles: int = 3  #: how many there are
-    stages: Stages = Stages()
-    omega_chi: float = 0.3  #: omega of the filter of the heading [rad/s]
-    turn_chi: float = 0.2  #: fastest turn of the path that it follows [rad/s]
-    estimated: bool = False  #: whether the leader is known by its position and heading only
-    estimator: Estimator = Estimator()
-    vehicle: Vehicle = Vehicle()  #: that is to follow
-    ell: float = ELL  #: distance of its control point [m]
-    limits: Limits = Limits()  #: of its actuators
-    speed_max: float = 2.5  #: that is let pass [m/s]
-    turn_max: float = 4.0  #: that is let pass [rad/s]
+    number: Annotated[int, Variable("1", "Place of this vehicle", 1, _CROWD)] = 2
+    vehicles: Annotated[int, Variable("1", "Number of vehicles", 1, _CROWD)] = 3
+    stages: Annotated[Stages, Variable(name="")] = Stages()
+    omega_chi: Annotated[
+        float, Variable("rad/s", "Frequency of the filter of the heading (omega)", POSITIVE)
+    ] = 0.3
+    turn_chi: Annotated[
+        float, Variable("rad/s", "Fastest turn that the formation follows", 0.0)
+    ] = 0.2
+    estimated: Annotated[
+        bool,
+        Variable(
+            "1",
+            "Whether the leader is known by y_0, eta_0 and age only, and estimated by (23), (51)",
+        ),
+    ] = False
+    estimator: Annotated[Estimator, Variable(name="")] = Estimator()
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: that is to follow
+    ell: Distance = ELL
+    limits: Annotated[Limits, Variable(name="")] = Limits()
+    speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
+    turn_max: Annotated[float, Variable("rad/s", "Largest accepted turn rate", 0.0)] = 4.0
 
 
 class Known(NamedTuple):
     """What is known of the leader's reference."""
 
-    y_0: Vector3  #: its control point [m], earth frame
-    dy_0: Vector3  #: velocity [m/s], if it is not estimated
-    ddy_0: Vector3  #: acceleration [m/s2], if it is not estimated
-    psi_0: float  #: heading of the path [rad]
-    age: float  #: how old y_0 is [s], if it is estimated
+    y_0: Annotated[
+        Vector3,
+        Variable(POSITION, "Control point of the leader's reference, or as a link brings it"),
+    ]
+    dy_0: Annotated[
+        Vector3, Variable(VELOCITY, "Velocity of the leader's reference, unless `estimated`")
+    ]
+    ddy_0: Annotated[
+        Vector3,
+        Variable(ACCELERATION, "Acceleration of the leader's reference, unless `estimated`"),
+    ]
+    psi_0: Annotated[float, Variable("rad", "Heading of the leader's path", name="eta_0.psi")]
+    age: Annotated[float, Variable("s", "Age of y_0, if `estimated`")]
 
 
 class Heading(NamedTuple):
@@ -179,20 +230,20 @@ def offset(parameters: Parameters, k: int) -> Vector3:
     """
     stages = parameters.stages
     shape, spacing = stages.shape[k], stages.spacing[k]
-    if shape == TABLE:
+    if shape == Shape.TABLE:
         return stages.x[k], stages.y[k], stages.z[k]
-    if shape == CIRCLE:
+    if shape == Shape.CIRCLE:
         if parameters.vehicles == 1:
             return _NOWHERE
         part = pi / parameters.vehicles
         radius = spacing / (2 * sin(part))
         around = 2 * part * (parameters.number - 1)
         return radius * cos(around), radius * sin(around), 0.0
-    if shape == COLUMN:
+    if shape == Shape.COLUMN:
         return -spacing * (parameters.number - 1), 0.0, 0.0
     far = spacing * (parameters.number // 2)
     side = far if parameters.number % 2 == 0 else -far
-    if shape == V:
+    if shape == Shape.V:
         return -_DIAGONAL * far, _DIAGONAL * side, 0.0
     return 0.0, side, 0.0
 
@@ -296,7 +347,7 @@ def acceleration(estimator: Estimator, z: Vector3) -> Vector3:
     its leader again, and take it past it.
     """
     most, lambda_, k_d = estimator.z_max, estimator.lambda_, estimator.k_d
-    a = observer.rate(observer.EULER, _NOWHERE, saturation(TANH, z), lambda_, k_d)
+    a = observer.rate(Form.EULER, _NOWHERE, saturation(Saturation.TANH, z), lambda_, k_d)
     return (
         a[0] if abs(z[0]) < most else 0.0,
         a[1] if abs(z[1]) < most else 0.0,
@@ -311,7 +362,7 @@ def leader(parameters: Parameters, state: FormationState, known: Known) -> Refer
     estimator = parameters.estimator
     z = innovation(estimator, state, known)
     dy_hat = plus_two_scaled(
-        state.dy_hat_o, estimator.lambda_, saturation(TANH, z), estimator.k_d, z
+        state.dy_hat_o, estimator.lambda_, saturation(Saturation.TANH, z), estimator.k_d, z
     )  # (23)
     return Reference(state.y_hat, dy_hat, acceleration(estimator, z))
 
@@ -325,10 +376,8 @@ def first_state(known: Known) -> FormationState:
     return FormationState(Heading(known.psi_0, known.psi_0, 0.0, 0.0), known.y_0, dy_hat_o)
 
 
-def steps(
-    parameters: Parameters, state: FormationState, known: Known, h: float, n: int
-) -> FormationState:
-    """State after n steps of h seconds, with held inputs.
+def step(parameters: Parameters, state: FormationState, known: Known, h: float) -> FormationState:
+    """State after a step, with held inputs.
 
     The filter of the heading is exact for them, the observer is Euler's scheme as in the paper.
 
@@ -337,19 +386,14 @@ def steps(
         state: at the beginning.
         known: of the leader.
         h: step [s].
-        n: how many.
 
     """
-    while n > 0:
-        heading = turned(parameters.omega_chi, parameters.turn_chi, state.heading, known.psi_0, h)
-        if parameters.estimated:
-            _, dy_hat, ddy_hat_o = leader(parameters, state, known)
-            y_hat = plus_scaled(state.y_hat, h, dy_hat)
-            state = FormationState(heading, y_hat, plus_scaled(state.dy_hat_o, h, ddy_hat_o))
-        else:
-            state = FormationState(heading, known.y_0, state.dy_hat_o)
-        n -= 1
-    return state
+    heading = turned(parameters.omega_chi, parameters.turn_chi, state.heading, known.psi_0, h)
+    if parameters.estimated:
+        _, dy_hat, ddy_hat_o = leader(parameters, state, known)
+        y_hat = plus_scaled(state.y_hat, h, dy_hat)
+        return FormationState(heading, y_hat, plus_scaled(state.dy_hat_o, h, ddy_hat_o))
+    return FormationState(heading, known.y_0, state.dy_hat_o)
 
 
 def reference(parameters: Parameters, state: FormationState, known: Known, t: float) -> Reference:

@@ -11,6 +11,8 @@ from math import atan2, cos, log, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix
+from auv_fmu.quantities import POSITION
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, Vector6, total
 
 #: Mass of the water that a spheroid of 1.6 m by 0.19 m displaces [kg].
@@ -27,28 +29,66 @@ _STRIPS = 20
 class Hull(NamedTuple):
     """The hull, a spheroid that is as heavy as the water that it displaces."""
 
-    length: float = 1.6  #: [m]
-    diameter: float = 0.19  #: [m]
-    mass: float = DISPLACED  #: without added mass [kg]
-    gravity: float = 9.81  #: acceleration of gravity [m/s2]
-    r_bg: Vector3 = (0.0, 0.0, 0.02)  #: centre of mass from the centre of buoyancy [m], body frame
-    added_roll: float = 0.3  #: added moment of inertia in roll, per that of the hull
+    length: Annotated[float, Variable("m", "Length of the hull", POSITIVE)] = 1.6
+    diameter: Annotated[float, Variable("m", "Diameter of the hull", POSITIVE)] = 0.19
+    mass: Annotated[
+        float, Variable("kg", "Mass; the hull is as heavy as its displacement", POSITIVE)
+    ] = DISPLACED
+    gravity: Annotated[float, Variable("m/s2", "Acceleration of gravity", 0.0)] = 9.81
+    r_bg: Annotated[
+        Vector3,
+        Variable(POSITION, "Centre of mass from the centre of buoyancy, body frame (r_bg)"),
+    ] = (0.0, 0.0, 0.02)
+    added_roll: Annotated[
+        float, Variable("1", "Added moment of inertia in roll, per inertia of the hull", 0.0)
+    ] = 0.3
 
 
 class Drag(NamedTuple):
     """What brakes the hull."""
 
-    c_d: float = 0.42  #: drag along the hull, per frontal area
-    c_d_across: float = ACROSS  #: drag across the hull, per area of its side
-    wing: float = 0.7  #: area that lifts, per length times diameter
-    oswald: float = 0.7  #: Oswald's efficiency number of it
-    T_surge: float = 20.0  #: time constant of surge at low speed [s]
-    T_sway: float = 20.0  #: time constant of sway at low speed [s]
-    T_heave: float = 20.0  #: time constant of heave [s]
-    T_yaw: float = 1.0  #: time constant of yaw [s]
-    zeta_roll: float = 0.3  #: relative damping of roll
-    zeta_pitch: float = 0.8  #: relative damping of pitch
-    fading: float = 3.0  #: how fast the linear drag of surge and sway fades with speed [s/m]
+    c_d: Annotated[
+        float, Variable("1", "Drag along the hull, per frontal area", 0.0, name="drag.along")
+    ] = 0.42
+    c_d_across: Annotated[
+        float,
+        Variable("1", "Drag across the hull, per area of its side", 0.0, name="drag.across"),
+    ] = ACROSS
+    wing: Annotated[
+        float,
+        Variable("1", "Area that lifts, per length times diameter", POSITIVE, name="lift.area"),
+    ] = 0.7
+    oswald: Annotated[
+        float, Variable("1", "Oswald's efficiency number", POSITIVE, name="lift.oswald")
+    ] = 0.7
+    T_surge: Annotated[
+        float,
+        Variable("s", "Time constant of surge at low speed", POSITIVE, name="drag.T.surge"),
+    ] = 20.0
+    T_sway: Annotated[
+        float, Variable("s", "Time constant of sway at low speed", POSITIVE, name="drag.T.sway")
+    ] = 20.0
+    T_heave: Annotated[
+        float, Variable("s", "Time constant of heave", POSITIVE, name="drag.T.heave")
+    ] = 20.0
+    T_yaw: Annotated[float, Variable("s", "Time constant of yaw", POSITIVE, name="drag.T.yaw")] = (
+        1.0
+    )
+    zeta_roll: Annotated[
+        float, Variable("1", "Damping ratio of roll", 0.0, name="drag.zeta.roll")
+    ] = 0.3
+    zeta_pitch: Annotated[
+        float, Variable("1", "Damping ratio of pitch", 0.0, name="drag.zeta.pitch")
+    ] = 0.8
+    fading: Annotated[
+        float,
+        Variable(
+            "s/m",
+            "How fast the linear drag of surge and sway fades with speed",
+            0.0,
+            name="drag.fading",
+        ),
+    ] = 3.0
 
 
 class Inertia(NamedTuple):

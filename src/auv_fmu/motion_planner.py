@@ -8,10 +8,19 @@ of samples (reading 12).
 from __future__ import annotations
 
 from math import degrees, radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu.attitude import rotate, rotation_from_euler
-from auv_fmu.control_point import ELL, control_point, control_point_velocity
+from auv_fmu.control_point import ELL, Distance, control_point, control_point_velocity
+from auv_fmu.quantities import (
+    ACCELERATION,
+    ETA_WITHOUT_ROLL,
+    NU_WITHOUT_ROLL,
+    POSITION,
+    TAU,
+    VELOCITY,
+)
+from auv_fmu.variable import Variable
 from auv_fmu.vectors import Rotation, Vector3, Vector5, plus_scaled
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
@@ -38,11 +47,11 @@ class SteepReference(ArithmeticError):
 class Parameters(NamedTuple):
     """All parameters of the planner."""
 
-    tau_d: Vector3 = TAU_D  #: driving force and moments (u, q, r) [N, N.m]
-    eta0: Vector5 = ETA_D0  #: initial posture (x, y, z, theta, psi) [m, rad]
-    vehicle: Vehicle = Vehicle()  #: the reference vehicle
-    ell: float = ELL  #: distance of its control point [m]
-    nu0: Vector5 = NU_D0  #: initial velocity (u, v, w, q, r) [m/s, rad/s]
+    tau_d: Annotated[Vector3, Variable(TAU, "Driving force and moments (tau_d)")] = TAU_D
+    eta0: Annotated[Vector5, Variable(ETA_WITHOUT_ROLL, "Initial posture")] = ETA_D0
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: the reference vehicle
+    ell: Distance = ELL
+    nu0: Annotated[Vector5, Variable(NU_WITHOUT_ROLL, "Initial velocity in the body frame")] = NU_D0
 
 
 class PlannerState(NamedTuple):
@@ -64,9 +73,9 @@ class Motion(NamedTuple):
 class Reference(NamedTuple):
     """Desired trajectory of the control point, earth frame."""
 
-    y_d: Vector3  #: [m]
-    dy_d: Vector3  #: [m/s]
-    ddy_d: Vector3  #: [m/s2]
+    y_d: Annotated[Vector3, Variable(POSITION, "Desired control point")]
+    dy_d: Annotated[Vector3, Variable(VELOCITY, "Desired velocity")]
+    ddy_d: Annotated[Vector3, Variable(ACCELERATION, "Desired acceleration, in closed form")]
 
 
 def initial_state(eta_d: Vector5, nu_d: Vector5) -> PlannerState:
@@ -115,31 +124,6 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
         psi + h * dpsi,
         (u + h * du, v + h * dv, w + h * dw, q + h * dq, r + h * dr),
     )
-
-
-def begin(parameters: Parameters) -> tuple[PlannerState, Motion]:
-    """State at the start, and its motion."""
-    state = initial_state(parameters.eta0, parameters.nu0)
-    return state, motion(parameters.vehicle, state, parameters.tau_d)
-
-
-def steps(
-    parameters: Parameters, state: PlannerState, moving: Motion, h: float, n: int
-) -> tuple[PlannerState, Motion]:
-    """State after n steps of h seconds, and its motion.
-
-    Args:
-        parameters: of the planner.
-        state, moving: at the beginning.
-        h: step [s].
-        n: how many.
-
-    """
-    while n > 0:
-        state = step(state, moving, h)
-        moving = motion(parameters.vehicle, state, parameters.tau_d)
-        n -= 1
-    return state, moving
 
 
 def reference(state: PlannerState, moving: Motion, ell: float) -> Reference:

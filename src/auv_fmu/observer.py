@@ -7,25 +7,25 @@ stand in :func:`.output_feedback.evaluate`.
 
 from __future__ import annotations
 
+from enum import IntEnum
 from math import expm1
 
 from auv_fmu.vectors import Vector3, plus_scaled, scaled
 
-#: A form of the observer as a value: which one of these.
-Form = int
 
-#: (51) in Euler's scheme (reading 4).
-EULER: Form = 0
+class Form(IntEnum):
+    """A form of the observer."""
 
-#: The same, with the term -k_d z of the error integrated exactly: :func:`exact_gain`.
-EXACT: Form = 1
+    #: (51) in Euler's scheme (reading 4).
+    EULER = 0
 
-#: (24) as it is printed, dy_hat_o = dy_r + k_d Lambda int s(z), of which the state is the second
-#: term. It begins at zero, which contradicts the initial condition below (24), unless dy_r(0) = 0.
-INTEGRAL: Form = 2
+    #: The same, with the term -k_d z of the error integrated exactly: :func:`exact_gain`.
+    EXACT = 1
 
-#: All by the names users select them with.
-FORMS: dict[str, Form] = {"euler": EULER, "exact": EXACT, "integral": INTEGRAL}
+    #: (24) as it is printed, dy_hat_o = dy_r + k_d Lambda int s(z), of which the state is the
+    #: second term. It begins at zero, which contradicts the initial condition below (24), unless
+    #: dy_r(0) = 0.
+    INTEGRAL = 2
 
 
 def exact_gain(k_d: float, h: float) -> float:
@@ -65,6 +65,6 @@ def rate(form: Form, ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -
         k_d: observer gain [1/s].
 
     """
-    if form == INTEGRAL:
+    if form == Form.INTEGRAL:
         return scaled(k_d * lambda_, s_z)
     return plus_scaled(ddy_r, k_d * lambda_, s_z)

@@ -14,21 +14,42 @@ from __future__ import annotations
 
 import math
 from math import cos, exp, expm1, sin, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu.random_numbers import CURRENT_VARIATION, gaussian, start
+from auv_fmu.variable import Variable
 from auv_fmu.vectors import Vector3
 
 
 class Current(NamedTuple):
     """A current; the defaults are a weak one that hardly varies."""
 
-    speed: float = 0.1  #: mean at the surface [m/s]
-    direction: float = 0.0  #: that it goes to, from north to east [rad]
-    root: float = 7.0  #: of the profile over depth; 0: the same at all depths
-    mu: float = 0.005  #: rate at which the variation is forgotten [1/s]
-    sigma: float = 0.02  #: standard deviation of the variation in each direction [m/s]
-    seed: int = 1  #: of the variation
+    speed: Annotated[float, Variable("m/s", "Mean speed at the surface", 0.0, tunable=True)] = 0.1
+    direction: Annotated[
+        float,
+        Variable("rad", "Direction that the current goes to: 0 north, pi/2 east", tunable=True),
+    ] = 0.0
+    root: Annotated[
+        float,
+        Variable(
+            "1",
+            "Profile: the root of the height above the bottom, of this degree; 0: no profile",
+            0.0,
+        ),
+    ] = 7.0
+    mu: Annotated[
+        float,
+        Variable("1/s", "Rate at which the variation is forgotten (mu, Gauss-Markov)", 0.0),
+    ] = 0.005
+    sigma: Annotated[
+        float,
+        Variable(
+            "m/s",
+            "Standard deviation of the variation in each horizontal direction (sigma)",
+            0.0,
+        ),
+    ] = 0.02
+    seed: Annotated[int, Variable("1", "Seed of the variation")] = 1
 
 
 class Variation(NamedTuple):
@@ -60,8 +81,6 @@ def advance(current: Current, variation: Variation, h: float) -> Variation:
         h: time [s].
 
     """
-    if not h > 0.0:
-        return variation
     kept = exp(-current.mu * h)
     added = current.sigma * sqrt(-expm1(-2.0 * current.mu * h))
     state, north = gaussian(variation.random)

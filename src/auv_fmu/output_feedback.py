@@ -7,15 +7,26 @@ Tanh, so the general form is written and s is a parameter. All matrices of gains
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu import observer
-from auv_fmu.adaptation import bound, regressor, robust_force, theta_hat_rate
+from auv_fmu.adaptation import (
+    Gamma,
+    Layer,
+    Prior,
+    Sigma,
+    bound,
+    regressor,
+    robust_force,
+    theta_hat_rate,
+)
 from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.control_point import ELL, actuator_command
+from auv_fmu.control_point import ELL, Distance, WithoutRoll, actuator_command
 from auv_fmu.euler import advance_4
-from auv_fmu.observer import EULER, EXACT, INTEGRAL, Form
-from auv_fmu.saturation import TANH, Saturation, saturation, slope
+from auv_fmu.observer import Form
+from auv_fmu.quantities import ACCELERATION, EULER, POSITION, VELOCITY, per_axis
+from auv_fmu.saturation import Saturation, saturation, slope
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import (
     Vector3,
     Vector4,
@@ -35,29 +46,79 @@ from auv_fmu.vectors import (
 class Gains(NamedTuple):
     """Parameters of (16) to (24), with the values of section 4.1."""
 
-    K1: Vector3 = (10.0, 10.0, 10.0)  #: diagonal of K_1 [N]
-    K2: Vector3 = (10.0, 10.0, 10.0)  #: diagonal of K_2 [N]
-    lambda_: float = 1.0  #: Lambda = lambda I [m/s]
-    k_d: float = 50.0  #: observer gain [1/s]
-    gamma: float = 1.0  #: Gamma = gamma I
-    sigma: float = 0.001  #: Sigma = sigma I [1/s]
-    theta_0: Vector4 = (0.0, 0.0, 0.0, 0.0)  #: prior of the parameters [N, kg/s, kg/m, kg]
-    eps_t: float = 1.0  #: width of the boundary layer [W]
-    ell: float = ELL  #: distance of the control point [m]
-    s: Saturation = TANH  #: saturation function of Definition 2
-    printed_jacobian: bool = False  #: (11) as printed, for zero roll (reading 3)
-    innovation_gate: float = 1.0  #: largest credible |y - y_hat| [m], not in the paper; 0: none
-    form: Form = EULER  #: of the observer
+    K1: Annotated[
+        Vector3,
+        Variable(
+            per_axis("N"),
+            "Gain of the velocity error on each axis (diagonal of K_1)",
+            POSITIVE,
+            tunable=True,
+        ),
+    ] = (10.0, 10.0, 10.0)
+    K2: Annotated[
+        Vector3,
+        Variable(
+            per_axis("N"),
+            "Gain of the position error on each axis (diagonal of K_2)",
+            POSITIVE,
+            tunable=True,
+        ),
+    ] = (10.0, 10.0, 10.0)
+    lambda_: Annotated[
+        float,
+        Variable(
+            "m/s",
+            "Bound of the approach speed on each axis (lambda)",
+            POSITIVE,
+            tunable=True,
+            name="lambda",
+        ),
+    ] = 1.0
+    k_d: Annotated[float, Variable("1/s", "Gain of the observer (k_d)", POSITIVE, tunable=True)] = (
+        50.0
+    )
+    gamma: Gamma = 1.0
+    sigma: Sigma = 0.001
+    theta_0: Prior = (0.0, 0.0, 0.0, 0.0)
+    eps_t: Layer = 1.0
+    ell: Distance = ELL
+    s: Annotated[
+        Saturation,
+        Variable(
+            "1",
+            "Saturation function of Definition 2: tanh, algebraic or arctan",
+            name="saturation",
+        ),
+    ] = Saturation.TANH
+    printed_jacobian: WithoutRoll = False
+    innovation_gate: Annotated[
+        float,
+        Variable(
+            "m",
+            "Restart the observer when |y - y_hat| exceeds this; 0: never. Not in the paper",
+            0.0,
+            tunable=True,
+        ),
+    ] = 1.0
+    form: Annotated[
+        Form,
+        Variable(
+            "1",
+            "Form of the observer: (51) by Euler's scheme (euler), with k_d exact over a step "
+            "(exact), or (24) as printed (integral)",
+            name="observer",
+        ),
+    ] = Form.EULER
 
 
 class Measurement(NamedTuple):
     """What the controller is told. No velocity of the vehicle is in it."""
 
-    y: Vector3  #: control point [m], earth frame
-    euler: Vector3  #: roll, pitch, yaw of the vehicle [rad]
-    y_d: Vector3  #: reference [m]
-    dy_d: Vector3  #: its velocity [m/s]
-    ddy_d: Vector3  #: its acceleration [m/s2]
+    y: Annotated[Vector3, Variable(POSITION, "Measured control point")]
+    euler: Annotated[Vector3, Variable(EULER, "Measured Euler angle", name="eta")]
+    y_d: Annotated[Vector3, Variable(POSITION, "Desired control point")]
+    dy_d: Annotated[Vector3, Variable(VELOCITY, "Desired velocity")]
+    ddy_d: Annotated[Vector3, Variable(ACCELERATION, "Desired acceleration")]
 
 
 class ControllerState(NamedTuple):
@@ -66,6 +127,7 @@ class ControllerState(NamedTuple):
     y_hat: Vector3  #: estimated control point [m]
     dy_hat_o: Vector3  #: of (23) and (24), or its integral [m/s]; dy_o is another (reading 15)
     theta_hat: Vector4  #: estimated parameters [N, kg/s, kg/m, kg]
+    h: float  #: length of the last step [s]; 0: there was none
 
 
 class Signals(NamedTuple):
@@ -84,7 +146,7 @@ def initial_state(gains: Gains, y: Vector3) -> ControllerState:
     y_hat = y
     z = difference(y, y_hat)
     dy_hat_o = observer.initial_dy_hat_o(saturation(gains.s, z), z, gains.lambda_, gains.k_d)
-    return ControllerState(y_hat, dy_hat_o, gains.theta_0)
+    return ControllerState(y_hat, dy_hat_o, gains.theta_0, 0.0)
 
 
 def credible(gains: Gains, state: ControllerState, y: Vector3) -> bool:
@@ -114,7 +176,7 @@ def restarted(gains: Gains, state: ControllerState, y: Vector3) -> ControllerSta
 
     """
     fresh = initial_state(gains, y)
-    return ControllerState(fresh.y_hat, fresh.dy_hat_o, state.theta_hat)
+    return ControllerState(fresh.y_hat, fresh.dy_hat_o, state.theta_hat, state.h)
 
 
 def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
@@ -132,16 +194,16 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
         h: step that begins there, which the gain of an `exact` observer follows from [s]; 0: none.
 
     """
-    K1, K2, lambda_, k_d, gamma, sigma, theta_0, eps_t, ell, s, printed_jacobian, _, form = gains
+    K2, lambda_, k_d, s = gains.K2, gains.lambda_, gains.k_d, gains.s
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
-    y_hat, dy_hat_o, theta_hat = state
-    if form == EXACT and h:
+    y_hat, dy_hat_o, theta_hat, _ = state
+    if gains.form == Form.EXACT and h:
         k_d = observer.exact_gain(k_d, h)
     e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
     e_z = difference(y_hat, y_d)  # e - z
     s_z, s_ez = saturation(s, z), saturation(s, e_z)
     dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
-    if form == INTEGRAL:
+    if gains.form == Form.INTEGRAL:
         dy_hat_o = total(dy_r, dy_hat_o)  # (24) as printed: dy_r + k_d Lambda int s(z)
     dy_hat = plus_two_scaled(dy_hat_o, lambda_, s_z, k_d, z)  # (23)
     dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
@@ -150,15 +212,17 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
     r_hat_sum = plus_two_scaled(de, lambda_, s_ez, lambda_, s_z)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
-    robust = robust_force(rho_hat, r_hat_sum, eps_t)  # last term of (21)
+    robust = robust_force(rho_hat, r_hat_sum, gains.eps_t)  # last term of (21)
     s_dy = saturation(s, difference(dy_o, dy_r))
     # Bracket of (21): F = -K_1 s(dy_o - dy_r) - K_2 s(e - z) - K_2 s(z) - robust
-    F = minus_times(minus_times(minus_product(K1, s_dy), K2, s_ez), K2, s_z)
+    F = minus_times(minus_times(minus_product(gains.K1, s_dy), K2, s_ez), K2, s_z)
     F = difference(F, robust)
-    rotation = rotation_from_euler(0.0 if printed_jacobian else phi, theta, psi)  # reading 3
-    tau = actuator_command(rotation, F, ell)  # (21), J^T F
-    dtheta_hat = theta_hat_rate(G, norm(r_hat_sum), theta_hat, theta_0, gamma, sigma)  # (22)
-    ddy_hat_o = observer.rate(form, ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
+    rotation = rotation_from_euler(0.0 if gains.printed_jacobian else phi, theta, psi)  # reading 3
+    tau = actuator_command(rotation, F, gains.ell)  # (21), J^T F
+    dtheta_hat = theta_hat_rate(
+        G, norm(r_hat_sum), theta_hat, gains.theta_0, gains.gamma, gains.sigma
+    )  # (22)
+    ddy_hat_o = observer.rate(gains.form, ddy_r, s_z, lambda_, k_d)  # (51), for (24): reading 4
     return Signals(tau, dy_hat, e, z, ddy_hat_o, dtheta_hat)
 
 
@@ -167,39 +231,13 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
 
     Args:
         state: at the beginning of the step.
-        signals: evaluated there.
+        signals: evaluated there, for a step of this length.
         h: step [s]; `observer_rate` of :mod:`.proof.gain_conditions` tells which k_d it can follow.
 
     """
-    y_hat, dy_hat_o, theta_hat = state
-    _, dy_hat, _, _, ddy_hat_o, dtheta_hat = signals
     return ControllerState(
-        plus_scaled(y_hat, h, dy_hat),
-        plus_scaled(dy_hat_o, h, ddy_hat_o),
-        advance_4(theta_hat, dtheta_hat, h),
+        plus_scaled(state.y_hat, h, signals.dy_hat),
+        plus_scaled(state.dy_hat_o, h, signals.ddy_hat_o),
+        advance_4(state.theta_hat, signals.dtheta_hat, h),
+        h,
     )
-
-
-def steps(
-    gains: Gains,
-    state: ControllerState,
-    signals: Signals,
-    measurement: Measurement,
-    h: float,
-    n: int,
-) -> ControllerState:
-    """State after n steps of h seconds under a held measurement.
-
-    Args:
-        gains: of the controller.
-        state, signals: at the beginning.
-        measurement: held.
-        h: step [s].
-        n: how many, one at least.
-
-    """
-    state = step(state, signals, h)
-    while n > 1:
-        state = step(state, evaluate(gains, state, measurement, h), h)
-        n -= 1
-    return state

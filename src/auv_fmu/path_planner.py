@@ -28,11 +28,12 @@ that was not chosen.
 from __future__ import annotations
 
 from math import atan2, degrees, sqrt, tan
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu.actuators import Limits
-from auv_fmu.control_point import ELL
+from auv_fmu.control_point import ELL, Distance
 from auv_fmu.motion_planner import STEEPEST, Reference
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, Vector5, Vector32, difference, distance, norm, plus_scaled
 from auv_fmu.vehicle import Vehicle
 
@@ -65,32 +66,63 @@ class ImpossiblePath(ArithmeticError):
 class Waypoints(NamedTuple):
     """Points to pass, and when; the defaults are a small survey, near the vehicle of Fig. 4."""
 
-    n: int = 6  #: how many
-    x: Vector32 = (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, *_UNUSED)  #: [m]
-    y: Vector32 = (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, *_UNUSED)  #: [m]
-    z: Vector32 = (0.0, 4.0, 4.0, 4.0, 4.0, 0.0, *_UNUSED)  #: [m]
-    t: Vector32 = (3.0, 28.0, 36.0, 60.0, 68.0, 93.0, *_UNUSED)  #: when [s], if they are timed
-    timed: bool = False  #: whether at their times, or at the cruise speed
-    cruise: float = 0.5  #: speed on all legs [m/s], if they are not
-    rounding: float = 6.0  #: T, the time that a corner is rounded in [s]
+    n: Annotated[
+        int, Variable("1", "Number of waypoints; later ones are not used", 2, MOST, name="count")
+    ] = 6
+    x: Annotated[Vector32, Variable("m", "North of the waypoint (x)", name="waypoint[{}].x")] = (
+        3.0,
+        15.0,
+        15.0,
+        3.0,
+        3.0,
+        15.0,
+        *_UNUSED,
+    )
+    y: Annotated[Vector32, Variable("m", "East of the waypoint (y)", name="waypoint[{}].y")] = (
+        6.0,
+        6.0,
+        10.0,
+        10.0,
+        14.0,
+        14.0,
+        *_UNUSED,
+    )
+    z: Annotated[Vector32, Variable("m", "Depth of the waypoint (z)", name="waypoint[{}].z")] = (
+        0.0,
+        4.0,
+        4.0,
+        4.0,
+        4.0,
+        0.0,
+        *_UNUSED,
+    )
+    t: Annotated[
+        Vector32,
+        Variable("s", "Time at which the waypoint is passed, if `timed`", name="waypoint[{}].t"),
+    ] = (3.0, 28.0, 36.0, 60.0, 68.0, 93.0, *_UNUSED)
+    timed: Annotated[
+        bool,
+        Variable("1", "Whether waypoints are passed at their times; if not, at the cruise speed"),
+    ] = False
+    cruise: Annotated[float, Variable("m/s", "Speed between waypoints without times", POSITIVE)] = (
+        0.5
+    )
+    rounding: Annotated[float, Variable("s", "Duration of the rounding of a corner", POSITIVE)] = (
+        6.0
+    )
 
 
 class Parameters(NamedTuple):
     """All parameters of the planner."""
 
-    waypoints: Waypoints = Waypoints()
-    vehicle: Vehicle = Vehicle()  #: that is to follow
-    ell: float = ELL  #: distance of its control point [m]
-    limits: Limits = Limits()  #: of its actuators
-    speed_max: float = 2.5  #: that is let pass [m/s]: with (2) and (3) a straight run ends at 2.67
-    turn_max: float = 4.0  #: that is let pass [rad/s]: where a turn on the spot ends
-
-
-class PathState(NamedTuple):
-    """Where on the path the reference is."""
-
-    start: float  #: time at which the run began [s]
-    t: float  #: time [s]
+    waypoints: Annotated[Waypoints, Variable(name="")] = Waypoints()
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: that is to follow
+    ell: Distance = ELL
+    limits: Annotated[Limits, Variable(name="")] = Limits()
+    #: With (2) and (3) a straight run ends at 2.67 m/s.
+    speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
+    #: Where a turn on the spot ends.
+    turn_max: Annotated[float, Variable("rad/s", "Largest accepted turn rate", 0.0)] = 4.0
 
 
 class Corner(NamedTuple):
@@ -98,6 +130,14 @@ class Corner(NamedTuple):
 
     k: int  #: its number, from 0; n: after the last one
     t: float  #: when it would be passed without roundings [s]
+
+
+class PathState(NamedTuple):
+    """Where on the path the reference is."""
+
+    start: float  #: time at which the run began [s]
+    t: float  #: time [s]
+    ahead: Corner  #: the first whose rounding is not over
 
 
 class Demand(NamedTuple):
@@ -163,6 +203,24 @@ def corner_ahead(waypoints: Waypoints, corner: Corner, t: float) -> Corner:
     while corner.k < waypoints.n and corner.t + waypoints.rounding / 2 <= t:
         corner = next_corner(waypoints, corner)
     return corner
+
+
+def initial_state(waypoints: Waypoints, t: float) -> PathState:
+    """State at the start of a run, at time t [s]."""
+    return PathState(t, t, corner_ahead(waypoints, first_corner(waypoints, t), t))
+
+
+def advance(waypoints: Waypoints, state: PathState, t: float) -> PathState:
+    """The state at another time.
+
+    Args:
+        waypoints: of the path.
+        state: at some time.
+        t: the other one; it may lie before, where a host goes back [s].
+
+    """
+    corner = state.ahead if t >= state.t else first_corner(waypoints, state.start)
+    return PathState(state.start, t, corner_ahead(waypoints, corner, t))
 
 
 def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
@@ -244,14 +302,14 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
         ImpossiblePath: the path turns within the length ell: no steady motion of the vehicle does.
 
     """
-    m11, m22, m33, _, _, d11, d22, d33, d55, d66, righting_pitch = vehicle
+    m11, m22, m33 = vehicle.m11, vehicle.m22, vehicle.m33
     (x, y, z), (dx, dy, dz), (ddx, ddy, ddz) = moment
     speed, level = norm(moment.dy_d), sqrt(dx * dx + dy * dy)
     faster = (dx * ddx + dy * ddy) / level
     q = (dz * faster - ddz * level) / (speed * speed)
     r = (dx * ddy - dy * ddx) / (level * speed)
     # speed^2 = u^2 + (v + ell r)^2 + (w - ell q)^2, with the sway and heave that belong to u.
-    sway, heave = m11 * r / d22, m11 * q / d33
+    sway, heave = m11 * r / vehicle.d22, m11 * q / vehicle.d33
     A = 1.0 + sway * sway + heave * heave
     B = ell * (sway * r + heave * q)
     C = ell * ell * (r * r + q * q) - speed * speed
@@ -263,13 +321,14 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
         )
     u = (B + sqrt(B * B - A * C)) / A
     v, w = -sway * u, heave * u
+    thrust = m11 * (dx * ddx + dy * ddy + dz * ddz) / speed
     return Demand(
         speed,
         sqrt(r * r + q * q),
         (
-            m11 * (dx * ddx + dy * ddy + dz * ddz) / speed + d11 * u - m22 * v * r + m33 * w * q,
-            d55 * q + righting_pitch * -dz / speed - (m33 - m11) * u * w,
-            d66 * r - (m11 - m22) * u * v,
+            thrust + vehicle.d11 * u - m22 * v * r + m33 * w * q,
+            vehicle.d55 * q + vehicle.righting_pitch * -dz / speed - (m33 - m11) * u * w,
+            vehicle.d66 * r - (m11 - m22) * u * v,
         ),
     )
 
@@ -284,7 +343,7 @@ def check(parameters: Parameters) -> None:
         ImpossiblePath: waypoints make no path, or it asks for more than a limit.
 
     """
-    waypoints, vehicle, _, _, _, _ = parameters
+    waypoints, vehicle = parameters.waypoints, parameters.vehicle
     if not (vehicle.d22 > 0.0 and vehicle.d33 > 0.0):
         raise ImpossiblePath(
             "d22 and d33 must be positive: nothing else limits the drift in a turn"
@@ -465,9 +524,14 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
 
 def _check_moment(parameters: Parameters, number: int, moment: Reference) -> None:
     """Refuse a moment that asks for too much, near the waypoint of a number."""
-    _, vehicle, ell, limits, speed_max, turn_max = parameters
-    asked = demand(vehicle, ell, moment)
-    hold_moment(asked, limits, speed_max, turn_max, number, moment.y_d)
+    hold_moment(
+        demand(parameters.vehicle, parameters.ell, moment),
+        parameters.limits,
+        parameters.speed_max,
+        parameters.turn_max,
+        number,
+        moment.y_d,
+    )
 
 
 def hold_moment(

@@ -9,8 +9,9 @@ roll adds to (2) enter through tau_w, so (2) stands once and is met exactly when
 
 from __future__ import annotations
 
+from enum import IntEnum
 from random import Random
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu.actuators import Drive, Limits, drive, limit_all
 from auv_fmu.attitude import (
@@ -23,7 +24,9 @@ from auv_fmu.attitude import (
     rotate_back,
     rotation_from_quaternion,
 )
-from auv_fmu.control_point import ELL, control_point, control_point_velocity
+from auv_fmu.control_point import ELL, Distance, control_point, control_point_velocity
+from auv_fmu.quantities import ETA, LAG, NU, VELOCITY
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Rotation, Vector3, Vector4, Vector6, difference, plus_scaled, total
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 
@@ -33,54 +36,86 @@ ETA_0: Vector6 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
 #: Initial velocity (u, v, w, p, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
 NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
-#: More standard deviations than any number of Random.gauss is off: sqrt(-2 log(2^-53)) is 8.6.
-_MOST_DEVIATIONS = 9.0
+#: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.
+_FARTHEST = 1e6
 
 _NO_FORCE = (0.0, 0.0, 0.0)
 _STILL = (0.0, 0.0, 0.0)
 
-#: A way to integrate (1) and (2) over a step, as a value: which one of these.
-Integrator = int
 
-#: Euler's scheme, which section 4.1 simulates with.
-EULER: Integrator = 0
+class Integrator(IntEnum):
+    """A way to integrate (1) and (2) over a step."""
 
-#: The classical Runge-Kutta scheme of fourth order. Not in the paper.
-RK4: Integrator = 1
-
-#: Both by the names users select them with.
-INTEGRATORS: dict[str, Integrator] = {"euler": EULER, "rk4": RK4}
+    EULER = 0  #: Euler's scheme, which section 4.1 simulates with
+    RK4 = 1  #: the classical Runge-Kutta scheme of fourth order; not in the paper
 
 
 class RollAxis(NamedTuple):
     """What the sixth degree of freedom adds to :class:`~auv_fmu.vehicle.Vehicle`."""
 
-    m44: float = 22.5  #: roll inertia with added inertia [kg.m2]
-    d44: float = 20.0  #: roll damping [kg.m2/s]
-    righting_roll: float = 5.0  #: righting moment in roll [N.m]; not in the paper (reading 1)
-    rolls: bool = True  #: whether the vehicle rolls; if not, it is the one of (1) and (2)
+    m44: Annotated[float, Variable("kg.m2", "Roll inertia with added inertia", POSITIVE)] = 22.5
+    d44: Annotated[float, Variable("kg.m2/s", "Linear damping of roll", 0.0)] = 20.0
+    righting_roll: Annotated[
+        float,
+        Variable(
+            "N.m",
+            "Righting moment in roll, not given in the paper; by default as in pitch",
+            name="righting.roll",
+        ),
+    ] = 5.0
+    rolls: Annotated[
+        bool,
+        Variable(
+            "1",
+            "Whether roll is free; if false, the vehicle follows (1) and (2). Not in the paper",
+            name="roll",
+        ),
+    ] = True
 
 
 class Localisation(NamedTuple):
     """The localisation system; section 4.1 gives none of its numbers (reading 7)."""
 
-    std: float = 0.001  #: standard deviation of each measured coordinate [m]
-    seed: int = 1  #: of the white noise
+    std: Annotated[
+        float,
+        Variable(
+            "m",
+            "Standard deviation of each measured coordinate",
+            0.0,
+            _FARTHEST,
+        ),
+    ] = 0.001
+    seed: Annotated[int, Variable("1", "Seed of the noise")] = 1
 
 
 class Parameters(NamedTuple):
     """All parameters of the plant."""
 
-    vehicle: Vehicle = Vehicle()
-    roll: RollAxis = RollAxis()
-    ell: float = ELL  #: distance of the control point [m]
-    limits: Limits = Limits()
-    eta0: Vector6 = ETA_0  #: initial posture (x, y, z, phi, theta, psi) [m, rad]
-    nu0: Vector6 = NU_0  #: initial velocity (u, v, w, p, q, r) [m/s, rad/s]
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()
+    roll: Annotated[RollAxis, Variable(name="")] = RollAxis()
+    ell: Distance = ELL
+    limits: Annotated[Limits, Variable(name="")] = Limits()
+    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = ETA_0
+    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = NU_0
     noise: Localisation = Localisation()
-    current: Vector3 = (0.0, 0.0, 0.0)  #: velocity of the water [m/s], earth frame
-    T: Vector3 = (0.0, 0.0, 0.0)  #: time constants of the actuators u, q, r [s]; 0: none
-    integrator: Integrator = EULER
+    current: Annotated[
+        Vector3,
+        Variable(VELOCITY, "Ocean current in the earth frame; not in the paper", tunable=True),
+    ] = (0.0, 0.0, 0.0)
+    T: Annotated[
+        Vector3,
+        Variable(
+            LAG,
+            "Time constant of the actuator lag, after the limits; 0: no lag. Not in the paper "
+            "(Remark 2)",
+            0.0,
+            name="actuator.T",
+        ),
+    ] = (0.0, 0.0, 0.0)
+    integrator: Annotated[
+        Integrator,
+        Variable("1", "Scheme that integrates (1) and (2): euler, as in the paper, or rk4"),
+    ] = Integrator.EULER
 
 
 class PlantState(NamedTuple):
@@ -89,7 +124,7 @@ class PlantState(NamedTuple):
     position: Vector3  #: centre of mass (x, y, z) [m], earth frame
     quaternion: Vector4  #: attitude, body to earth, scalar first
     nu_r: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
-    tau: Vector3  #: (tau_u, tau_q, tau_r) that acts [N, N.m]
+    tau: Vector3  #: (tau_u, tau_q, tau_r) that acted at the end of the last step [N, N.m]
     water: Vector3  #: velocity of the water that nu_r is through [m/s], earth frame
 
 
@@ -199,10 +234,10 @@ def accelerations_6dof(
 
     """
     m44, d44, righting_roll, rolls = roll
+    m22, m33, m55, m66 = vehicle.m22, vehicle.m33, vehicle.m55, vehicle.m66
     u, v, w, p, q, r = nu
     tau_wu, tau_wv, tau_ww, tau_wp, tau_wq, tau_wr = tau_w
     sin_theta, cos_theta_sin_phi = -rotation[0][2], rotation[1][2]
-    _, m22, m33, m55, m66, _, _, _, _, _, _ = vehicle
     du, dv, dw, dq, dr = accelerations(
         vehicle,
         (u, v, w, q, r),
@@ -362,21 +397,18 @@ def mean(one: float, two: float, three: float, four: float) -> float:
     return (one + 2.0 * (two + three) + four) / 6.0
 
 
-def begin(parameters: Parameters, tau: Vector3, water: Vector3) -> tuple[PlantState, Rotation]:
-    """State at the start, and its attitude.
+def begin(parameters: Parameters, water: Vector3) -> PlantState:
+    """State at the start, with actuators at rest.
 
     Args:
         parameters: of the plant.
-        tau: (tau_u, tau_q, tau_r) after the limits of (3), if it is known [N, N.m].
         water: velocity of the water [m/s], earth frame.
 
     """
     x, y, z, phi, theta, psi = parameters.eta0
     quaternion = quaternion_from_euler(phi, theta, psi)
-    rotation = rotation_from_quaternion(quaternion)
-    acting = drive(_NO_FORCE, tau, parameters.T, 0.0).last
-    state = PlantState((x, y, z), quaternion, parameters.nu0, acting, _STILL)
-    return immersed(state, rotation, water), rotation
+    state = PlantState((x, y, z), quaternion, parameters.nu0, _NO_FORCE, _STILL)
+    return immersed(state, rotation_from_quaternion(quaternion), water)
 
 
 def flow(parameters: Parameters, water: Vector3) -> Vector3:
@@ -389,7 +421,24 @@ def applied(parameters: Parameters, tau: Vector3) -> Vector3:
     return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
 
 
-def steps(
+def actuation(parameters: Parameters, state: PlantState, tau: Vector3) -> Vector3:
+    """What the actuators give (tau_u, tau_q, tau_r) [N, N.m].
+
+    Args:
+        parameters: of the plant.
+        state: of the vehicle.
+        tau: what they are to give, after the limits of (3) [N, N.m].
+
+    """
+    T, lagging = parameters.T, state.tau
+    return (
+        lagging[0] if T[0] else tau[0],
+        lagging[1] if T[1] else tau[1],
+        lagging[2] if T[2] else tau[2],
+    )
+
+
+def advance(
     parameters: Parameters,
     state: PlantState,
     rotation: Rotation,
@@ -398,35 +447,29 @@ def steps(
     water: Vector3,
     dwater: Vector3,
     h: float,
-    n: int,
-) -> tuple[PlantState, Rotation]:
-    """State after n steps of h seconds under held inputs, and its attitude.
+) -> PlantState:
+    """State after a step under held inputs, by the integrator of the parameters.
 
     Args:
         parameters: of the plant.
         state, rotation: at the beginning.
         tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
-        water: velocity of the water at the beginning of each of them [m/s], earth frame.
+        water: velocity of the water at the beginning [m/s], earth frame.
         dwater: its acceleration [m/s2], earth frame.
         h: step [s].
-        n: how many.
 
     """
     T_u, T_q, T_r = parameters.T
-    acting = Drive(tau, tau, tau, tau)
-    while n > 0:
-        state = immersed(state, rotation, water)
-        if T_u or T_q or T_r:
-            acting = drive(state.tau, tau, parameters.T, h)
-        if parameters.integrator == RK4:
-            state = step_rk4(parameters, state, rotation, acting, tau_w, h)
-        else:
-            state = step(parameters, state, rotation, acting, tau_w, h)
-        state = carried(state, dwater, h)
-        rotation = rotation_from_quaternion(state.quaternion)
-        n -= 1
-    return state, rotation
+    state = immersed(state, rotation, water)
+    acts = Drive(tau, tau, tau, tau)
+    if T_u or T_q or T_r:
+        acts = drive(state.tau, tau, parameters.T, h)
+    if parameters.integrator == Integrator.RK4:
+        state = step_rk4(parameters, state, rotation, acts, tau_w, h)
+    else:
+        state = step(parameters, state, rotation, acts, tau_w, h)
+    return carried(state, dwater, h)
 
 
 def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> PlantOutputs:
@@ -470,17 +513,3 @@ def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
 
     """
     return plus_scaled(y, std, n)
-
-
-def measurable(y: Vector3, measured: Vector3, std: float) -> Vector3:
-    """The measurement of y that is nearest to another one: as far off as noise can be.
-
-    Args:
-        y: control point [m], earth frame.
-        measured: what it is said to have been measured as [m].
-        std: standard deviation of each axis [m].
-
-    """
-    most = _MOST_DEVIATIONS * std
-    noise = limit_all(difference(measured, y), (-most, -most, -most), (most, most, most))
-    return total(y, noise)

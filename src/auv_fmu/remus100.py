@@ -8,10 +8,10 @@ refers to the centre of buoyancy, and the body frame lies in it: x forward, y to
 from __future__ import annotations
 
 from math import cos, exp, sin, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu.attitude import rotate, rotation_from_euler
-from auv_fmu.control_point import ELL, control_point, control_point_velocity
+from auv_fmu.control_point import ELL, Distance, control_point, control_point_velocity
 from auv_fmu.hull import (
     Drag,
     Hull,
@@ -24,7 +24,9 @@ from auv_fmu.hull import (
 )
 from auv_fmu.linear_algebra import Vector, solve
 from auv_fmu.plant import Localisation
+from auv_fmu.quantities import ETA, NU, VELOCITY
 from auv_fmu.tail import FASTEST, FASTEST_TURN, Tail, forces, limit_tail
+from auv_fmu.variable import Variable
 from auv_fmu.vectors import Vector3, Vector6, plus_scaled, total
 
 
@@ -35,16 +37,27 @@ class TooFast(ArithmeticError):
 class Parameters(NamedTuple):
     """All parameters of the vehicle."""
 
-    hull: Hull = Hull()
-    drag: Drag = Drag()
-    tail: Tail = Tail()
-    T_delta: float = 0.1  #: time constant of the fins [s]
-    T_n: float = 1.0  #: time constant of the propeller [s]
-    ell: float = ELL  #: distance of the control point [m]
-    eta0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  #: initial posture [m, rad]
-    nu0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  #: initial velocity [m/s, rad/s], body frame
+    hull: Annotated[Hull, Variable(name="")] = Hull()
+    drag: Annotated[Drag, Variable(name="")] = Drag()
+    tail: Annotated[Tail, Variable(name="")] = Tail()
+    T_delta: Annotated[float, Variable("s", "Time constant of the fins", 0.0, name="fin.T")] = 0.1
+    T_n: Annotated[
+        float, Variable("s", "Time constant of the propeller", 0.0, name="propeller.T")
+    ] = 1.0
+    ell: Distance = ELL
+    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
     noise: Localisation = Localisation()
-    current: Vector3 = (0.0, 0.0, 0.0)  #: velocity of the water [m/s], earth frame
+    current: Annotated[
+        Vector3, Variable(VELOCITY, "Ocean current in the earth frame", tunable=True)
+    ] = (0.0, 0.0, 0.0)
 
 
 class RemusState(NamedTuple):
@@ -242,35 +255,31 @@ def begin(parameters: Parameters, water: Vector3) -> RemusState:
     return state
 
 
-def steps(
+def advance(
     parameters: Parameters,
     state: RemusState,
     command: Vector3,
     water: Vector3,
     dwater: Vector3,
     h: float,
-    n: int,
 ) -> RemusState:
-    """State after n steps of h seconds under held inputs.
+    """State after a step under held inputs.
 
     Args:
         parameters: of the vehicle.
         state: at the beginning.
         command: (delta_r, delta_s, n) [rad, rad, rad/s].
-        water: velocity of the water at the beginning of each of them, beside `current` [m/s],
-            earth frame.
+        water: velocity of the water at the beginning, beside `current` [m/s], earth frame.
         dwater: its acceleration [m/s2], earth frame.
         h: step [s].
-        n: how many.
 
     """
-    mass = inertia(parameters.hull)
     flow = total(parameters.current, water)
-    for _ in range(n):
-        state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
-        check_speed(state)
-        state = carried(step(parameters, mass, state, command, h), dwater, h)
-        check_speed(state)
+    state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
+    check_speed(state)
+    mass = inertia(parameters.hull)
+    state = carried(step(parameters, mass, state, command, h), dwater, h)
+    check_speed(state)
     return state
 
 

@@ -5,27 +5,24 @@ As in section 2.1 and above Theorem 2 they act on vectors, component by componen
 
 from __future__ import annotations
 
+from enum import IntEnum
 from math import atan, exp, log, log1p, pi, sqrt, tanh
 
 from auv_fmu.vectors import Vector3
 
-#: A saturation function as a value: which one of this module it is.
-Saturation = int
 
-#: Those named in the paper: tanh(xi), and xi / sqrt(1 + xi^2).
-TANH: Saturation = 0
-ALGEBRAIC: Saturation = 1
+class Saturation(IntEnum):
+    """A saturation function: those named in the paper, and one more."""
 
-#: One more, (2 / pi) atan(xi), whose slope is another: Theorem 2 weighs K_1 with it.
-ARCTAN: Saturation = 2
+    TANH = 0  #: tanh(xi)
+    ALGEBRAIC = 1  #: xi / sqrt(1 + xi^2)
+    ARCTAN = 2  #: (2 / pi) atan(xi), whose slope is another: Theorem 2 weighs K_1 with it
 
-#: All by the names users select them with.
-SATURATIONS: dict[str, Saturation] = {"tanh": TANH, "algebraic": ALGEBRAIC, "arctan": ARCTAN}
 
 #: Scales the arc tangent to the bound M = 1; its slope at 0.
 _SCALE = 2.0 / pi
 
-#: Largest slope s'_M of Lemma 1 of each.
+#: Largest slope s'_M of Lemma 1 of each, by the names users select them with.
 MAXIMUM_SLOPE: dict[str, float] = {"tanh": 1.0, "algebraic": 1.0, "arctan": _SCALE}
 
 #: From here on 1 + xi^2 is xi^2 apart from rounding, and not much later too large for a float.
@@ -34,9 +31,9 @@ _LARGE = 1e9
 
 def saturation(s: Saturation, xi: Vector3) -> Vector3:
     """s(xi), for the saturation function s: M = 1 for each of them."""
-    if s == TANH:
+    if s == Saturation.TANH:
         return tanh(xi[0]), tanh(xi[1]), tanh(xi[2])
-    if s == ALGEBRAIC:
+    if s == Saturation.ALGEBRAIC:
         return xi[0] / root(xi[0]), xi[1] / root(xi[1]), xi[2] / root(xi[2])
     return _SCALE * atan(xi[0]), _SCALE * atan(xi[1]), _SCALE * atan(xi[2])
 
@@ -50,9 +47,9 @@ def slope(s: Saturation, xi: Vector3, s_xi: Vector3) -> Vector3:
         s_xi: s(xi).
 
     """
-    if s == TANH:
+    if s == Saturation.TANH:
         return 1.0 - s_xi[0] * s_xi[0], 1.0 - s_xi[1] * s_xi[1], 1.0 - s_xi[2] * s_xi[2]
-    if s == ALGEBRAIC:
+    if s == Saturation.ALGEBRAIC:
         r_1, r_2, r_3 = root(xi[0]), root(xi[1]), root(xi[2])
         return 1.0 / (r_1 * r_1 * r_1), 1.0 / (r_2 * r_2 * r_2), 1.0 / (r_3 * r_3 * r_3)
     return (
@@ -69,9 +66,9 @@ def root(xi: float) -> float:
 
 def integral(s: Saturation, xi: float) -> float:
     """Integral of s_i from 0 to xi, items (i) and (ii) of Lemma 1."""
-    if s == TANH:
+    if s == Saturation.TANH:
         return log_cosh(xi)
-    if s == ALGEBRAIC:
+    if s == Saturation.ALGEBRAIC:
         return root(xi) - 1.0
     return _SCALE * (xi * atan(xi) - log(root(xi)))
 

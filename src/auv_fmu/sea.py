@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from math import pi
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from auv_fmu import ocean_current, waves
 from auv_fmu.ocean_current import Current, Variation
+from auv_fmu.quantities import ACCELERATION, VELOCITY
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, plus_scaled, total
-from auv_fmu.waves import Components, Waves
+from auv_fmu.waves import Components, Spectrum, Waves
 
 
 class ImpossibleSea(ArithmeticError):
@@ -20,16 +22,28 @@ class Sea(NamedTuple):
 
     waves: Waves = Waves()
     current: Current = Current()
-    depth: float = 50.0  #: of the water [m]; 0: deeper than waves reach
-    g: float = 9.81  #: acceleration of gravity [m/s2]
+    depth: Annotated[float, Variable("m", "Depth of the water; 0: deep", 0.0)] = 50.0
+    g: Annotated[float, Variable("m/s2", "Acceleration of gravity (g)", POSITIVE)] = 9.81
 
 
 class WaterMotion(NamedTuple):
     """How water moves at a place."""
 
-    velocity: Vector3  #: [m/s], earth frame
-    acceleration: Vector3  #: [m/s2], earth frame, of the water that is there
-    elevation: float  #: of the surface above that of still water [m]
+    velocity: Annotated[
+        Vector3, Variable(VELOCITY, "Velocity of the water in the earth frame", name="water")
+    ]
+    acceleration: Annotated[
+        Vector3,
+        Variable(ACCELERATION, "Acceleration of the water in the earth frame", name="dwater"),
+    ]
+    elevation: Annotated[
+        float,
+        Variable(
+            "m",
+            "Elevation of the surface above still water",
+            feedthrough=("eta.x", "eta.y", "time"),
+        ),
+    ]
 
 
 def check(sea: Sea) -> None:
@@ -43,7 +57,7 @@ def check(sea: Sea) -> None:
 
     """
     limit = waves.highest_regular(2.0 * pi / sea.waves.Tp, sea.depth, sea.g)
-    if sea.waves.spectrum != waves.NONE and sea.waves.Hs > limit:
+    if sea.waves.spectrum != Spectrum.NONE and sea.waves.Hs > limit:
         raise ImpossibleSea(
             f"waves.Hs = {sea.waves.Hs:g} m is more than {limit:.3g} m, at which waves with "
             f"waves.Tp = {sea.waves.Tp:g} s break in this depth; reduce waves.Hs or raise waves.Tp"

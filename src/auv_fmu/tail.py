@@ -8,10 +8,19 @@ the paper.
 from __future__ import annotations
 
 from math import pi, radians
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+import auv_fmu
 from auv_fmu.actuators import limit
+from auv_fmu.quantities import Members
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, Vector6
+
+#: The source of the model, and the paper whose numbers of equations stand beside it.
+__citation__ = (
+    "The model is that of the class remus100 in PythonVehicleSimulator 1.0.1, by T. I. Fossen. "
+    f"{auv_fmu.__citation__}"
+)
 
 #: Beyond this speed [m/s] through the water there is no model: it is four times the largest of the
 #: vehicle, and explicit steps of 20 ms are stable below it.
@@ -21,25 +30,96 @@ FASTEST = 10.0
 FASTEST_TURN = 30.0
 
 
+#: Rudder, stern planes and propeller: what is commanded, and what they are.
+ACTUATOR: Members = {"delta_r": "rad", "delta_s": "rad", "n": "rad/s"}
+
+
 class Tail(NamedTuple):
     """Parameters of fins and propeller, with the values of the REMUS 100."""
 
-    rho: float = 1026.0  #: density of the water [kg/m3]
-    area: float = 2 * 0.00665  #: area of a pair of fins [m2]
-    x: float = -0.8  #: where the fins are ahead of the centre [m]: they are at the stern
-    lift_r: float = 0.5  #: lift of the rudder per angle [1/rad]
-    lift_s: float = 0.7  #: lift of the stern planes per angle [1/rad]
-    delta_max: float = radians(15.0)  #: largest angle of a fin [rad]
-    diameter: float = 0.14  #: of the propeller [m]
-    deduction: float = 0.1  #: share of the thrust that the flow around the hull takes
-    advance: float = 0.944  #: speed of advance per speed of the vehicle: 1 - wake fraction
-    j_1: float = 0.6632  #: advance number at the largest speed
-    kt_0: float = 0.4566  #: thrust coefficient at the advance number 0
-    kt_1: float = 0.1798  #: thrust coefficient at j_1
-    kq_0: float = 0.0700  #: torque coefficient at the advance number 0
-    kq_1: float = 0.0312  #: torque coefficient at j_1
-    torque: float = 0.1  #: share of the torque of the propeller that rolls the vehicle
-    n_max: float = round(1525.0 * pi / 30.0, 12)  #: largest speed of the propeller [rad/s]
+    rho: Annotated[float, Variable("kg/m3", "Density of the water (rho)", POSITIVE)] = 1026.0
+    area: Annotated[float, Variable("m2", "Area of a pair of fins", POSITIVE, name="fin.area")] = (
+        2 * 0.00665
+    )
+    x: Annotated[
+        float,
+        Variable(
+            "m",
+            "Where the fins are ahead of the centre; at the stern: < 0",
+            maximum=-POSITIVE,
+            name="fin.x",
+        ),
+    ] = -0.8
+    lift_r: Annotated[
+        float,
+        Variable("1/rad", "Lift coefficient of the rudder per angle", POSITIVE, name="fin.lift.r"),
+    ] = 0.5
+    lift_s: Annotated[
+        float,
+        Variable(
+            "1/rad", "Lift coefficient of the stern planes per angle", POSITIVE, name="fin.lift.s"
+        ),
+    ] = 0.7
+    delta_max: Annotated[
+        float, Variable("rad", "Largest angle of a fin", POSITIVE, pi / 2, name="fin.max")
+    ] = radians(15.0)
+    diameter: Annotated[
+        float, Variable("m", "Diameter of the propeller", POSITIVE, name="propeller.diameter")
+    ] = 0.14
+    deduction: Annotated[
+        float,
+        Variable(
+            "1",
+            "Share of the thrust that the flow around the hull takes (thrust deduction number)",
+            0.0,
+            0.9,
+            name="propeller.deduction",
+        ),
+    ] = 0.1
+    advance: Annotated[
+        float,
+        Variable(
+            "1",
+            "Speed of advance per speed of the vehicle (1 - wake fraction)",
+            0.0,
+            name="propeller.advance",
+        ),
+    ] = 0.944
+    j_1: Annotated[
+        float,
+        Variable(
+            "1",
+            "Advance number to which KT_1 and KQ_1 belong (J_1)",
+            POSITIVE,
+            name="propeller.J_1",
+        ),
+    ] = 0.6632
+    kt_0: Annotated[
+        float,
+        Variable(
+            "1", "Thrust coefficient at advance number 0 (KT_0)", POSITIVE, name="propeller.KT_0"
+        ),
+    ] = 0.4566
+    kt_1: Annotated[
+        float,
+        Variable("1", "Thrust coefficient at advance number J_1 (KT_1)", name="propeller.KT_1"),
+    ] = 0.1798
+    kq_0: Annotated[
+        float,
+        Variable("1", "Torque coefficient at advance number 0 (KQ_0)", 0.0, name="propeller.KQ_0"),
+    ] = 0.0700
+    kq_1: Annotated[
+        float,
+        Variable("1", "Torque coefficient at advance number J_1 (KQ_1)", name="propeller.KQ_1"),
+    ] = 0.0312
+    torque: Annotated[
+        float,
+        Variable("1", "Share of the torque that rolls the vehicle", 0.0, name="propeller.torque"),
+    ] = 0.1
+    n_max: Annotated[
+        float,
+        Variable("rad/s", "Largest speed of the propeller", POSITIVE, name="propeller.max"),
+    ] = round(1525.0 * pi / 30.0, 12)
 
 
 def limit_tail(tail: Tail, actuator: Vector3) -> Vector3:

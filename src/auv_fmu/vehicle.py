@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 from math import cos
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3, Vector5
 
 
 class Vehicle(NamedTuple):
     """Parameters of (2), with the values of section 4.1."""
 
-    m11: float = 25.0  #: surge mass with added mass [kg]
-    m22: float = 17.5  #: sway mass with added mass [kg]
-    m33: float = 30.0  #: heave mass with added mass [kg]
-    m55: float = 22.5  #: pitch inertia with added inertia [kg.m2]
-    m66: float = 15.0  #: yaw inertia with added inertia [kg.m2]
-    d11: float = 30.0  #: surge damping [kg/s]
-    d22: float = 30.0  #: sway damping [kg/s]
-    d33: float = 30.0  #: heave damping [kg/s]
-    d55: float = 20.0  #: pitch damping [kg.m2/s]
-    d66: float = 20.0  #: yaw damping [kg.m2/s]
-    righting_pitch: float = 5.0  #: rho g nabla GM_L, righting moment in pitch [N.m]
+    m11: Annotated[float, Variable("kg", "Surge mass with added mass", POSITIVE)] = 25.0
+    m22: Annotated[float, Variable("kg", "Sway mass with added mass", POSITIVE)] = 17.5
+    m33: Annotated[float, Variable("kg", "Heave mass with added mass", POSITIVE)] = 30.0
+    m55: Annotated[float, Variable("kg.m2", "Pitch inertia with added inertia", POSITIVE)] = 22.5
+    m66: Annotated[float, Variable("kg.m2", "Yaw inertia with added inertia", POSITIVE)] = 15.0
+    d11: Annotated[float, Variable("kg/s", "Linear damping of surge", 0.0)] = 30.0
+    d22: Annotated[float, Variable("kg/s", "Linear damping of sway", 0.0)] = 30.0
+    d33: Annotated[float, Variable("kg/s", "Linear damping of heave", 0.0)] = 30.0
+    d55: Annotated[float, Variable("kg.m2/s", "Linear damping of pitch", 0.0)] = 20.0
+    d66: Annotated[float, Variable("kg.m2/s", "Linear damping of yaw", 0.0)] = 20.0
+    righting_pitch: Annotated[
+        float,
+        Variable("N.m", "Righting moment in pitch (rho g nabla GM_L)", name="righting.pitch"),
+    ] = 5.0
 
 
 def euler_rates(theta: float, q: float, r: float) -> tuple[float, float]:
@@ -57,14 +61,15 @@ def accelerations(
         d/dt (u, v, w, q, r) [m/s2, rad/s2].
 
     """
-    m11, m22, m33, m55, m66, d11, d22, d33, d55, d66, righting_pitch = vehicle
+    m11, m22, m33 = vehicle.m11, vehicle.m22, vehicle.m33
+    righting = vehicle.righting_pitch * sin_theta
     u, v, w, q, r = nu
     tau_u, tau_q, tau_r = tau
     tau_wu, tau_wv, tau_ww, tau_wq, tau_wr = tau_w
     return (
-        (m22 * v * r - m33 * w * q - d11 * u + tau_u - tau_wu) / m11,
-        (-m11 * u * r - d22 * v - tau_wv) / m22,
-        (m11 * u * q - d33 * w - tau_ww) / m33,
-        ((m33 - m11) * u * w - d55 * q - righting_pitch * sin_theta + tau_q - tau_wq) / m55,
-        ((m11 - m22) * u * v - d66 * r + tau_r - tau_wr) / m66,
+        (m22 * v * r - m33 * w * q - vehicle.d11 * u + tau_u - tau_wu) / m11,
+        (-m11 * u * r - vehicle.d22 * v - tau_wv) / m22,
+        (m11 * u * q - vehicle.d33 * w - tau_ww) / m33,
+        ((m33 - m11) * u * w - vehicle.d55 * q - righting + tau_q - tau_wq) / vehicle.m55,
+        ((m11 - m22) * u * v - vehicle.d66 * r + tau_r - tau_wr) / vehicle.m66,
     )

@@ -27,29 +27,23 @@ A regular wave of amplitude a moves water of depth h, at the depth z below its s
 from __future__ import annotations
 
 import math
+from enum import IntEnum
 from math import cos, exp, expm1, fmod, log, pi, sin, sqrt, tanh, tau
 from typing import Annotated, NamedTuple
 
 from auv_fmu.linear_algebra import Matrix, Vector
 from auv_fmu.random_numbers import WAVE_DIRECTIONS, WAVE_FREQUENCIES, WAVE_PHASES, start, uniform
+from auv_fmu.variable import POSITIVE, Variable
 from auv_fmu.vectors import Vector3
 
 #: Most regular waves of a sea.
 MOST = 64
 
-#: A spectrum, as a value: which one of these.
-Spectrum = int
+#: Largest exponent of the spreading: narrower ones need finer angles than it is integrated over.
+_NARROWEST = 100.0
 
-NONE: Spectrum = 0
-PIERSON_MOSKOWITZ: Spectrum = 1
-JONSWAP: Spectrum = 2
-
-#: All by the names users select them with.
-SPECTRA: dict[str, Spectrum] = {
-    "none": NONE,
-    "pierson-moskowitz": PIERSON_MOSKOWITZ,
-    "jonswap": JONSWAP,
-}
+#: A spectrum. It is written as a call for the hyphen, which users select it with.
+Spectrum = IntEnum("Spectrum", {"NONE": 0, "PIERSON-MOSKOWITZ": 1, "JONSWAP": 2})
 
 #: Regular waves in rows of (omega [rad/s], k [rad/m], cosine and sine of the direction, phase
 #: [rad]); rows that a sea does not use are zero.
@@ -80,15 +74,30 @@ _STILL: Vector3 = (0.0, 0.0, 0.0)
 class Waves(NamedTuple):
     """A random sea; the defaults are a slight to moderate one."""
 
-    spectrum: Spectrum = JONSWAP
-    Hs: float = 1.0  #: significant wave height [m]
-    Tp: float = 7.0  #: period of the peak of the spectrum [s]
-    gamma: float = 3.3  #: how much JONSWAP raises the peak
-    highest: float = 4.0  #: highest frequency, as a multiple of the peak's
-    direction: float = 0.0  #: mean direction that waves go to, from north to east [rad]
-    s: float = 10.0  #: exponent of the spreading; 0: all waves go in the mean direction
-    n: int = 32  #: number of regular waves
-    seed: int = 1  #: of their frequencies, phases and directions
+    spectrum: Annotated[
+        Spectrum, Variable("1", "Spectrum of the waves: none, pierson-moskowitz or jonswap")
+    ] = Spectrum.JONSWAP
+    Hs: Annotated[float, Variable("m", "Significant wave height (Hs)", 0.0)] = 1.0
+    Tp: Annotated[float, Variable("s", "Period of the peak of the spectrum (Tp)", POSITIVE)] = 7.0
+    gamma: Annotated[float, Variable("1", "JONSWAP peak enhancement factor (gamma)", 1.0, 10.0)] = (
+        3.3
+    )
+    highest: Annotated[
+        float,
+        Variable("1", "Highest frequency of the waves, as a multiple of the peak's", 1.0, 10.0),
+    ] = 4.0
+    direction: Annotated[
+        float, Variable("rad", "Mean direction that the waves go to: 0 north, pi/2 east")
+    ] = 0.0
+    s: Annotated[
+        float,
+        Variable("1", "Spreading exponent s of cos^2s(angle/2); 0: long-crested", 0.0, _NARROWEST),
+    ] = 10.0
+    n: Annotated[
+        int,
+        Variable("1", "Number of regular waves that the sea is the sum of", 1, MOST, name="count"),
+    ] = 32
+    seed: Annotated[int, Variable("1", "Seed of frequencies, phases and directions")] = 1
 
 
 class Gradient(NamedTuple):
@@ -165,7 +174,7 @@ def enhancement(waves: Waves, ratio: float) -> float:
         ratio: of the frequency to that of the peak.
 
     """
-    if waves.spectrum != JONSWAP:
+    if waves.spectrum != Spectrum.JONSWAP:
         return 1.0
     off = (ratio - 1.0) / (_WIDTH_BELOW if ratio <= 1.0 else _WIDTH_ABOVE)
     return math.pow(waves.gamma, exp(-0.5 * off * off))
@@ -244,7 +253,7 @@ def components(waves: Waves, depth: float, g: float) -> Components:
 
     """
     rows = Matrix((0.0 for _ in range(5)) for _ in range(MOST))
-    if waves.spectrum == NONE:
+    if waves.spectrum == Spectrum.NONE:
         return rows
     ratios = frequencies(waves)
     state = start(waves.seed, WAVE_PHASES)
@@ -309,7 +318,7 @@ def motion(waves: Waves, rows: Components, depth: float, position: Vector3, t: f
         t: time [s].
 
     """
-    if waves.spectrum == NONE:
+    if waves.spectrum == Spectrum.NONE:
         return WaveMotion(_STILL, _STILL, Gradient(0.0, 0.0, 0.0, 0.0, 0.0), 0.0)
     x, y, z = position
     z = within(z, depth)

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 import subprocess
 from collections.abc import Sequence
-from ctypes import CDLL, Array, Structure, byref, c_char, c_char_p, c_double, c_int, c_size_t
+from ctypes import (
+    CDLL,
+    Structure,
+    byref,
+    c_char,
+    c_char_p,
+    c_double,
+    c_int,
+    c_size_t,
+    c_ulong,
+)
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
-from types import ModuleType
-from typing import Any, get_type_hints
+from typing import Any
 
-from fmus.discovery import components, source_of
+from auv_fmu.variable import Refusal
+from fmus.discovery import source_of
 from fmus.native.translator import translated
-from fmus.ports.groups import count_values, hints_of, is_record, parts_of
+from fmus.ports.groups import Nothing, count_values, form, hints_of, is_record, parts_of
+from fmus.python.callbacks import LONGEST_MESSAGE
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = ROOT / "fmus/native/runtime"
@@ -22,23 +32,46 @@ RUNTIME = ROOT / "fmus/native/runtime"
 _SHIM = """
 #include "equations.c"
 #define OUT __attribute__((visibility("default")))
-OUT void check(model_parameters *p, Error *e) { model_check(p, e); }
-OUT void begin(model_parameters *p, model_inputs *i, double t, model_state *s, model_outputs *o,
-               Error *e) { model_begin(p, i, t, s, o, e); }
-OUT void advance(model_parameters *p, model_state *s, model_inputs *i, double t, double h, int n,
-                 model_outputs *o, Error *e) { model_advance(p, s, i, t, h, n, o, e); }
-OUT void derive(model_parameters *p, model_state *s, Error *e) { model_derive(p, s, e); }
-OUT void expected(model_parameters *p, model_state *s, model_outputs *o, model_outputs *x, Error *e)
-{ model_expected(p, s, o, x, e); }
-OUT int credible(model_parameters *p, model_state *s, model_inputs *i, Error *e)
-{ return model_credible(p, s, i, e); }
-OUT void restart(model_parameters *p, model_state *s, model_inputs *i, Error *e)
-{ model_restart(p, s, i, e); }
-OUT void measure(model_parameters *p, double *n, model_outputs *o, Error *e)
-{ model_measure(p, n, o, e); }
-OUT unsigned long seed(model_parameters *p, Error *e) { return model_seed(p, e); }
-OUT const char *restarted(void) { return MODEL_RESTARTED; }
+#define P model_parameters *p
+#define S model_state *s
+#define D model_derived *d
+#define I model_inputs *i
+#define O model_outputs *o
+#define E Error *e
+OUT void check(P, E) { model_check(p, e); }
+OUT void check_state(P, S, E) { model_check_state(p, s, e); }
+OUT unsigned long seed(P, E) { return model_seed(p, e); }
+OUT void start(P, I, double t, S, E) { model_start(p, i, t, s, e); }
+OUT int credible(P, S, I, E) { return model_credible(p, s, i, e); }
+OUT void restarted(P, S, I, E) { model_restart(p, s, i, e); }
+OUT void derive(P, S, I, double t, D, E) { model_derive(p, s, i, t, d, e); }
+OUT void outputs(P, S, D, I, double t, O, E) { model_evaluate(p, s, d, i, t, o, e); }
+OUT void update(P, S, D, I, double t, double h, E) { model_update(p, s, d, i, t, h, e); }
+OUT void measured(P, double *n, O, E) { model_measure(p, n, o, e); }
+OUT const char *logged(void) { return MODEL_RESTARTED; }
 """
+
+#: What the compiled hooks take, and which of it has their result; others return it.
+_TAKES = {
+    "check": ("parameters",),
+    "check_state": ("parameters", "state"),
+    "seed": ("parameters",),
+    "start": ("parameters", "inputs", "t", "state"),
+    "credible": ("parameters", "state", "inputs"),
+    "restarted": ("parameters", "state", "inputs"),
+    "derive": ("parameters", "state", "inputs", "t", "derived"),
+    "outputs": ("parameters", "state", "derived", "inputs", "t", "outputs"),
+    "update": ("parameters", "state", "derived", "inputs", "t", "h"),
+    "measured": ("parameters", "n", "outputs"),
+}
+_RESULTS = {
+    "start": "state",
+    "restarted": "state",
+    "derive": "derived",
+    "outputs": "outputs",
+    "update": "state",
+    "measured": "outputs",
+}
 
 FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-function")
 
@@ -60,12 +93,16 @@ def is_series(kind: Any) -> bool:
     return parts_of(kind) is not None and not is_record(kind)
 
 
-@cache
 def structure(kind: Any) -> Any:
     """A type of the equations as ctypes has it."""
+    return _structure(form(kind))
+
+
+@cache
+def _structure(kind: Any) -> Any:
     if kind is float:
         return c_double
-    if kind in (int, bool):
+    if not is_series(kind) and not is_record(kind):
         return c_int
     if is_series(kind):
         parts = [(f"x{i}", structure(k)) for i, k in enumerate(parts_of(kind) or ())]
@@ -74,50 +111,45 @@ def structure(kind: Any) -> Any:
     return type("Part", (Structure,), {"_fields_": parts})
 
 
-@cache
-def series(kind: Any) -> Any:
-    """A type as states and outputs are kept: all its numbers as doubles."""
-    parts = hints_of(kind).values() if isinstance(kind, type) else [kind]
-    size = sum(map(count_values, parts))
-    return type("Series", (Structure,), {"_fields_": [("v", c_double * size)]})
-
-
 def listed(kind: Any, value: Any) -> Any:
-    """A value as states and outputs are kept."""
-    made = series(kind)()
-    made.v[:] = flat(value)
-    return made
+    """A value as inputs, states and outputs are kept: all its numbers as doubles."""
+    return (c_double * count_values(kind))(*flat(value))
 
 
 def filled(kind: Any, value: Any) -> Any:
     """A value in a structure of its type."""
+    kind = form(kind)
     made = structure(kind)
     if not issubclass(made, Structure):
         return made(value)
-    kinds = parts_of(kind) if is_series(kind) else hints_of(kind).values()
+    kinds = parts_of(kind)
     assert kinds is not None
-    values = value.values() if isinstance(value, dict) else value
-    return made(*(filled(k, v) for k, v in zip(kinds, values, strict=True)))
+    return made(*(filled(k, v) for k, v in zip(kinds, value, strict=True)))
 
 
 def flat(value: Any) -> list[float]:
     """All numbers of a value, of a structure of ctypes or of a tuple."""
     if isinstance(value, Structure):
         value = [getattr(value, name) for name, *_ in value._fields_]
-    elif isinstance(value, Array):
-        value = list(value)
-    elif isinstance(value, dict):
-        value = value.values()
     if isinstance(value, (float, int)):
         return [value]
     return [number for part in value for number in flat(part)]
 
 
+#: What something comes to: what it raises, or the bits of its numbers.
+Outcome = tuple[str, list[str]]
+
+
+def outcome(made: Any) -> Outcome:
+    """What something comes to that raises nothing."""
+    return "", bits(flat(() if made is None else made))
+
+
 class Equations:
-    """A component's functions in both languages."""
+    """A component's hooks in both languages."""
 
     def __init__(self, name: str) -> None:
-        self.behaviour: ModuleType = import_module(f"{components()[name]}.behaviour")
+        self.behaviour = source_of(name).definition.behaviour
         folder = Path(mkdtemp(prefix="auv_fmu_equations_"))
         (folder / "equations.c").write_text(translated(source_of(name).definition))
         (folder / "shim.c").write_text(_SHIM)
@@ -125,45 +157,48 @@ class Equations:
         library = folder / "equations.so"
         subprocess.run([*command, "-o", library, folder / "shim.c", "-lm"], check=True)
         self.library = CDLL(str(library))
-        self.library.restarted.restype = c_char_p
-        hints = {**hints_of(self.behaviour.begin), **hints_of(self.behaviour.advance)}
-        self.parameters, self.state = hints["parameters"], hints["state"]
-        self.inputs = hints.get("inputs", tuple[()])
-        self.derived = hints.get("derived")
-        self.outputs = self.behaviour.Outputs
-        derived = [structure(self.derived)] if self.derived else []
-        parts = [(f"x{i}", kind) for i, kind in enumerate([series(self.state), *derived])]
-        self._kept = type("Kept", (Structure,), {"_fields_": parts})
+        self.library.logged.restype = c_char_p
+        self.library.seed.restype = c_ulong
 
-    def kept(self, state: Any = None) -> Any:
-        """The state as the component keeps it: what is derived from it is not filled in."""
-        made = self._kept()
-        if state is not None:
-            made.x0 = listed(self.state, state)
-        return made
-
-    def result(self, name: str, *arguments: Any) -> int:
-        """What a function gives that raises nothing."""
+    def of_c(self, hook: str, **given: Any) -> Outcome:
+        """What a compiled hook comes to."""
+        passed = {what: self._passed(what, given.get(what)) for what in _TAKES[hook]}
         error = Error()
-        result: int = getattr(self.library, name)(*_passed(arguments), byref(error))
-        assert not error.raised
-        return result
+        arguments = (a if isinstance(a, c_double) else byref(a) for a in passed.values())
+        returned = getattr(self.library, hook)(*arguments, byref(error))
+        if error.raised:
+            return error.why.text.decode(), []
+        if hook in _RESULTS:
+            return outcome(passed[_RESULTS[hook]])
+        return outcome(None if hook.startswith("check") else returned)
 
-    def call(self, name: str, *arguments: Any) -> str:
-        """Call a function with structures and numbers; what it raised."""
-        error = Error()
-        getattr(self.library, name)(*_passed(arguments), byref(error))
-        return error.why.text.decode() if error.raised else ""
+    def of_python(self, hook: str, **given: Any) -> Outcome:
+        """What the hook comes to in Python; a refusal as a slave says it."""
+        try:
+            return outcome(self.call(hook, **given))
+        except Refusal as refusal:
+            return str(refusal), []
+        except Exception as error:
+            return f"{type(error).__name__}: {error}"[:LONGEST_MESSAGE], []
 
-    def python(self, name: str, **given: Any) -> Any:
-        """Call the function of the same name with those arguments that it has."""
-        function = getattr(self.behaviour, name)
-        return function(**{n: given[n] for n in get_type_hints(function) if n != "return"})
+    def call(self, hook: str, **given: Any) -> Any:
+        """What the hook returns."""
+        function = self.behaviour.hooks[hook]
+        assert function is not None
+        return function(**{name: given[name] for name in self.behaviour.arguments(hook)})
 
-
-def _passed(arguments: Sequence[Any]) -> list[Any]:
-    kinds = {float: c_double, int: c_int}
-    return [kinds[type(a)](a) if type(a) in kinds else byref(a) for a in arguments]
+    def _passed(self, what: str, value: Any) -> Any:
+        """An argument, or room for it."""
+        if what in ("t", "h"):
+            return c_double(value)
+        if what == "n":
+            return (c_double * len(value))(*value)
+        kind = getattr(self.behaviour, what) or Nothing
+        if not count_values(kind):
+            return (c_double * 1)()
+        if what in ("parameters", "derived"):
+            return structure(kind)() if value is None else filled(kind, value)
+        return (c_double * count_values(kind))() if value is None else listed(kind, value)
 
 
 @cache

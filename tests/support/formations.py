@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import strategies as st
 
 from auv_fmu import formation
-from auv_fmu.formation import TABLE, Estimator, Known, Parameters, Stages
+from auv_fmu.formation import Estimator, Known, Parameters, Shape, Stages
 
 ORIGIN = (0.0, 0.0, 0.0)
 FOUR = (0.0,) * 4
@@ -26,7 +26,7 @@ def tables(draw) -> Parameters:
     rests = draw(st.tuples(*(st.floats(0.0, 20.0),) * 3))
     t = (rests[0], rests[0] + durations[0] + rests[1])
     t = (*t, t[1] + durations[1] + rests[2])
-    stages = Stages(draw(st.integers(1, 4)), (TABLE,) * 4, FOUR, x, y, z, t, durations)
+    stages = Stages(draw(st.integers(1, 4)), (Shape.TABLE,) * 4, FOUR, x, y, z, t, durations)
     return Parameters(stages=stages, omega_chi=draw(st.floats(0.05, 2.0)))
 
 
@@ -50,7 +50,7 @@ def follow(estimator: Estimator, position, received, h: float, n: int):
             sent = waiting.pop(0)[1]
         leader = known(position(sent), age=t - sent)
         yield t, state, formation.leader(parameters, state, leader)
-        state = formation.steps(parameters, state, leader, h, 1)
+        state = formation.step(parameters, state, leader, h)
 
 
 def every(period: float, delay: float, end: float) -> list[tuple[float, float]]:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from auv_fmu import hull, plant, remus100
 from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
-from auv_fmu.plant import RK4, Parameters, RollAxis
+from auv_fmu.plant import Integrator, Parameters, RollAxis
 from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, pitch_angles, speeds, vectors
 
@@ -31,7 +31,7 @@ def parameter_sets(draw, rolls=None):
     vehicle = Vehicle(*draw(vectors(masses, 5)), *draw(vectors(dampings, 5)), G)
     is_free = draw(st.booleans()) if rolls is None else rolls
     roll = RollAxis(draw(masses), draw(dampings), G, is_free)
-    return Parameters(vehicle, roll, integrator=RK4)
+    return Parameters(vehicle, roll, integrator=Integrator.RK4)
 
 
 def mass_and_damping(parameters):

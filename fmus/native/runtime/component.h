@@ -102,6 +102,9 @@ static void set_unknown(call *this, string type, const uint32_t references[], si
 
 static void take_step(call *this, double time, double step);
 
+/* Where the run is: at the end of the last step that was taken. */
+static double time_of(const call *this);
+
 /* States: each looks at its arguments first. A handle that is not NULL is used again. */
 static void get_state(call *this, void **state);
 static void set_state(call *this, void *state);

@@ -186,7 +186,7 @@ MODEL_EXCHANGE_FUNCTIONS(OF_MODEL_EXCHANGE)
 
 ANSWER(fmi2GetRealStatus, ALWAYS, wrong_place_of(v), (void *c, int kind, double *v), {
     if (kind == LAST_SUCCESSFUL_TIME) {
-        *v = this.instance->last_successful_time;
+        *v = time_of(&this);
     } else {
         this.status = FMI_DISCARD;
         tell(this.instance, FMI_DISCARD, "Invalid status inquiry for fmi2GetRealStatus");

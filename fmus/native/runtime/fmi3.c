@@ -140,7 +140,7 @@ EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_s
     if (GOES_ON(this, complete ? NULL : "NULL")) {
         take_step(&this, time, step);
         *event_handling_needed = *terminate_simulation = *early_return = 0;
-        *last_successful_time = this.instance->run.time;
+        *last_successful_time = time_of(&this);
     }
     return end(&this);
 }
@@ -187,7 +187,7 @@ EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, doub
         for (size_t i = 0, from = 0; i <= n; i++) {
             if (i < n && r[i] != TIME) continue;
             if (i > from) get_reals(&this, &r[from], i - from, &v[from]);
-            if (i < n) v[i] = this.instance->run.time;
+            if (i < n) v[i] = time_of(&this);
             from = i + 1;
         }
     }

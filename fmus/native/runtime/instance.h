@@ -89,16 +89,23 @@ typedef struct {
 
 typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED } mode;
 
-/* State and outputs at a communication point. */
+/* Of outputs. Those that are outdated are computed when they are read. A sampled component holds
+ * those of the beginning of a step after it; the next step computes its own. */
+typedef enum { OUTDATED, HELD, FRESH } freshness;
+
+/* A communication point. */
 typedef struct {
+    double time;
     state_values state;
+    double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* that the noise is made of */
     output_values outputs;
+    freshness outputs_are;
 } moment;
 
 /* Everything that the rest of a run depends on. */
 typedef struct {
     mode mode;
-    double start_time, time; /* where it has begun, and where it is */
+    double start_time;
     parameter_values parameters; /* as they were set */
     input_values inputs;
     int begun;         /* whether there is a state */
@@ -124,11 +131,11 @@ struct instance {
     run run;
     parameter_values meant; /* the parameters that steps are taken with */
     double longest_step;
-    int underived; /* whether what a step needs of the state is to be derived of it first */
-    int stale; /* whether a value has changed that state and outputs at the start time depend on */
+    model_derived derived;
+    int underived; /* whether it is to be derived again before it is used */
+    int stale;     /* whether a value has changed that the state at the start time depends on */
     size_t n_said;
     uint64_t said[MOST_MESSAGES];
-    double last_successful_time; /* the end of the last step that was taken */
     /* What a call sets, until all of it is found good. */
     parameter_values set_parameters;
     input_values set_inputs;

@@ -1,18 +1,17 @@
 /* Modes and steps.
  *
- * A step is a transaction: state and outputs change together, after everything was computed and
- * found finite.
+ * A step is a transaction: it computes the next moment, which is taken when all of it was found
+ * finite. The outputs of a moment are computed when they are read; at the end of a step at once, if
+ * no input changes them, so that it is the step that is refused. A sampled component computes those
+ * of the beginning of a step, and keeps them.
  */
 #include <math.h>
 #include <string.h>
 
-/* Longest step of a component that has no internal steps [s]. */
-static const double NO_LIMIT = 1e300;
-
 /* Makes a run what it is after instantiation. */
 static void renew_run(run *it) {
     memset(it, 0, sizeof *it);
-    it->parameters.h_max = NO_LIMIT;
+    it->parameters.h_max = INFINITY; /* unless there is such a parameter */
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality == PARAMETER) {
             put_parameter(&it->parameters, &ports[i], ports[i].start);
@@ -20,6 +19,7 @@ static void renew_run(run *it) {
             it->inputs.values[ports[i].place] = ports[i].start;
         }
     }
+    it->moments[it->now].outputs_are = FRESH;
 }
 
 /* Makes everything what it is after instantiation. */
@@ -28,7 +28,6 @@ static void renew(instance *it) {
     it->stale = 0;
     it->in_error = 0;
     it->n_said = 0;
-    it->last_successful_time = 0.0;
 }
 
 static int adopt(instance *it, const parameter_values *values, message *why) {
@@ -62,44 +61,51 @@ static int has_members(const double values[], message *why) {
     return 1;
 }
 
-/* Gives outputs their noise. */
-static int measure(instance *it, output_values *outputs, message *why) {
-    double draws[AT_LEAST_ONE(MODEL_DRAWS)];
-    Error error;
-    for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(&it->run.noise);
-    error.raised = 0;
-    model_measure(&it->meant.model, draws, &outputs->groups, &error);
-    if (error.raised) return compose(why, "%s", error.why.text);
-    return all_finite(outputs->values, MODEL_OUTPUTS) ||
-           compose(why, "a sampled output is not finite");
+/* Whether a state that was computed is one that a run can go on from. */
+static int is_sound(const state_values *state, const Error *error, message *why) {
+    if (error->raised) return compose(why, "%s", error->why.text);
+    return has_members(state->values, why) &&
+           (bounded(state) ||
+            compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE));
 }
 
-/* Takes over what was computed for the next moment, if no number of it is out of bounds. */
-static int accept(instance *it, const Error *error, message *why) {
-    run *run = &it->run;
-    moment *next = &run->moments[!run->now];
-    if (error->raised) return compose(why, "%s", error->why.text);
-    if (!has_members(next->state.values, why)) return 0;
-    if (!bounded(&next->state)) {
-        return compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE);
+static void draw(generator *noise, double draws[]) {
+    for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(noise);
+}
+
+/* Derives of a state what hooks need, unless nothing that it is made of has changed. */
+static void derive(instance *it, const model_state *state, double time, Error *error) {
+    if (!it->underived) return;
+    model_derive(&it->meant.model, state, &it->run.inputs.groups, time, &it->derived, error);
+    it->underived = error->raised;
+}
+
+/* Computes the outputs of a moment. */
+static int evaluate(instance *it, const moment *of, output_values *outputs, message *why) {
+    const model_parameters *parameters = &it->meant.model;
+    const model_inputs *inputs = &it->run.inputs.groups;
+    const model_state *state = &of->state.groups;
+    state_values restarted;
+    Error error;
+    error.raised = 0;
+    if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
+        restarted = of->state;
+        state = &restarted.groups;
+        model_restart(parameters, &restarted.groups, inputs, &error);
     }
+    if (MODEL_OUTPUTS_TAKE_DERIVED) derive(it, state, of->time, &error);
+    model_evaluate(parameters, state, &it->derived, inputs, of->time, &outputs->groups, &error);
+    if (error.raised) return compose(why, "%s", error.why.text);
     for (int i = 0; i < REAL_OUTPUTS; i++) {
-        if (!isfinite(next->outputs.values[i])) {
-            return is_finite(port_at(output_references[i]), next->outputs.values[i], why);
+        if (!isfinite(outputs->values[i])) {
+            return is_finite(port_at(output_references[i]), outputs->values[i], why);
         }
     }
-    if (MODEL_DRAWS > 0) {
-        generator before;
-        copy_for(&before, &run->noise, MODEL_DRAWS);
-        if (!measure(it, &next->outputs, why)) {
-            copy_for(&run->noise, &before, MODEL_DRAWS);
-            return 0;
-        }
-    }
-    run->now = !run->now;
-    run->begun = 1;
-    it->underived = 0;
-    return 1;
+    if (MODEL_DRAWS == 0) return 1;
+    model_measure(parameters, of->draws, &outputs->groups, &error);
+    if (error.raised) return compose(why, "%s", error.why.text);
+    return all_finite(outputs->values, REAL_OUTPUTS) ||
+           compose(why, "a sampled output is not finite");
 }
 
 /* Initialisation and end */
@@ -112,22 +118,35 @@ static int start(instance *it, message *why) {
     if (!adopt(it, &run->parameters, why)) return 0;
     if (MODEL_DRAWS > 0) {
         seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model, &error));
+        draw(&run->noise, next->draws);
     }
-    model_begin(&it->meant.model, &run->inputs.groups, run->start_time, &next->state.groups,
-                &next->outputs.groups, &error);
-    return accept(it, &error, why);
+    next->time = run->start_time;
+    model_start(&it->meant.model, &run->inputs.groups, next->time, &next->state.groups, &error);
+    if (!is_sound(&next->state, &error, why) || !evaluate(it, next, &next->outputs, why)) return 0;
+    next->outputs_are = FRESH;
+    run->now = !run->now;
+    run->begun = 1;
+    return 1;
 }
 
 static int refresh(instance *it, message *why) {
     run *run = &it->run;
+    moment *now = &run->moments[run->now];
+    output_values *outputs = &run->moments[!run->now].outputs;
     message said;
-    if (!it->stale) return 1;
-    if (start(it, &said)) {
-        it->stale = 0;
+    if (!it->stale) {
+        if (!evaluate(it, now, outputs, &said)) {
+            run->fault = 1;
+            return compose(why, "outputs refused: %s", said.text);
+        }
+        now->outputs = *outputs;
+        now->outputs_are = FRESH;
         return 1;
     }
+    it->stale = !start(it, &said);
+    if (!it->stale) return 1;
     run->begun = 0;
-    memset(&run->moments[run->now].outputs, 0, sizeof run->moments[run->now].outputs);
+    memset(&now->outputs, 0, sizeof now->outputs);
     return compose(why, "initialisation refused: %s", said.text);
 }
 
@@ -146,7 +165,7 @@ static void set_experiment(call *this, double start) {
     message why;
     if (!follows(this, INSTANTIATED)) return;
     if (isfinite(start)) {
-        run->start_time = run->time = this->instance->last_successful_time = start;
+        run->start_time = run->moments[run->now].time = start;
     } else {
         compose(&why, "start time %r: must be finite", start);
         fail(this, &why);
@@ -156,16 +175,16 @@ static void set_experiment(call *this, double start) {
 static void enter_initialisation(call *this) {
     if (!follows(this, INSTANTIATED)) return;
     this->instance->run.mode = INITIALISING;
-    this->instance->stale = 1;
+    note_change(this->instance, 0, 0);
 }
 
 static void exit_initialisation(call *this) {
     message why;
     if (!follows(this, INITIALISING)) return;
-    if (refresh(this->instance, &why)) {
-        this->instance->run.mode = STEPPING;
-    } else {
+    if (this->instance->stale && !refresh(this->instance, &why)) {
         fail(this, &why);
+    } else {
+        this->instance->run.mode = STEPPING;
     }
 }
 
@@ -191,12 +210,20 @@ static int internal_steps(double time, double step, double longest, message *why
     return -1;
 }
 
+/* The end of a step: that of a host that counts them, where its beginning is. */
+static double end_of_step(double start, double time, double step) {
+    double k = nearbyint((time - start) / step);
+    return time == start + k * step ? start + (k + 1.0) * step : time + step;
+}
+
+/* Computes the next moment, and makes it now if all of it is good. */
 static int advance(instance *it, double time, double step, message *why) {
     run *run = &it->run;
-    const moment *now = &run->moments[run->now];
     moment *next = &run->moments[!run->now];
+    model_state *state = &next->state.groups;
     const model_parameters *parameters = &it->meant.model;
     const model_inputs *inputs = &run->inputs.groups;
+    generator before;
     message said;
     Error error;
     int n = 1;
@@ -204,30 +231,58 @@ static int advance(instance *it, double time, double step, message *why) {
         n = internal_steps(time, step, it->longest_step, why);
         if (n <= 0) return n == 0;
     }
+    *next = run->moments[run->now];
+    if (next->time != time) {
+        next->time = time;
+        if (MODEL_OUTPUTS_TAKE_TIME) next->outputs_are = OUTDATED;
+        if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
+    }
+    if (MODEL_SAMPLED && next->outputs_are != FRESH &&
+        !evaluate(it, next, &next->outputs, why)) {
+        return 0;
+    }
     error.raised = 0;
-    next->state = now->state;
-    int credible = model_credible(parameters, &now->state.groups, inputs, &error);
-    if (!credible && !error.raised) {
+    if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
         compose(&said, MODEL_RESTARTED, time);
         say(it, &said, FMI_WARNING, MODEL_RESTARTED);
-        model_restart(parameters, &next->state.groups, inputs, &error);
-    } else if (it->underived) {
-        model_derive(parameters, &next->state.groups, &error);
+        model_restart(parameters, state, inputs, &error);
     }
-    model_advance(parameters, &next->state.groups, inputs, time, step / n, n,
-                  &next->outputs.groups, &error);
-    if (!accept(it, &error, why)) return 0;
-    run->time = time + step;
+    double h = step / n;
+    for (int i = 0; i < n && !error.raised; i++) {
+        double t = time + i * h;
+        if (MODEL_UPDATE_TAKES_DERIVED) derive(it, state, t, &error);
+        model_update(parameters, state, &it->derived, inputs, t, h, &error);
+        if (MODEL_DERIVE_TAKES_STATE || MODEL_DERIVE_TAKES_TIME) it->underived = 1;
+    }
+    if (!is_sound(&next->state, &error, why)) return 0;
+    next->time = end_of_step(run->start_time, time, step);
+    next->outputs_are = MODEL_SAMPLED ? HELD : OUTDATED;
+    if (MODEL_DRAWS > 0) {
+        copy_for(&before, &run->noise, MODEL_DRAWS);
+        draw(&run->noise, next->draws);
+    }
+    if (!MODEL_SAMPLED && !MODEL_OUTPUTS_TAKE_INPUTS) {
+        if (!evaluate(it, next, &next->outputs, why)) {
+            if (MODEL_DRAWS > 0) copy_for(&run->noise, &before, MODEL_DRAWS);
+            return 0;
+        }
+        next->outputs_are = FRESH;
+    }
+    run->now = !run->now;
     return 1;
+}
+
+static double time_of(const call *this) {
+    const run *run = &this->instance->run;
+    return run->moments[run->now].time;
 }
 
 static void take_step(call *this, double time, double step) {
     instance *it = this->instance;
     message why, said;
     if (!follows(this, STEPPING)) return;
-    if (advance(it, time, step, &why)) {
-        it->last_successful_time = time + step;
-    } else {
+    if (!advance(it, time, step, &why)) {
+        it->underived = 1;
         compose(&said, "step refused at t = %g s: %s", time, why.text);
         discard(this, &said, why.text);
     }

@@ -3,9 +3,10 @@
  * It is held in memory as the bytes that it is serialised to:
  *
  *     MAGIC, identity, mode, start time, time,
- *     parameters in the order of their ports, inputs and outputs, of both Reals before others,
- *     whether there is a state, and if so: the numbers of the state, and of the noise the words of
- *     the generator, the place of the next, whether there is a next number, and it;
+ *     parameters in the order of their ports, inputs, Reals before others,
+ *     whether there is a state, and if so: the numbers of the state; of the noise the words of the
+ *     generator, the place of the next, whether there is a next number, and it, and what is drawn;
+ *     of a sampled component the outputs, Reals before others, and what they are;
  *     fault;
  *     the CRC-32 of all that.
  */
@@ -13,7 +14,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const char MAGIC[] = "FMU state 2";
+static const char MAGIC[] = "FMU state 3";
 
 /* Tells states of one model and version from all others. */
 static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
@@ -21,8 +22,8 @@ static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
 /* More bytes than any state has. */
 static const size_t MOST_BYTES = (size_t)1 << 30;
 
-/* How far results from the same numbers may differ between two machines. */
-static const double NEAR = 1e-9;
+/* No normal number that is drawn is larger: it is made of 53 bits. */
+static const double LARGEST_DRAW = 9.0;
 
 enum { CHECKSUM_SIZE = 4 };
 
@@ -34,11 +35,12 @@ typedef struct {
 
 /* Writing */
 
-static void put_noise(writer *to, const generator *noise) {
+static void put_noise(writer *to, const generator *noise, const double draws[]) {
     for (int i = 0; i < GENERATOR_WORDS; i++) put_word(to, noise->words[i]);
     put_word(to, noise->place);
     put_word(to, (uint32_t)noise->has_next);
     put_real(to, noise->has_next ? noise->next : 0.0);
+    put_numbers(to, REAL, draws, MODEL_DRAWS);
 }
 
 static void put_run(writer *to, const run *it) {
@@ -47,18 +49,21 @@ static void put_run(writer *to, const run *it) {
     put_text(to, IDENTITY);
     put_word(to, it->mode);
     put_real(to, it->start_time);
-    put_real(to, it->time);
+    put_real(to, now->time);
     for (int i = 0; i < N_PORTS; i++) {
         if (ports[i].causality != PARAMETER) continue;
         double number = parameter(&it->parameters, &ports[i]);
         put_numbers(to, ports[i].type, &number, 1);
     }
     put_values(to, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
-    put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
     put_word(to, (uint32_t)it->begun);
     if (it->begun) {
         put_state(to, now->state.values);
-        if (MODEL_DRAWS > 0) put_noise(to, &it->noise);
+        if (MODEL_DRAWS > 0) put_noise(to, &it->noise, now->draws);
+        if (MODEL_SAMPLED) {
+            put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
+            put_word(to, now->outputs_are);
+        }
     }
     put_word(to, (uint32_t)it->fault);
 }
@@ -130,22 +135,29 @@ static int take_state(reader *from, double values[], message *why) {
     return 1;
 }
 
-static int take_noise(reader *from, generator *noise, message *why) {
+static int can_be_drawn(double number) { return fabs(number) <= LARGEST_DRAW; }
+
+static int take_noise(reader *from, generator *noise, double draws[], message *why) {
     for (int i = 0; i < GENERATOR_WORDS; i++) noise->words[i] = take_word(from);
     noise->place = take_word(from);
     noise->has_next = take_truth(from);
     noise->next = take_real(from);
+    take_numbers(from, REAL, draws, MODEL_DRAWS);
     if (noise->place > GENERATOR_WORDS || noise->has_next < 0) {
         return compose(why, "its noise generator has an invalid state");
     }
-    return isfinite(noise->next) || compose(why, "its noise is not finite");
+    int good = can_be_drawn(noise->next);
+    for (int i = 0; i < MODEL_DRAWS; i++) good &= can_be_drawn(draws[i]);
+    return good || compose(why, "its noise is none that can be drawn");
 }
 
-static int are_zero(const double values[], size_t n) {
-    for (size_t i = 0; i < n; i++) {
-        if (values[i] != 0.0) return 0;
-    }
-    return 1;
+/* The outputs that a sampled component keeps. */
+static int take_sample(reader *from, moment *it, message *why) {
+    take_values(from, it->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
+    uint32_t number = take_word(from);
+    if (number > FRESH) return compose(why, "its outputs are neither fresh nor not");
+    it->outputs_are = (freshness)number;
+    return good_values(it->outputs.values, MODEL_OUTPUTS, output_references, why);
 }
 
 /* A saved run, checked part by part. */
@@ -155,11 +167,11 @@ static int take_run(reader *from, run *it, message *why) {
     if (number > TERMINATED) return compose(why, "%u is not a mode", number);
     it->mode = (mode)number;
     it->start_time = take_real(from);
-    it->time = take_real(from);
-    if (!isfinite(it->start_time) || isnan(it->time)) {
+    now->time = take_real(from);
+    if (!isfinite(it->start_time) || isnan(now->time)) {
         return compose(why, "a value is not finite");
     }
-    if (it->mode < STEPPING && it->time != it->start_time) {
+    if (it->mode < STEPPING && now->time != it->start_time) {
         return compose(why, "its time is not its start time");
     }
     for (int i = 0; i < N_PORTS; i++) {
@@ -169,22 +181,19 @@ static int take_run(reader *from, run *it, message *why) {
         }
     }
     take_values(from, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
-    take_values(from, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
-    if (!good_values(it->inputs.values, MODEL_INPUTS, input_references, why) ||
-        !good_values(now->outputs.values, MODEL_OUTPUTS, output_references, why)) {
-        return 0;
-    }
+    if (!good_values(it->inputs.values, MODEL_INPUTS, input_references, why)) return 0;
     it->begun = take_truth(from);
     if (it->mode == INSTANTIATED && it->begun) {
         return compose(why, "it has a state before the initialisation");
     }
-    if (!it->begun &&
-        (it->mode == STEPPING || !are_zero(now->outputs.values, MODEL_OUTPUTS))) {
-        return compose(why, "it has steps, or outputs, without a state");
+    if (!it->begun && it->mode == STEPPING) {
+        return compose(why, "it has steps without a state");
     }
     if (it->begun) {
+        now->outputs_are = OUTDATED;
         if (!take_state(from, now->state.values, why)) return 0;
-        if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, why)) return 0;
+        if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, now->draws, why)) return 0;
+        if (MODEL_SAMPLED && !take_sample(from, now, why)) return 0;
     }
     it->fault = take_truth(from);
     if (it->fault < 0) return compose(why, "its fault is neither true nor false");
@@ -192,30 +201,15 @@ static int take_run(reader *from, run *it, message *why) {
            compose(why, "it has missing or unknown parts");
 }
 
-/* Whether two lists of outputs are the same, but for the rounding of Reals. */
-static int nearly_equal(const double one[], const double other[]) {
-    for (int i = 0; i < MODEL_OUTPUTS; i++) {
-        double larger = fmax(fabs(one[i]), fabs(other[i]));
-        double most = i < REAL_OUTPUTS ? NEAR * fmax(larger, 1.0) : 0.0;
-        if (!(fabs(one[i] - other[i]) <= most)) return 0;
-    }
-    return 1;
-}
-
-/* Whether a run can have led to a state and outputs, all of them finite. */
-static int can_be_reached(run *it, message *why) {
+/* Whether a run can have led to a state, whose numbers are finite. */
+static int can_be_reached(const run *it, message *why) {
     const model_parameters *parameters = &it->parameters.model;
-    moment *now = &it->moments[it->now];
-    output_values *expected = &it->moments[!it->now].outputs;
+    const state_values *state = &it->moments[it->now].state;
     Error error = {0};
     model_check(parameters, &error);
-    if (!error.raised && !bounded(&now->state)) return compose(why, "it exceeds %g", LARGEST_STATE);
-    model_expected(parameters, &now->state.groups, &now->outputs.groups, &expected->groups, &error);
-    if (error.raised) return compose(why, "%s", error.why.text);
-    if (MODEL_EXPECTS && !nearly_equal(expected->values, now->outputs.values)) {
-        return compose(why, "its outputs do not match its state");
-    }
-    return 1;
+    if (!error.raised && !bounded(state)) return compose(why, "it exceeds %g", LARGEST_STATE);
+    model_check_state(parameters, &state->groups, &error);
+    return !error.raised || compose(why, "%s", error.why.text);
 }
 
 /* How many bytes a state has at most; `it` is a new run. */
@@ -247,8 +241,9 @@ static int restore(instance *it, const saved *state, message *why) {
                (!wanted->begun || adopt(it, &wanted->parameters, why));
     if (good) {
         it->run = *wanted;
+        it->stale = 0;
         /* Before the first step all follows from parameters and inputs: it is computed again. */
-        it->stale = it->run.mode == INITIALISING;
+        note_change(it, 0, 0);
     }
     free(wanted);
     return good;
@@ -304,7 +299,7 @@ static void get_state(call *this, void **state) {
     message unused;
     writer to = {NULL, 0};
     entry *before;
-    refresh(this->instance, &unused);
+    if (this->instance->stale) refresh(this->instance, &unused);
     if (!has_place(this, state, &before)) return;
     put_run(&to, &this->instance->run);
     saved *made = new_saved(to.size + CHECKSUM_SIZE);

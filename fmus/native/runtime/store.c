@@ -13,7 +13,8 @@ static int adopt(instance *it, const parameter_values *values, message *why);
 /* Whether a call comes in the one mode that it is allowed in; else it fails. */
 static int follows(call *this, mode mode);
 
-/* Computes state and outputs at the start time, if a value they depend on has changed. */
+/* Computes the outputs, and before them the state at the start time if a value has changed that it
+ * depends on. */
 static int refresh(instance *it, message *why);
 
 /* Ports */
@@ -148,7 +149,8 @@ static int has_output(const uint32_t references[], size_t n) {
 static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     instance *it = this->instance;
     message why;
-    if (it->stale && has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
+    if (it->run.moments[it->run.now].outputs_are != OUTDATED) return;
+    if (has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
 }
 
 static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
@@ -177,6 +179,19 @@ static string get_string(call *this, uint32_t reference) {
 
 /* Setting */
 
+/* Inputs or parameters of the run have changed: what depends on them has to follow. */
+static void note_change(instance *it, int inputs, int parameters) {
+    moment *now = &it->run.moments[it->run.now];
+    if (it->run.mode == INITIALISING) {
+        it->stale = 1;
+        now->outputs_are = OUTDATED;
+    } else if (it->run.mode == STEPPING) {
+        if (inputs && MODEL_OUTPUTS_TAKE_INPUTS) now->outputs_are = OUTDATED;
+        if (inputs && MODEL_DERIVE_TAKES_INPUTS) it->underived = 1;
+        if (parameters && MODEL_OUTPUTS_TAKE_PARAMETERS) now->outputs_are = OUTDATED;
+    }
+}
+
 /* Only after its end a run takes no values. */
 static int can_set(call *this) {
     return this->instance->run.mode != TERMINATED || follows(this, STEPPING);
@@ -186,7 +201,8 @@ static int can_set(call *this) {
 struct setting {
     call *call;
     int good;
-    int tunes; /* whether there are parameters among them */
+    int has_parameters;
+    int changes_inputs, changes_parameters;
 };
 
 static void set_unknown(call *this, string type, const uint32_t references[], size_t n) {
@@ -198,17 +214,17 @@ static void set_unknown(call *this, string type, const uint32_t references[], si
 
 static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n) {
     instance *instance = this->instance;
-    setting it = {this, can_set(this), 0};
+    setting it = {this, can_set(this), 0, 0, 0};
     for (size_t i = 0; i < n && it.good; i++) {
         const port *port = port_of(references[i], type);
         if (port != NULL) {
-            it.tunes |= port->causality == PARAMETER;
+            it.has_parameters |= port->causality == PARAMETER;
         } else {
             set_unknown(this, version.types[type], &references[i], 1);
             it.good = 0;
         }
     }
-    if (it.tunes) instance->set_parameters = instance->run.parameters;
+    if (it.has_parameters) instance->set_parameters = instance->run.parameters;
     instance->set_inputs = instance->run.inputs;
     return it;
 }
@@ -233,7 +249,9 @@ static int take_value(setting *it, const port *port, double number, string text,
     }
     if (port->causality == INPUT) {
         instance->set_inputs.values[port->place] = number;
+        it->changes_inputs = 1;
     } else {
+        it->changes_parameters = 1;
         put_parameter(&instance->set_parameters, port, number);
     }
     return 1;
@@ -242,7 +260,7 @@ static int take_value(setting *it, const port *port, double number, string text,
 /* A run with another parameter than the host asked for must not begin. */
 static void give_up(setting *it, message *why) {
     it->good = 0;
-    if (it->tunes && it->call->instance->run.mode != STEPPING) {
+    if (it->has_parameters && it->call->instance->run.mode != STEPPING) {
         it->call->instance->run.fault = 1;
         fail(it->call, why);
     } else {
@@ -260,13 +278,14 @@ static void end_setting(setting *it) {
     run *run = &instance->run;
     message why;
     if (!it->good) return;
-    if (it->tunes && run->mode == STEPPING && !adopt(instance, &instance->set_parameters, &why)) {
+    if (it->changes_parameters && run->mode == STEPPING &&
+        !adopt(instance, &instance->set_parameters, &why)) {
         give_up(it, &why);
         return;
     }
-    if (it->tunes) run->parameters = instance->set_parameters;
+    if (it->changes_parameters) run->parameters = instance->set_parameters;
     run->inputs = instance->set_inputs;
-    if (run->mode == INITIALISING) instance->stale = 1;
+    note_change(instance, it->changes_inputs, it->changes_parameters);
 }
 
 static int all_finite(const double values[], size_t n) {
@@ -281,6 +300,7 @@ static void set_reals(call *this, const uint32_t references[], size_t n, const d
     if (n == REAL_INPUTS && !INPUTS_HAVE_RANGES && run->mode == STEPPING &&
         are_all(references, input_references, n) && all_finite(values, n)) {
         memcpy(run->inputs.values, values, n * sizeof *values);
+        note_change(this->instance, 1, 0);
         return;
     }
     setting it = begin_setting(this, REAL, references, n);

@@ -103,8 +103,8 @@ def run(
     first = closed_loop.act(
         setting, blocks, moment, run_steps.h, run_steps.parts, run_steps.delayed
     )
-    driven, _ = blocks.vehicle.begin(setting.plant, first.tau, moment.scene.water.velocity)
-    done = done_in(first, blocks.vehicle.acting(setting.plant, driven))
+    acting = blocks.vehicle.acting(setting.plant, moment.vehicles.plant, first.tau)
+    done = done_in(first, acting)
     if not (is_sound(moment) and nought(done) == 0.0):
         return moment
     k = 0
@@ -124,7 +124,8 @@ def run(
         instant = closed_loop.act(setting, blocks, moment, h, parts, run_steps.delayed)
         begun, before = moment, done.tau
         moment = closed_loop.step(setting, blocks, instant, h, parts, end, n)
-        done = done_in(instant, blocks.vehicle.acting(setting.plant, moment.vehicles.plant))
+        acting = blocks.vehicle.acting(setting.plant, moment.vehicles.plant, instant.tau)
+        done = done_in(instant, acting)
         if not is_sound(moment):
             break
         miss = difference(done.velocity, begun.scene.plant.dy)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,21 +11,9 @@ from auv_fmu import blocks
 from auv_fmu.blocks import SeaWaves
 from auv_fmu.closed_loop import LongestSteps, Setting
 from auv_fmu.sea import Sea
-from fmus.allocation import ports as allocation
-from fmus.auv_plant import behaviour as auv_plant_behaviour
-from fmus.auv_plant import ports as auv_plant
-from fmus.disturbance_generator import ports as disturbance_generator
-from fmus.motion_planner import ports as motion_planner
-from fmus.observer_controller import ports as observer_controller
-from fmus.path_planner import behaviour as path_planner_behaviour
-from fmus.path_planner import ports as path_planner
-from fmus.pd_controller import ports as pd_controller
-from fmus.ports.groups import ParameterSet
-from fmus.ports.port import H_MAX, Port, Refusal
-from fmus.remus100 import behaviour as remus100_behaviour
-from fmus.remus100 import ports as remus100
-from fmus.sea import behaviour as sea_behaviour
-from fmus.sea import ports as sea
+from auv_fmu.variable import Refusal
+from fmus.discovery import source_of
+from fmus.ports.port import H_MAX, Port
 from orchestrator.machine.errors import InputError
 from orchestrator.master.plan import code_of
 from orchestrator.runs.scenario import Scenario
@@ -133,36 +121,22 @@ def _shown(connection: Connection) -> str:
 class _Block(NamedTuple):
     """A component as the equations have it."""
 
-    ports: Mapping[str, Port]  #: its parameters
+    ports: Mapping[str, Port]  #: its parameters, all but `h_max`
     paths: Mapping[str, Place]  #: where each lies in the set of the equations
     starts: Any  #: that set, of the ports' own values
     check: Callable[[Any], object]  #: refuses values that do not fit
 
 
-def _declared(
-    parameters: ParameterSet[Any], check: Callable[[Any], object] = lambda values: None
-) -> _Block:
+@cache
+def _block(fmu: str) -> _Block:
+    """A component, by the name of its FMU."""
+    definition = source_of(fmu).definition
+    parameters, check = definition.parameters, definition.behaviour.hooks["check"]
     ports = {port.name: port for port in parameters.ports}
     starts = {name: port.start for name, port in ports.items() if port.start is not None}
-    return _Block(ports, parameters.paths, parameters.of(starts), check)
-
-
-#: By the name of the FMU.
-_BLOCKS: Mapping[str, _Block] = {
-    "AuvPlant": _declared(auv_plant.PARAMETERS, auv_plant_behaviour.check),
-    "Remus100": _declared(remus100.PARAMETERS, remus100_behaviour.check),
-    "Allocation": _declared(allocation.PARAMETERS),
-    "ObserverController": _declared(observer_controller.PARAMETERS),
-    "PdController": _declared(pd_controller.PARAMETERS),
-    "DisturbanceGenerator": _declared(disturbance_generator.PARAMETERS),
-    "MotionPlanner": _declared(motion_planner.PARAMETERS),
-    "PathPlanner": _declared(
-        # Runs of a study mostly have the same path, and to check it takes a while.
-        path_planner.PARAMETERS,
-        lru_cache(maxsize=8)(path_planner_behaviour.check),
-    ),
-    "Sea": _declared(sea.PARAMETERS, sea_behaviour.check),
-}
+    # Runs of a study mostly have the same path, and to check it takes a while.
+    checked = lru_cache(maxsize=8)(check) if check else lambda values: None
+    return _Block(ports, parameters.paths, parameters.of(starts), checked)
 
 
 def setting_of(
@@ -179,13 +153,13 @@ def setting_of(
         InputError: a component would refuse a value, or the equations here have no place for it.
 
     """
-    components = {name: _BLOCKS[fmu] for name, fmu in fmus.items()}
+    components = {name: _block(fmu) for name, fmu in fmus.items()}
     sets = {name: component.starts for name, component in components.items()}
     longest: dict[str, Any] = {}
     for name, value in parameters.items():
         component, port = name.component, name.port
         declared = components[component].ports.get(port)
-        if port == H_MAX.name:
+        if port == H_MAX:
             longest[component] = value
         elif declared:
             try:

@@ -13,19 +13,22 @@ from fmus.ports.definition import Definition, define
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_description
 from fmus.python.packaging import fmu_entries, seal
-from support.all_types import behaviour, ports
+from support.all_types import component, prompt, sampled
 from support.hosts import MEMORY
 
 NAME = "AllTypes"
 
 _GUID = "{all types}"
 
+#: Components, by when their outputs are computed.
+VARIANTS = {"read": component, "sampled": sampled, "prompt": prompt}
+
 _SCRIPT = """\
-from all_types import behaviour, ports
+from all_types import component, prompt, sampled
 from fmus.python.loading import settle
 from fmus.python.slave import slave_of
 
-AllTypes = slave_of("AllTypes", ports, behaviour)
+AllTypes = slave_of("AllTypes", {module})
 settle(AllTypes, globals(), locals())
 """
 
@@ -35,9 +38,9 @@ _FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-ffp-contract
 _DESCRIBE = {"2": fmi2_description, "3": fmi3_description}
 
 
-def definition() -> Definition:
+def definition(variant: str = "read") -> Definition:
     """What it is."""
-    return define(NAME, ports, behaviour)
+    return define(NAME, VARIANTS[variant])
 
 
 def native(
@@ -81,8 +84,9 @@ def sanitized(folder: Path) -> Path:
     return native(folder, sanitizers=MEMORY, compiler="gcc")
 
 
-def python(folder: Path) -> Path:
+def python(folder: Path, variant: str = "read") -> Path:
     """Its FMU in Python, unpacked into a folder, and beside it as a file."""
     support = Path(__file__).parents[1]
-    seal(fmu_entries(f"{NAME}_fmu", _SCRIPT, "native", support), folder.with_suffix(".fmu"))
+    script = _SCRIPT.format(module=VARIANTS[variant].__name__.rpartition(".")[2])
+    seal(fmu_entries(f"{NAME}_fmu", script, "native", support), folder.with_suffix(".fmu"))
     return Path(fmpy.extract(folder.with_suffix(".fmu"), folder))

@@ -14,7 +14,7 @@ from auv_fmu.disturbance import Disturbance
 from auv_fmu.ocean_current import Current
 from auv_fmu.plant import Localisation
 from auv_fmu.sea import Sea
-from auv_fmu.waves import NONE, Waves
+from auv_fmu.waves import Spectrum, Waves
 
 QUIET = PAPER._replace(plant=plant.Parameters(noise=Localisation(std=0.0)))
 
@@ -38,7 +38,9 @@ def test_water_is_added_to_the_current_of_the_vehicle(setting):
 def test_sea_without_waves_and_variation_is_steady_water():
     """0.5 m/s to the east, up to the rounding of sin and cos; friction would make more of it."""
     smooth = QUIET._replace(disturbance=Disturbance(A_f=0.0))
-    sea = Sea(Waves(spectrum=NONE), Current(speed=0.5, direction=pi / 2, root=0.0, sigma=0.0))
+    sea = Sea(
+        Waves(spectrum=Spectrum.NONE), Current(speed=0.5, direction=pi / 2, root=0.0, sigma=0.0)
+    )
     in_sea = positions(smooth._replace(water=sea_waves(sea)))
     steady = positions(smooth._replace(water=(0.0, 0.5, 0.0)))
     np.testing.assert_allclose(in_sea, steady, rtol=0.0, atol=1e-12)

@@ -11,7 +11,7 @@ from auv_fmu.disturbance import Disturbance
 from auv_fmu.output_feedback import Gains
 from auv_fmu.pd import PdGains
 from auv_fmu.plant import Localisation, Parameters
-from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS
+from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
 
 QUIET = Parameters(noise=Localisation(std=0.0))
 
@@ -72,13 +72,13 @@ def test_noise_is_that_of_its_seed():
     assert len({first(seed) for seed in seeds}) == len(seeds)
 
 
-@pytest.mark.parametrize("name", SATURATIONS)
+@pytest.mark.parametrize("name", MAXIMUM_SLOPE)
 def test_closed_loop_of_any_saturation_function_converges(name):
     """Theorem 2: the tracking error ends in a ball; 10 cm in 60 s from 6 m for our numbers.
 
     Near rest a gain counts s'_M times, so that ball is 1 / s'_M times as large.
     """
-    *_, last = closed_loop(3000, Setting(controller=Gains(s=SATURATIONS[name]), plant=QUIET))
+    *_, last = closed_loop(3000, Setting(controller=Gains(s=Saturation[name.upper()]), plant=QUIET))
     assert np.abs(last.signals.e).max() < 0.1 / MAXIMUM_SLOPE[name]
 
 

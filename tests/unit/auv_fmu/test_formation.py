@@ -12,20 +12,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import closed_loop, formation, motion_planner
+from auv_fmu.blocks import helix_begin, helix_step
 from auv_fmu.closed_loop import PAPER
 from auv_fmu.formation import (
-    CIRCLE,
-    COLUMN,
-    LINE,
-    TABLE,
     Estimator,
     FormationState,
     Heading,
     ImpossibleFormation,
     Known,
     Parameters,
+    Shape,
     Stages,
-    V,
 )
 from auv_fmu.motion_planner import Reference
 from auv_fmu.path_planner import ImpossiblePath
@@ -33,8 +30,11 @@ from support.formations import FOUR, ORIGIN, every, follow, known, tables
 
 DEFAULT = Parameters()
 
+#: All that follow from a number.
+SHAPES = [shape for shape in Shape if shape != Shape.TABLE]
 
-def in_shape(shape: int, number: int = 2, vehicles: int = 3, **others) -> Parameters:
+
+def in_shape(shape: Shape, number: int = 2, vehicles: int = 3, **others) -> Parameters:
     return Parameters(number, vehicles, Stages()._replace(shape=(shape,) * 4), **others)
 
 
@@ -44,10 +44,13 @@ def in_shape(shape: int, number: int = 2, vehicles: int = 3, **others) -> Parame
 @pytest.mark.parametrize(
     ("shape", "places"),
     [
-        (LINE, [(0, 0), (0, 5), (0, -5), (0, 10)]),
-        (COLUMN, [(0, 0), (-5, 0), (-10, 0), (-15, 0)]),
-        (V, [(0, 0), (-sqrt(12.5), sqrt(12.5)), (-sqrt(12.5), -sqrt(12.5)), (-sqrt(50), sqrt(50))]),
-        (CIRCLE, [(sqrt(12.5), 0), (0, sqrt(12.5)), (-sqrt(12.5), 0), (0, -sqrt(12.5))]),
+        (Shape.LINE, [(0, 0), (0, 5), (0, -5), (0, 10)]),
+        (Shape.COLUMN, [(0, 0), (-5, 0), (-10, 0), (-15, 0)]),
+        (
+            Shape.V,
+            [(0, 0), (-sqrt(12.5), sqrt(12.5)), (-sqrt(12.5), -sqrt(12.5)), (-sqrt(50), sqrt(50))],
+        ),
+        (Shape.CIRCLE, [(sqrt(12.5), 0), (0, sqrt(12.5)), (-sqrt(12.5), 0), (0, -sqrt(12.5))]),
     ],
 )
 def test_places_of_four(shape, places):
@@ -56,7 +59,11 @@ def test_places_of_four(shape, places):
         assert found == pytest.approx((x, y, 0.0), abs=1e-12)
 
 
-@given(st.sampled_from([LINE, COLUMN, V, CIRCLE]), st.integers(2, 64), st.floats(0.1, 100.0))
+@given(
+    st.sampled_from(SHAPES),
+    st.integers(2, 64),
+    st.floats(0.1, 100.0),
+)
 def test_neighbours_are_the_spacing_apart_and_nobody_is_nearer(shape, vehicles, spacing):
     stages = Stages()._replace(shape=(shape,) * 4, spacing=(spacing,) * 4)
     places = [
@@ -70,7 +77,7 @@ def test_neighbours_are_the_spacing_apart_and_nobody_is_nearer(shape, vehicles, 
 
 
 def test_circle_of_one_is_on_the_reference():
-    assert formation.offset(in_shape(CIRCLE, 1, 1), 0) == ORIGIN
+    assert formation.offset(in_shape(Shape.CIRCLE, 1, 1), 0) == ORIGIN
 
 
 @given(tables(), st.floats(0.0, 250.0))
@@ -178,7 +185,8 @@ def test_derivatives_of_the_reference_are_those_of_its_position():
     there: 1 ms times omega^2, some 10 m, and the jumps of chi'''.
     """
     stages = Stages(
-        3, (LINE, V, TABLE, LINE), (5.0,) * 4, FOUR, FOUR, (0.0, 0.0, 3.0, 0.0),
+        3, (Shape.LINE, Shape.V, Shape.TABLE, Shape.LINE), (5.0,) * 4, FOUR, FOUR,
+        (0.0, 0.0, 3.0, 0.0),
         (5.0, 15.0, 90.0), (8.0, 10.0, 20.0),
     )  # fmt: skip
     parameters = Parameters(3, 3, stages, omega_chi=0.5)
@@ -189,7 +197,7 @@ def test_derivatives_of_the_reference_are_those_of_its_position():
         t = k * h
         leader = spiral(t, 0.3 + 0.08 * t if t < 20.0 else -1.0)
         rows.append(formation.reference(parameters, state, leader, t))
-        state = formation.steps(parameters, state, leader, h, 1)
+        state = formation.step(parameters, state, leader, h)
     y, dy, ddy = (np.array([row[i] for row in rows]) for i in range(3))
     np.testing.assert_allclose((y[2:] - y[:-2]) / (2 * h), dy[1:-1], atol=1e-5)
     np.testing.assert_allclose((dy[2:] - dy[:-2]) / (2 * h), ddy[1:-1], atol=1e-3)
@@ -198,23 +206,23 @@ def test_derivatives_of_the_reference_are_those_of_its_position():
 def test_place_of_the_leader_has_its_reference():
     leader = spiral(7.0, 0.4)
     state = FormationState(Heading(0.4, 0.3, 0.1, 0.02), ORIGIN, ORIGIN)
-    found = formation.reference(in_shape(COLUMN, 1), state, leader, 3.0)
+    found = formation.reference(in_shape(Shape.COLUMN, 1), state, leader, 3.0)
     assert found == Reference(leader.y_0, leader.dy_0, leader.ddy_0)
 
 
-@pytest.mark.parametrize("shape", [LINE, COLUMN, V, CIRCLE])
+@pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_places_beside_the_helix_of_the_paper_can_be_followed(shape, number):
     """From rest on: the inner places move back as the formation begins to turn."""
     parameters, of_leader = in_shape(shape, number), motion_planner.Parameters()
-    moving, motion = motion_planner.begin(of_leader)
+    moving, motion = helix_begin(of_leader)
     state = None
     for k in range(3000):
         leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
         state = state or formation.first_state(leader)
         formation.reference(parameters, state, leader, 0.02 * k)
-        state = formation.steps(parameters, state, leader, 0.02, 1)
-        moving, motion = motion_planner.steps(of_leader, moving, motion, 0.02, 1)
+        state = formation.step(parameters, state, leader, 0.02)
+        moving, motion = helix_step(of_leader, moving, motion, 0.02 * k, 0.02)
 
 
 def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
@@ -224,9 +232,9 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
     """
     blocks, h, moments = closed_loop.blocks_of(PAPER), PAPER.h, []
     parts, of_leader = closed_loop.splits(PAPER, h), motion_planner.Parameters()
-    moving, motion = motion_planner.begin(of_leader)
+    moving, motion = helix_begin(of_leader)
     leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
-    planners = [in_shape(LINE, number) for number in (1, 2, 3)]
+    planners = [in_shape(Shape.LINE, number) for number in (1, 2, 3)]
     states = [formation.first_state(leader)] * 3
     noise = Random(1).gauss
     for planner, state in zip(planners, states, strict=True):
@@ -241,7 +249,7 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
             instant = closed_loop.act(PAPER, blocks, moment, h, parts, delayed=False)
             n = (noise(0.0, 1.0), noise(0.0, 1.0), noise(0.0, 1.0))
             moments[i] = closed_loop.step(PAPER, blocks, instant, h, parts, (k + 1) * h, n)
-            states[i] = formation.steps(planner, states[i], leader, h, 1)
+            states[i] = formation.step(planner, states[i], leader, h)
             errors.append(dist(moment.scene.plant.y, wanted.y_d))
             positions.append(moment.scene.plant.y)
             assert instant.tau == instant.command  # no actuator is at its limit
@@ -249,7 +257,7 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
             d = dist(formation.offset(planners[i], 0), formation.offset(planners[j], 0))
             assert abs(dist(a, b) - d) <= errors[i] + errors[j] + 1e-9
         assert max(errors) < (0.2 if k * h > 40.0 else 1.5)
-        moving, motion = motion_planner.steps(of_leader, moving, motion, h, 1)
+        moving, motion = helix_step(of_leader, moving, motion, k * h, h)
         leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
 
 
@@ -285,7 +293,7 @@ def test_vehicle_points_along_its_reference_and_at_rest_with_the_formation():
     ],
 )
 def test_changes_that_no_vehicle_can_follow_are_refused(stages, why):
-    shapes = {"n": 2, "shape": (LINE, COLUMN, LINE, LINE)}
+    shapes = {"n": 2, "shape": (Shape.LINE, Shape.COLUMN, Shape.LINE, Shape.LINE)}
     with pytest.raises(ImpossibleFormation) as refused:
         formation.check(DEFAULT._replace(stages=Stages()._replace(**{**shapes, **stages})))
     assert str(refused.value) == why

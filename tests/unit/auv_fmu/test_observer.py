@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import observer, output_feedback
-from auv_fmu.observer import EULER, EXACT, INTEGRAL
+from auv_fmu.observer import Form
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
-from auv_fmu.saturation import TANH, saturation
+from auv_fmu.saturation import Saturation, saturation
 from support.strategies import speeds, vectors
 
 three = vectors(speeds, 3)
@@ -18,16 +18,16 @@ three = vectors(speeds, 3)
 ORIGIN = (0.0, 0.0, 0.0)
 
 
-def estimate(dy_hat_o, z, lambda_, k_d, form=EULER, h=0.02):
+def estimate(dy_hat_o, z, lambda_, k_d, form=Form.EULER, h=0.02):
     """dy_hat of (23), of a controller that finds y = z where y_hat = 0."""
     gains = Gains(lambda_=lambda_, k_d=k_d, form=form)
     measured = Measurement(z, ORIGIN, ORIGIN, ORIGIN, ORIGIN)
-    state = ControllerState(ORIGIN, dy_hat_o, (0.0,) * 4)
+    state = ControllerState(ORIGIN, dy_hat_o, (0.0,) * 4, 0.0)
     return output_feedback.evaluate(gains, state, measured, h).dy_hat
 
 
 def s(z):
-    return saturation(TANH, z)
+    return saturation(Saturation.TANH, z)
 
 
 def test_observer_finds_a_constant_velocity():
@@ -63,7 +63,7 @@ def test_observer_is_the_one_of_the_proof(y, y_hat, dy, dy_hat_o, ddy_r):
     y, y_hat, dy, dy_hat_o, ddy_r = map(np.array, (y, y_hat, dy, dy_hat_o, ddy_r))
     z = y - y_hat
     dy_hat = np.array(estimate(dy_hat_o, z, lambda_, k_d))
-    ddy_hat_o = np.array(observer.rate(EULER, ddy_r, s(z), lambda_, k_d))
+    ddy_hat_o = np.array(observer.rate(Form.EULER, ddy_r, s(z), lambda_, k_d))
 
     def dy_o(t):
         z = y + t * dy - (y_hat + t * dy_hat)
@@ -79,7 +79,7 @@ def test_24_starts_from_dy_r():
 
     Fig. 4 at its start: a reference at rest, and a control point that is 6.6 m away.
     """
-    gains, y = Gains(form=INTEGRAL), (2.35, 6.0, 0.0)
+    gains, y = Gains(form=Form.INTEGRAL), (2.35, 6.0, 0.0)
     state = output_feedback.initial_state(gains, y)
     measured = Measurement(y, ORIGIN, (0.35, 0.0, -2.0), ORIGIN, ORIGIN)
     dy_r = output_feedback.evaluate(gains, state, measured, 0.02).dy_hat
@@ -98,7 +98,7 @@ def test_state_of_the_observer_is_equation_24():
     integral = np.zeros(3)
     for t in (np.arange(n) + 0.5) * h:
         z = np.arctanh(0.9 * np.cos(w * t))
-        integral += h * np.array(observer.rate(EULER, w * np.cos(w * t), s(z), lambda_, k_d))
+        integral += h * np.array(observer.rate(Form.EULER, w * np.cos(w * t), s(z), lambda_, k_d))
     expected = np.sin(w * end) + k_d * lambda_ * 0.9 * np.sin(w * end) / w
     np.testing.assert_allclose(integral, expected, rtol=1e-6)
 
@@ -107,7 +107,7 @@ def test_state_of_the_observer_is_equation_24():
 def test_exact_gain_takes_the_error_where_the_continuous_observer_takes_it(k_d, h, z):
     """dz/dt = -k_d z, with a vehicle that moves on as dy_hat_o says: exp(-k_d h) z in any step."""
     dy = (0.4, -0.2, 0.1)
-    rate = estimate(dy, z, 0.0, k_d, EXACT, h)
+    rate = estimate(dy, z, 0.0, k_d, Form.EXACT, h)
     after = np.array(z) + h * np.array(dy) - h * np.array(rate)
     np.testing.assert_allclose(after, np.array(z) * exp(-k_d * h), rtol=1e-9, atol=1e-15)
 

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 
 from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
-from auv_fmu.plant import EULER, RK4, Parameters, RollAxis
+from auv_fmu.plant import Integrator, Parameters, RollAxis
 from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
@@ -98,12 +98,11 @@ def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
 
 
 def started(eta0, nu0, parameters=PARAMETERS):
-    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), UNDRIVEN, parameters.current)[0]
+    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), parameters.current)
 
 
 def moved(state, tau, tau_w, h, parameters=PARAMETERS, n=1, dwater=(0.0, 0.0, 0.0)):
-    rotation = rotation_from_quaternion(state.quaternion)
-    return plant.steps(parameters, state, rotation, tau, tau_w, parameters.current, dwater, h, n)[0]
+    return swept(state, parameters, n, h, lambda t: (parameters.current, dwater), tau, tau_w)
 
 
 def seen(state, parameters=PARAMETERS):
@@ -259,23 +258,26 @@ def test_vehicle_in_a_current_that_comes_up_is_dragged_along_as_damping_says():
 
 
 def test_actuators_with_a_lag_follow_a_step_as_their_equation_does():
-    """tau_0 + (tau - tau_0) (1 - exp(-t / T)) at every instant; the one without follows at once."""
+    """tau (1 - exp(-t / T)) at every instant, from rest; the one without follows at once."""
     tau, T = (40.0, -20.0, 10.0), (0.5, 0.004, 0.0)
     parameters = PARAMETERS._replace(T=T)
-    state, _ = plant.begin(parameters, tau, parameters.current)
-    assert state.tau == (0.0, 0.0, 10.0)
+    state = plant.begin(parameters, parameters.current)
+    assert plant.actuation(parameters, state, tau) == (0.0, 0.0, 10.0)
     for k in range(1, 50):
         state = moved(state, tau, AT_REST, H, parameters)
         expected = [40.0 * (1 - exp(-k * H / 0.5)), -20.0 * (1 - exp(-k * H / 0.004)), 10.0]
-        np.testing.assert_allclose(state.tau, expected, rtol=1e-12)
+        actual = plant.actuation(parameters, state, tau)
+        np.testing.assert_allclose(actual, expected, rtol=1e-12)
+        idle = plant.actuation(parameters, state, UNDRIVEN)
+        assert idle == (*actual[:2], 0.0), "an actuator without a lag has no memory"
 
 
-@given(st.sampled_from((1e-3, 5e-3, 0.02, 0.1, 1.0)), st.booleans())
-def test_vehicle_with_a_lag_has_the_impulse_of_its_actuators(T, is_rk4):
+@given(st.sampled_from((1e-3, 5e-3, 0.02, 0.1, 1.0)), st.sampled_from(Integrator))
+def test_vehicle_with_a_lag_has_the_impulse_of_its_actuators(T, integrator):
     """Without damping m11 u is the integral of tau (1 - exp(-t / T)): tau (t + T expm1(-t / T))."""
     tau_u, n = 40.0, 50
     vehicle = VEHICLE._replace(d11=0.0)
-    parameters = Parameters(vehicle, T=(T, 0.0, 0.0), integrator=RK4 if is_rk4 else EULER)
+    parameters = Parameters(vehicle, T=(T, 0.0, 0.0), integrator=integrator)
     state = started((0.0,) * 6, AT_REST, parameters)
     for k in range(1, n + 1):
         state = moved(state, (tau_u, 0.0, 0.0), AT_REST, H, parameters)
@@ -291,7 +293,7 @@ def swept(state, parameters, steps, h, flow, tau=UNDRIVEN, tau_w=AT_REST):
     for k in range(steps):
         water, dwater = flow(k * h)
         rotation = rotation_from_quaternion(state.quaternion)
-        state = plant.steps(parameters, state, rotation, tau, tau_w, water, dwater, h, 1)[0]
+        state = plant.advance(parameters, state, rotation, tau, tau_w, water, dwater, h)
     return state
 
 
@@ -305,7 +307,7 @@ def swell(t):
     )
 
 
-@pytest.mark.parametrize("integrator", [EULER, RK4])
+@pytest.mark.parametrize("integrator", Integrator)
 @pytest.mark.parametrize("rolls", [True, False])
 def test_undriven_vehicle_moves_as_the_water_that_it_displaces(integrator, rolls):
     """Whatever its added mass: begun with the water and without damping, it stays with it."""
@@ -313,9 +315,8 @@ def test_undriven_vehicle_moves_as_the_water_that_it_displaces(integrator, rolls
     roll = ROLL._replace(rolls=rolls)
     parameters = Parameters(vehicle, roll, integrator=integrator)
     water, _ = swell(0.0)
-    begun, _ = plant.begin(
-        parameters._replace(eta0=(0.0,) * 6, nu0=(*water, 0.0, 0.0, 0.0)), UNDRIVEN, water
-    )
+    at_start = parameters._replace(eta0=(0.0,) * 6, nu0=(*water, 0.0, 0.0, 0.0))
+    begun = plant.begin(at_start, water)
     h, n = 0.002, 5000
     state = swept(begun, parameters, n, h, swell)
     amplitudes, phases = np.array((0.4, -0.3, 0.2)), np.array((0.3, 1.2, 2.0))
@@ -338,7 +339,7 @@ def test_forces_of_accelerating_water_are_those_of_morison_and_kirchhoff(mass):
     in the translations. However M is split into both, the motion is the one of the plant.
     """
     stop, tau, tau_w = 3.0, (20.0, 3.0, 5.0), (0.5, 0.1, -0.2, 0.05, 0.1, 0.2)
-    parameters = PARAMETERS._replace(integrator=RK4)
+    parameters = PARAMETERS._replace(integrator=Integrator.RK4)
     eta0, nu0 = (0.0, 0.0, 0.0, 0.2, 0.3, -0.4), (0.5, 0.1, -0.1, 0.1, 0.2, 0.1)
     added = MASSES - (mass, mass, mass, 0.0, 0.0, 0.0)
 
@@ -391,7 +392,7 @@ def test_forces_of_accelerating_water_are_those_of_morison_and_kirchhoff(mass):
 
     def ended(n):
         at_start = parameters._replace(eta0=eta0, nu0=nu0)
-        state, _ = plant.begin(at_start, UNDRIVEN, swell(0.0)[0])
+        state = plant.begin(at_start, swell(0.0)[0])
         state = swept(state, parameters, n, stop / n, swell, tau, tau_w)
         return np.concatenate((state.position, state.nu_r))
 
@@ -428,7 +429,7 @@ def ends(parameters, tau, tau_w, n, stop):
 
 @pytest.mark.parametrize("rolls", [True, False])
 @pytest.mark.parametrize("lag", [0.0, 0.3])
-@pytest.mark.parametrize(("integrator", "order"), [(EULER, 1), (RK4, 4)])
+@pytest.mark.parametrize(("integrator", "order"), [(Integrator.EULER, 1), (Integrator.RK4, 4)])
 def test_integrators_have_the_orders_that_they_are_known_for(integrator, order, rolls, lag):
     """Against (1) and (2) in rotation matrices, by scipy's solve_ivp."""
     tau, tau_w, current, stop = (
@@ -462,11 +463,11 @@ def test_body_that_nothing_brakes_keeps_its_energy_with_rk4_and_gains_some_with_
     vehicle = VEHICLE._replace(d11=0.0, d22=0.0, d33=0.0, d55=0.0, d66=0.0, righting_pitch=0.0)
     roll = ROLL._replace(d44=0.0, righting_roll=0.0)
     gains = {}
-    for integrator in (EULER, RK4):
+    for integrator in Integrator:
         parameters = Parameters(vehicle, roll, integrator=integrator)
         begun = started((0.0,) * 6, (1.0, 0.2, -0.1, 0.1, 0.3, 0.4), parameters)
         ended = moved(begun, UNDRIVEN, AT_REST, H, parameters, 1000)
         energies = [MASSES @ np.square(state.nu_r) for state in (begun, ended)]
         gains[integrator] = energies[1] / energies[0] - 1.0
-    assert abs(gains[RK4]) < 1e-8
-    assert gains[EULER] > 0.01
+    assert abs(gains[Integrator.RK4]) < 1e-8
+    assert gains[Integrator.EULER] > 0.01

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.saturation import MAXIMUM_SLOPE, SATURATIONS, integral, saturation
+from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation, integral, saturation
 from auv_fmu.saturation import slope as slopes_of
 from support.strategies import vectors
 
 numbers = st.floats(-50.0, 50.0)
 positive = st.floats(0.01, 20.0)
-every = pytest.mark.parametrize("name", SATURATIONS)
+every = pytest.mark.parametrize("name", MAXIMUM_SLOPE)
 ROUNDING = 1e-12
 
 #: Below it the products of numbers are rounded to no digits of their own.
@@ -22,20 +22,20 @@ SMALLEST = 1e-300
 
 def s(name, xi):
     """s_i(xi)."""
-    return saturation(SATURATIONS[name], (xi, 0.0, 0.0))[0]
+    return saturation(Saturation[name.upper()], (xi, 0.0, 0.0))[0]
 
 
 def slope(name, xi):
     """s_i'(xi)."""
     x = (xi, 0.0, 0.0)
-    return slopes_of(SATURATIONS[name], x, saturation(SATURATIONS[name], x))[0]
+    return slopes_of(Saturation[name.upper()], x, saturation(Saturation[name.upper()], x))[0]
 
 
 @every
 @given(xi=vectors(numbers, 3))
 def test_vectors_are_saturated_component_by_component(name, xi):
-    values = saturation(SATURATIONS[name], xi)
-    slopes = slopes_of(SATURATIONS[name], xi, values)
+    values = saturation(Saturation[name.upper()], xi)
+    slopes = slopes_of(Saturation[name.upper()], xi, values)
     assert values == tuple(s(name, xi_i) for xi_i in xi)
     assert slopes == tuple(slope(name, xi_i) for xi_i in xi)
 
@@ -63,7 +63,7 @@ def test_slope_is_the_derivative(name, xi):
 @given(xi=numbers, k=positive)
 def test_lemma_1_i_and_ii(name, xi, k):
     """The integral of s(k r) from 0 to xi is that of s from 0 to k xi, over k."""
-    area, s_M = integral(SATURATIONS[name], k * xi) / k, MAXIMUM_SLOPE[name]
+    area, s_M = integral(Saturation[name.upper()], k * xi) / k, MAXIMUM_SLOPE[name]
     slack = ROUNDING * (1 + abs(area))
     assert s(name, k * xi) ** 2 / (2 * k * s_M) <= area + slack
     assert area <= k * s_M * xi**2 / 2 + slack
@@ -80,12 +80,12 @@ def test_integral_is_the_area_under_the_function(name, xi):
     weights = np.ones(2001)
     weights[1:-1:2], weights[2:-1:2] = 4.0, 2.0
     area = weights @ [s(name, node) for node in nodes] * xi / 2000 / 3
-    assert integral(SATURATIONS[name], xi) == pytest.approx(area, abs=1e-8)
+    assert integral(Saturation[name.upper()], xi) == pytest.approx(area, abs=1e-8)
 
 
 @given(xi=st.floats(-20.0, 20.0))
 def test_integral_of_tanh_is_the_logarithm_of_cosh(xi):
-    assert integral(SATURATIONS["tanh"], xi) == pytest.approx(log(cosh(xi)), abs=1e-12)
+    assert integral(Saturation.TANH, xi) == pytest.approx(log(cosh(xi)), abs=1e-12)
 
 
 @every
@@ -106,7 +106,7 @@ def test_lemma_1_iv_to_vi(name, x, k, psi):
         assert s(name, xi) ** 2 <= s_M * xi * s(name, xi) * (1 + ROUNDING)
         # As printed (vi) has no square on s'_M; by (iv) it belongs there.
         assert s(name, xi) ** 2 <= s_M**2 * xi**2 * (1 + ROUNDING)
-    values = np.array(saturation(SATURATIONS[name], x))
+    values = np.array(saturation(Saturation[name.upper()], x))
     left = np.array(x) @ np.diag(psi) @ values
     assert left >= min(psi) * (values @ values) * (1 - ROUNDING)
 

@@ -6,6 +6,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from auv_fmu import ocean_current, plant, remus100, sea, waves
+from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.ocean_current import Variation
 from auv_fmu.sea import ImpossibleSea, Sea
 
@@ -93,13 +94,13 @@ def way_of_water(parameters, place, duration, h):
 def auv_adrift(eta0, nu0, water, duration, h):
     """Positions of an AuvPlant without drive or disturbance."""
     parameters = plant.Parameters(eta0=eta0, nu0=nu0)
-    state, rotation = plant.begin(parameters, NONE, nu0[:3])
+    state = plant.begin(parameters, nu0[:3])
     found = [state.position]
     for t in (np.arange(round(duration / h)) * h).tolist():
         flow, dflow, _ = water(state.position, t)
-        state, rotation = plant.steps(
-            parameters, state, rotation, NONE, (*NONE, *NONE), flow, dflow, h, 1
-        )
+        rotation = rotation_from_quaternion(state.quaternion)
+        still = NONE, (*NONE, *NONE)
+        state = plant.advance(parameters, state, rotation, *still, flow, dflow, h)
         found.append(state.position)
     return np.array(found)
 
@@ -111,7 +112,7 @@ def remus_adrift(eta0, nu0, water, duration, h):
     found = [state.position]
     for t in (np.arange(round(duration / h)) * h).tolist():
         flow, dflow, _ = water(state.position, t)
-        state = remus100.steps(parameters, state, NONE, flow, dflow, h, 1)
+        state = remus100.advance(parameters, state, NONE, flow, dflow, h)
         found.append(state.position)
     return np.array(found)
 
@@ -156,7 +157,7 @@ def test_a_vehicle_adrift_has_the_drift_of_stokes():
 
 
 def test_current_of_a_sea_without_waves():
-    parameters = Sea(waves.Waves(spectrum=waves.NONE), depth=0.0)
+    parameters = Sea(waves.Waves(spectrum=waves.Spectrum.NONE), depth=0.0)
     actual = sea.water(parameters, sea.regular_waves(parameters), VARIATION, (0.0,) * 3, 5.0)
     assert actual.velocity == (0.1 + 0.03, -0.02, 0.0)
     assert not any(actual.acceleration) and actual.elevation == 0.0
@@ -170,4 +171,4 @@ def test_waves_that_would_break_are_refused():
         sea.check(deep._replace(waves=deep.waves._replace(Hs=11.0)))
     with pytest.raises(ImpossibleSea):
         sea.check(Sea(depth=1.0))
-    sea.check(Sea(waves.Waves(spectrum=waves.NONE, Hs=11.0)))
+    sea.check(Sea(waves.Waves(spectrum=waves.Spectrum.NONE, Hs=11.0)))

@@ -11,10 +11,11 @@ from scipy.integrate import quad
 from scipy.stats import beta
 
 from auv_fmu import waves
-from auv_fmu.waves import JONSWAP, MOST, PIERSON_MOSKOWITZ, Waves
+from auv_fmu.waves import MOST, Spectrum, Waves
 from support.tiers import slow
 
 G = 9.81
+JONSWAP, PIERSON_MOSKOWITZ = Spectrum.JONSWAP, Spectrum["PIERSON-MOSKOWITZ"]
 
 seeds = st.integers(-(2**31), 2**31 - 1)
 depths = st.sampled_from((0.0, 3.0, 12.0, 60.0, 4000.0))
@@ -86,7 +87,8 @@ def record(sea, hours, step):
 
 
 @pytest.mark.parametrize(
-    ("spectrum", "records"), [(JONSWAP, 1), *slow((JONSWAP, 12), (PIERSON_MOSKOWITZ, 12))]
+    ("spectrum", "records"),
+    [(JONSWAP, 1), *slow((JONSWAP, 12), (PIERSON_MOSKOWITZ, 12))],
 )
 def test_spectrum_of_records_of_three_hours_is_the_analytic_one(spectrum, records):
     """Energies of ten bands, from periodograms with a window of Hann.
@@ -312,5 +314,5 @@ def test_particles_in_deep_water_run_in_circles():
 
 
 def test_a_sea_without_spectrum_is_still():
-    sea = Waves(spectrum=waves.NONE)
+    sea = Waves(spectrum=Spectrum.NONE)
     assert moved(sea, 10.0, (1.0, 2.0, 3.0), 4.0) == ((0.0,) * 3, (0.0,) * 3, (0.0,) * 5, 0.0)

@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import motion_planner
+from auv_fmu.blocks import helix_begin, helix_step
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import alpha_1_at_most, alphas, ball, reach, stretch, theorem
 from auv_fmu.proof.gain_conditions import Bounds, Zetas, bounds, conditions, coupling
@@ -97,8 +98,9 @@ def test_31_asks_for_a_small_lambda_in_any_unit(lambda_, v0):
 def test_31_asks_for_a_slow_reference_in_any_unit():
     """zeta_1 is k |dy_d| at least. Section 4.1 has 0.167 m/s, once it is on its way."""
     planner = motion_planner.Parameters()
-    state, moving = motion_planner.begin(planner)
-    state, moving = motion_planner.steps(planner, state, moving, 0.02, 2500)
+    state, moving = helix_begin(planner)
+    for k in range(2500):
+        state, moving = helix_step(planner, state, moving, 0.02 * k, 0.02)
     speed = np.linalg.norm(motion_planner.reference(state, moving, ELL).dy_d)
     assert speed == pytest.approx(0.167, abs=5e-4)
     known, k = bounds(Vehicle(), ELL), coupling(Vehicle(), ELL)

@@ -81,7 +81,7 @@ def test_reference_is_within_its_bounds(parameters, headings, moving):
             assert dist(y_d, y_0) <= bounds.distance * (1 + 1e-9) + 1e-9
             assert hypot(*dy_d) <= bounds.speed * (1 + 1e-9) + 1e-9
             assert hypot(*ddy_d) <= bounds.acceleration * (1 + 1e-9) + 1e-9
-            state = formation.steps(parameters, state, leader, h, 1)
+            state = formation.step(parameters, state, leader, h)
             t += h
 
 
@@ -107,7 +107,7 @@ def test_stability_with_a_period_is_that_of_the_scheme(lambda_, k_d, period, del
         # The leader rests in the origin, where each message says it was.
         state = FormationState(Heading(0.0, 0.0, 0.0, 0.0), (y, 0.0, 0.0), (v, 0.0, 0.0))
         for k in range(n):
-            state = formation.steps(parameters, state, known(age=delay + k * h), h, 1)
+            state = formation.step(parameters, state, known(age=delay + k * h), h)
         columns.append((state.y_hat[0] / 1e-7, state.dy_hat_o[0] / 1e-7))
     largest = max(abs(np.linalg.eigvals(np.array(columns).T)))
     if abs(largest - 1) > 0.01:

@@ -231,7 +231,7 @@ def test_observer_is_unstable_where_a_step_is_longer_than_2_over_its_rate(k_d, g
     """The controller's own observer, vehicle and reference at rest, z(0) = 1e-9 m, h = 20 ms."""
     gains, h = Gains(k_d=k_d, theta_0=(0.0,) * 4), 0.02
     assert (h * observer_rate(gains.lambda_, k_d) > 2.0) is grows
-    state = ControllerState((1e-9, 0.0, 0.0), ORIGIN, gains.theta_0)
+    state = ControllerState((1e-9, 0.0, 0.0), ORIGIN, gains.theta_0, 0.0)
     measurement = Measurement(ORIGIN, ORIGIN, ORIGIN, ORIGIN, ORIGIN)
     for _ in range(500):
         signals = output_feedback.evaluate(gains, state, measurement, h)

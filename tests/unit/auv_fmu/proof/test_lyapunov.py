@@ -10,7 +10,7 @@ from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.proof.control_point_model import M_2
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.lyapunov import Errors, composite_errors, kinetic, lyapunov
-from auv_fmu.saturation import SATURATIONS, saturation
+from auv_fmu.saturation import Saturation, saturation
 from auv_fmu.vehicle import Vehicle
 from support.strategies import angles, lengths, pitch_angles, speeds, vectors
 
@@ -29,7 +29,7 @@ def test_kinetic_term_is_that_of_the_matrix_m_2(theta, psi, r, ell):
 @given(dy=three, dy_d=three, dy_hat=three, e_z=three, z=three)
 def test_composite_errors_are_17_and_19(dy, dy_d, dy_hat, e_z, z):
     """r_1 = de + Lambda Tanh(e - z) and r_2 = dz + Lambda Tanh(z)."""
-    s = SATURATIONS["tanh"]
+    s = Saturation.TANH
     r_1, r_2 = composite_errors(dy, dy_d, dy_hat, e_z, z, 0.7, s)
     de, dz = np.subtract(dy, dy_d), np.subtract(dy, dy_hat)
     np.testing.assert_allclose(r_1, de + 0.7 * np.tanh(e_z), atol=1e-14)
@@ -39,7 +39,7 @@ def test_composite_errors_are_17_and_19(dy, dy_d, dy_hat, e_z, z):
 @given(dy=three, dy_d=three, dy_hat=three, e_z=three, z=three)
 def test_remark_5_leaves_out_twice_the_rate_of_z(dy, dy_d, dy_hat, e_z, z):
     """r_1 + r_2 less the estimate below (21), and |dz/dt| within (1 + lambda) |x|."""
-    r_1, r_2 = composite_errors(dy, dy_d, dy_hat, e_z, z, 0.7, SATURATIONS["tanh"])
+    r_1, r_2 = composite_errors(dy, dy_d, dy_hat, e_z, z, 0.7, Saturation.TANH)
     estimated = np.subtract(dy_hat, dy_d) + 0.7 * np.tanh(e_z) + 0.7 * np.tanh(z)
     dz = np.subtract(dy, dy_hat)
     np.testing.assert_allclose(np.add(r_1, r_2) - estimated, 2.0 * dz, atol=1e-13)
@@ -69,16 +69,16 @@ def test_what_remark_5_leaves_out(estimated, dz, rho, rho_hat, eps_t):
     assert terms(np.zeros(3), rho) == pytest.approx(2.0 * rho * size)
 
 
-@pytest.mark.parametrize("name", SATURATIONS)
+@pytest.mark.parametrize("s", Saturation)
 @given(euler=vectors(angles, 3), e=three, z=three, r_1=three, r_2=three, ell=lengths)
-def test_bounds_35_of_the_lyapunov_function(name, euler, e, z, r_1, r_2, ell):
+def test_bounds_35_of_the_lyapunov_function(s, euler, e, z, r_1, r_2, ell):
     """With the largest slope s'_M = 1, and without the terms in theta."""
     errors = Errors(e, z, r_1, r_2)
-    V = lyapunov(VEHICLE, rotation_from_euler(*euler), errors, K2, SATURATIONS[name], ell)
+    V = lyapunov(VEHICLE, rotation_from_euler(*euler), errors, K2, s, ell)
     known = bounds(VEHICLE, ell)
     e_z = tuple(np.subtract(e, z))
     r_square = np.dot(r_1, r_1) + np.dot(r_2, r_2)
-    s_ez, s_z = (np.array(saturation(SATURATIONS[name], x)) for x in (e_z, z))
+    s_ez, s_z = (np.array(saturation(s, x)) for x in (e_z, z))
     lower = 0.5 * np.dot(K2, s_ez**2 + s_z**2) + 0.5 * known.lambda_m2 * r_square
     upper = 0.5 * max(K2) * (np.dot(e_z, e_z) + np.dot(z, z)) + 0.5 * known.lambda_M2 * r_square
     assert lower * (1 - 1e-12) - 1e-12 <= V <= upper * (1 + 1e-12) + 1e-12

@@ -6,7 +6,7 @@ import ast
 import re
 import subprocess
 import sys
-from ctypes import byref, c_double, c_ulong
+from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
 from random import Random
@@ -16,37 +16,31 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import acoustic_link, formation
+from auv_fmu import acoustic_link, formation, plant
 from auv_fmu.arrays import Matrix, Vector
 from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.sea import Sea
 from auv_fmu.waves import MOST as MOST_WAVES
-from auv_fmu.waves import SPECTRA, Waves
+from auv_fmu.waves import Spectrum, Waves
 from fmus.discovery import components, ports_of, source_of
 from fmus.native.functions import function_in_c
 from fmus.native.program import Program
 from fmus.native.shapes import strip_sphinx_marks
 from fmus.native.tables import tables
 from fmus.native.translator import _drawn, translated
-from fmus.ports.groups import class_of, count_values, hints_of, parts_of
+from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
-from fmus.python.callbacks import LONGEST_MESSAGE, describe_error
 from support.equations import (
     FLAGS,
     ROOT,
     RUNTIME,
-    Error,
-    bits,
+    Equations,
     equations,
-    filled,
-    flat,
     is_series,
-    listed,
-    series,
-    structure,
+    outcome,
 )
-from support.settings import NAMES, behaviour_of, parameters_of
+from support.settings import NAMES, parameters_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -96,7 +90,7 @@ def test_it_is_c_without_warnings(name, standard, tmp_path):
 @every
 def test_each_function_has_its_docstring_above_it(name):
     text, seen = translated(source_of(name).definition), 0
-    behaviour = Path(str(import_module(f"{components()[name]}.behaviour").__file__))
+    behaviour = Path(str(import_module(components()[name]).__file__))
     for path in (behaviour, *(ROOT / "src/auv_fmu").glob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
@@ -229,7 +223,7 @@ def test_parameters_lie_where_the_equations_look_for_them(name: str):
     parameters = [row for row in rows(name) if row["causality"] == "PARAMETER"]
     for row in parameters:
         [member] = re.findall(r"^PARAMETER_AT\((.*)\)$", row["place"])
-        if row["name"] == H_MAX.name:
+        if row["name"] == H_MAX:
             assert member == "h_max"
         elif row["kind"] != "STRING":
             assert at(model, member.removeprefix("model.")) == values[row["name"]]
@@ -263,141 +257,90 @@ def number(random: Random) -> float:
 
 def value(kind: Any, random: Random, wild: float = 0.3) -> Any:
     """Something that a type of the equations can hold; most numbers are tame."""
+    kind = form(kind)
     if kind is float:
         return number(random) if random.random() < wild else random.uniform(-3.0, 3.0)
     if kind in (int, bool):
         return random.randrange(3 if kind is int else 2)
+    if is_class(kind, IntEnum):
+        return random.choice([*kind])
     if is_series(kind):
         numbers = tuple(value(k, random, wild) for k in parts_of(kind) or ())
         return class_of(kind)(numbers) if get_origin(kind) is Annotated else numbers
-    parts = {name: value(k, random, wild) for name, k in hints_of(kind).items()}
-    return parts if issubclass(kind, dict) else kind(**parts)
+    return kind(**{name: value(k, random, wild) for name, k in hints_of(kind).items()})
 
 
-def outcome(made: Any) -> tuple[str, list[str]]:
-    return "", bits(flat(made))
+def drawn(both: Equations, random: Random, wild: float) -> dict[str, Any]:
+    """Arguments of hooks."""
+    of = both.behaviour
+    kinds = {"parameters": of.parameters, "state": of.state, "inputs": of.inputs}
+    values = {name: value(kind, random, wild) for name, kind in kinds.items()}
+    return {**values, "t": number(random), "h": random.random()}
 
 
-def raised(call: Any) -> tuple[str, list[str]]:
-    """What a function gives, or what it raises as a slave would say it."""
-    try:
-        return outcome(call())
-    except Exception as error:
-        return describe_error(error)[:LONGEST_MESSAGE], []
+def same(both: Equations, hook: str, given: Any) -> bool:
+    """Compare what a hook comes to in both languages; whether that is no refusal."""
+    found = both.of_c(hook, **given)
+    assert found == both.of_python(hook, **given)
+    return not found[0]
 
 
-@every
-@given(random=randoms)
-def test_begin(name, random):
-    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
-    parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
-    t = number(random)
-    given = {"parameters": parameters, "inputs": inputs, "t": t}
-    state, outputs = both.kept(), series(both.outputs)()
-    why = both.call(
-        "begin",
-        filled(both.parameters, parameters),
-        filled(both.inputs, inputs),
-        t,
-        state,
-        outputs,
-    )
-    found = (why, []) if why else outcome([state, outputs])
-    assert found == raised(lambda: both.python("begin", **given))
+def moment(both: Equations, given: dict[str, Any]) -> bool:
+    """Compare all that is made of a state; whether it is no refusal, after which all is there."""
+    if both.behaviour.derived:
+        if not same(both, "derive", given):
+            return False
+        given["derived"] = both.call("derive", **given)
+    return same(both, "outputs", given)
 
 
 @every
 @given(random=randoms)
-def test_advance(name, random):
-    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
-    parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
-    state = value(both.state, random, wild)
-    t, h, n = number(random), random.random(), random.randrange(1, 5)
-    given = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": n}
-    kept, outputs = both.kept(state), series(both.outputs)()
-    why = both.call("derive", filled(both.parameters, parameters), kept)
-    if both.derived:
-        derived = raised(lambda: both.python("derive", **given))
-        assert ((why, []) if why else outcome(kept.x1)) == derived
-        if why:
-            return
-        given["derived"] = both.python("derive", **given)
-    why = both.call(
-        "advance",
-        filled(both.parameters, parameters),
-        kept,
-        filled(both.inputs, inputs),
-        t,
-        h,
-        n,
-        outputs,
-    )
-    found = (why, []) if why else outcome([kept, outputs])
-    assert found == raised(lambda: both.python("advance", **given))
-
-
-@pytest.mark.parametrize("name", [name for name in NAMES if behaviour_of(name).hooks["expected"]])
-@given(random=randoms)
-def test_expected(name, random):
-    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
-    parameters, state = value(both.parameters, random, wild), value(both.state, random, wild)
-    outputs = value(both.outputs, random, wild)
-    if hasattr(state, "quaternion") and random.random() < 0.5:
-        state = state._replace(quaternion=(0.6, 0.0, 0.8, 0.0))
-    found = series(both.outputs)()
-    why = both.call(
-        "expected",
-        filled(both.parameters, parameters),
-        both.kept(state),
-        listed(both.outputs, outputs),
-        found,
-    )
-    given = {"parameters": parameters, "state": state, "outputs": outputs}
-    assert ((why, []) if why else outcome(found)) == raised(
-        lambda: both.python("expected", **given)
-    )
+def test_hooks_do_the_same(name, random):
+    both = equations(name)
+    given = drawn(both, random, random.choice((0.0, 0.02, 0.3)))
+    has_start, has_check = (both.behaviour.hooks[hook] for hook in ("start", "check_state"))
+    if has_start:
+        same(both, "start", given)
+    if has_check:
+        quaternion = {"quaternion": (0.6, 0.0, 0.8, 0.0)}
+        has_one = hasattr(given["state"], "quaternion") and random.random() < 0.5
+        state = given["state"]._replace(**quaternion) if has_one else given["state"]
+        same(both, "check_state", {**given, "state": state})
+    if moment(both, given) and has_start:
+        same(both, "update", given)
 
 
 @given(random=randoms)
 def test_restarts_of_the_observer(random):
-    both, wild = equations("ObserverController"), 0.0
-    parameters = value(both.parameters, random, wild)
-    state, inputs = value(both.state, random, wild), value(both.inputs, random, wild)
-    given = {"parameters": parameters, "state": state, "inputs": inputs}
-    kept = both.kept(state)
-    passed = filled(both.parameters, parameters), kept, filled(both.inputs, inputs)
-    assert bool(both.result("credible", *passed)) == both.python("credible", **given)
-    assert both.call("restart", *passed) == ""
-    assert outcome(kept) == outcome(both.python("restarted", **given))
-    text = both.library.restarted().decode() % 0.02
-    assert text == both.behaviour.RESTARTED.format(t=0.02)
+    both = equations("ObserverController")
+    given = drawn(both, random, 0.0)
+    assert same(both, "credible", given)
+    assert same(both, "restarted", given)
+    assert both.library.logged().decode() % 0.02 == both.behaviour.restarted.format(t=0.02)
 
 
 @given(random=randoms)
 def test_limits_that_leave_an_actuator_nothing(random):
-    both, wild = equations("AuvPlant"), 0.3
-    parameters = value(both.parameters, random, wild)
-    why = both.call("check", filled(both.parameters, parameters))
-    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+    both = equations("AuvPlant")
+    same(both, "check", drawn(both, random, 0.3))
 
 
 @given(random=randoms, n=st.integers(0, MOST + 2), timed=st.booleans())
 def test_paths_are_refused_alike(random, n, timed):
     """Most of them somewhere on the way; more waypoints than there are, for a place beyond them."""
-    both, default = equations("PathPlanner"), Parameters()
     series = [tuple(random.uniform(-15.0, 15.0) for _ in range(MOST)) for _ in "xyz"]
     t = tuple(sorted(random.uniform(0.0, 2000.0) for _ in range(MOST)))
     flat_z = tuple(0.2 * z for z in series[2])
     T = random.uniform(1.0, 40.0)
     waypoints = Waypoints(n, *series[:2], flat_z, t, timed, random.uniform(0.05, 1.0), T)
-    parameters = default._replace(waypoints=waypoints)
-    why = both.call("check", filled(both.parameters, parameters))
-    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+    parameters = Parameters()._replace(waypoints=waypoints)
+    same(equations("PathPlanner"), "check", {"parameters": parameters})
 
 
 @given(
     random=randoms,
-    spectrum=st.sampled_from([*SPECTRA.values()]),
+    spectrum=st.sampled_from(Spectrum),
     n=st.integers(1, MOST_WAVES),
     depth=st.sampled_from((0.0, 2.0, 30.0, 6000.0)),
 )
@@ -418,31 +361,22 @@ def test_seas_are_alike(random, spectrum, n, depth):
         Current(speed=random.uniform(0.0, 3.0), seed=random.randrange(-(2**31), 2**31)),
         depth=depth,
     )
-    given = filled(both.parameters, parameters)
-    why = both.call("check", given)
-    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
-    kept, outputs, t = both.kept(), structure(both.outputs)(), random.uniform(0.0, 1e5)
-    inputs = both.inputs((random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), 0.0))
-    assert not both.call("begin", given, filled(both.inputs, inputs), t, kept, outputs)
-    state, derived, seen = both.python("begin", parameters=parameters, inputs=inputs, t=t)
-    assert outcome([kept, outputs]) == outcome([[state, derived], seen])
-    for _ in range(3):
-        h, z = random.uniform(0.0, 10.0), random.uniform(-5.0, 40.0)
-        inputs = both.inputs((*inputs.eta[:2], z))
-        arguments = {"parameters": parameters, "state": state, "derived": derived}
-        assert not both.call("advance", given, kept, filled(both.inputs, inputs), t, h, 1, outputs)
-        state, derived, seen = both.python("advance", **arguments, inputs=inputs, t=t, h=h)
-        assert outcome([kept, outputs]) == outcome([[state, derived], seen])
-        t += h
+    same(both, "check", {"parameters": parameters})
+
+    def inputs() -> Any:
+        x, y = random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3)
+        return both.behaviour.inputs((x, y, random.uniform(-5.0, 40.0)))
+
+    runs(both, parameters, inputs, random.uniform(0.0, 10.0), 3)
 
 
-@given(random=randoms, shape=st.integers(0, 4), estimated=st.booleans())
+@given(random=randoms, shape=st.sampled_from(formation.Shape), estimated=st.booleans())
 def test_formations_are_the_same_over_many_steps(random, shape, estimated):
     """Leaders that change their minds; the first one that cannot be followed ends a run."""
     both = equations("FormationPlanner")
     stages = formation.Stages(
         4,
-        (shape, 4, random.randrange(5), shape),
+        (shape, formation.Shape.TABLE, random.choice([*formation.Shape]), shape),
         *(tuple(random.uniform(1.0, 6.0) for _ in range(4)) for _ in range(4)),
         (1.0, 3.0, 6.0),
         (1.5, 2.0, 2.5),
@@ -453,11 +387,11 @@ def test_formations_are_the_same_over_many_steps(random, shape, estimated):
 
     def inputs() -> formation.Known:
         """Slow, but anywhere and with any heading."""
-        known = value(both.inputs, random, 0.0)
+        known = value(formation.Known, random, 0.0)
         slow = {name: tuple(0.05 * x for x in getattr(known, name)) for name in ("dy_0", "ddy_0")}
         return known._replace(age=abs(known.age), **slow)
 
-    runs(both, parameters, random, inputs, 0.1)
+    runs(both, parameters, inputs, 0.1)
 
 
 @given(random=randoms)
@@ -472,38 +406,31 @@ def test_links_are_the_same_over_many_steps(random):
         1.0,
         random.uniform(0.0, 2.0),
     )
-    runs(both, parameters, random, lambda: value(both.inputs, random, 0.0), 0.5)
+    runs(both, parameters, lambda: value(both.behaviour.inputs, random, 0.0), 0.5)
 
 
-def runs(both: Any, parameters: Any, random: Random, inputs_at: Any, h: float) -> None:
-    """Compare 40 steps of both, each from where the last one ended, until one is refused."""
-    given, kept, outputs = filled(both.parameters, parameters), both.kept(), series(both.outputs)()
-    state = None
-    for k in range(41):
-        name, inputs, t = "advance" if k else "begin", inputs_at(), max(0, k - 1) * h
-        told = filled(both.inputs, inputs)
-        if name == "begin":
-            why = both.call(name, given, told, t, kept, outputs)
-        else:
-            why = both.call(name, given, kept, told, t, h, 1, outputs)
-        ours = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": 1}
-        found = (why, []) if why else outcome([kept, outputs])
-        assert found == raised(lambda name=name, ours=ours: both.python(name, **ours))
-        if why:
+def runs(both: Equations, parameters: Any, inputs: Any, h: float, n: int = 40) -> None:
+    """Compare n steps of both, each from where the last one ended, until one is refused."""
+    given = {"parameters": parameters, "inputs": inputs(), "t": 0.0, "h": h}
+    if not same(both, "start", given):
+        return
+    given["state"] = both.call("start", **given)
+    for k in range(n):
+        given |= {"inputs": inputs(), "t": k * h}
+        if not (moment(both, given) and same(both, "update", given)):
             return
-        state, _ = both.python(name, **ours)
+        given["state"] = both.call("update", **given)
 
 
 @given(random=randoms)
 def test_noise_of_the_localisation(random):
-    both, wild = equations("AuvPlant"), 0.3
-    parameters, outputs = value(both.parameters, random, wild), value(both.outputs, random, wild)
-    n = value(tuple[float, float, float], random, wild)
-    passed = listed(both.outputs, outputs)
-    given = filled(both.parameters, parameters)
-    both.library.measure(byref(given), (c_double * 3)(*n), byref(passed), byref(Error()))
-    measured = both.behaviour.measured(parameters, outputs["y"], n)
-    assert outcome(passed) == outcome({**outputs, "y": measured})
+    both = equations("AuvPlant")
+    parameters = drawn(both, random, 0.3)["parameters"]
+    outputs = value(both.behaviour.outputs, random)
+    n = value(tuple[float, float, float], random)
+    measured = outputs._replace(y=both.call("measured", parameters=parameters, y=outputs.y, n=n))
+    found = both.of_c("measured", parameters=parameters, n=n, outputs=outputs)
+    assert found == outcome(measured)
 
 
 def drawn_type(random: Random, depth: int = 0) -> Any:
@@ -547,8 +474,5 @@ def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
 
 @pytest.mark.parametrize("seed", [0, 1, -1, 2**31 - 1, -(2**31)])
 def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
-    both = equations("AuvPlant")
-    parameters = structure(both.parameters)()
-    parameters.noise.seed = seed
-    both.library.seed.restype = c_ulong
-    assert both.library.seed(byref(parameters), byref(Error())) == seed % 2**32
+    parameters = plant.Parameters(noise=plant.Localisation(seed=seed))
+    assert equations("AuvPlant").of_c("seed", parameters=parameters) == outcome(seed % 2**32)

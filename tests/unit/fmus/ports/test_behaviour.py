@@ -1,4 +1,4 @@
-"""What a behaviour may say: each mistake is told in one line that names it."""
+"""What a component may say: each mistake is told in one line that names it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fmus.ports.port import Misdeclared
 GOOD = """\
 from __future__ import annotations
 
-from typing import NamedTuple, TypedDict
+from typing import NamedTuple
 
 
 class State(NamedTuple):
@@ -29,16 +29,20 @@ class Gains(NamedTuple):
     k: float
 
 
-class Outputs(TypedDict):
+class Outputs(NamedTuple):
     y: tuple[float, float]
 
 
-def begin(parameters: Gains) -> tuple[State, Outputs]:
-    return State(0.0), {"y": (0.0, parameters.k)}
+def start(parameters: Gains) -> State:
+    return State(parameters.k)
 
 
-def advance(h: float, state: State, parameters: Gains) -> tuple[State, Outputs]:
-    return _moved(state, h), {"y": (state.x, parameters.k)}
+def update(h: float, state: State) -> State:
+    return _moved(state, h)
+
+
+def outputs(state: State, parameters: Gains) -> Outputs:
+    return Outputs((state.x, parameters.k))
 
 
 def _moved(state: State, h: float) -> State:
@@ -62,7 +66,7 @@ def behaviour(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str):
 
 def test_types_and_hooks_are_those_of_the_text(tmp_path, monkeypatch):
     said = behaviour(tmp_path, monkeypatch, GOOD)
-    assert [name for name, hook in said.hooks.items() if hook] == ["begin", "advance"]
+    assert [name for name, hook in said.hooks.items() if hook] == ["start", "outputs", "update"]
     assert (said.state.__name__, said.parameters.__name__) == ("State", "Gains")
     assert (said.inputs, said.derived, said.noisy, said.draws) == (Nothing, None, "", 0)
 
@@ -70,7 +74,7 @@ def test_types_and_hooks_are_those_of_the_text(tmp_path, monkeypatch):
 def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
     said = behaviour(tmp_path, monkeypatch, GOOD + SEED + MEASURED)
     assert (said.noisy, said.draws) == ("y", 2)
-    assert said.arguments("advance") == ("h", "state", "parameters")
+    assert said.arguments("update") == ("h", "state")
     assert said.arguments("measured") == ("n", "y")
 
 
@@ -84,36 +88,32 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
     said = behaviour(
         tmp_path, monkeypatch, GOOD.replace("def _moved", f"{helper}{caller}def _moved")
     )
-    assert [name for name, hook in said.hooks.items() if hook] == ["begin", "advance"]
+    assert [name for name, hook in said.hooks.items() if hook] == ["start", "outputs", "update"]
 
 
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
-        ("def advance", "def _advance", "has no advance"),
-        ("class Outputs(TypedDict)", "class Output(TypedDict)", "has no Outputs"),
+        ("def update", "def _update", "has start, but no update"),
+        ("def outputs", "def _outputs", "has no function outputs"),
         (
             "def _moved",
             "def moved",
-            "moved is not one of the hooks check, .*, expected, and no function here calls it$",
+            "moved is not one of the hooks check, .*, check_state, and no function here calls it$",
         ),
         (
             "\n\ndef _moved",
             "\n\ndef chek() -> None:\n    pass\n\n\ndef half() -> None:\n    pass\n\n\ndef _moved",
             "chek is not one of .* calls it; nor half$",
         ),
-        ("(h: float,", "(h,", "advance takes h of no type$"),
-        ("(h: float,", "(h: real,", "advance has a type that is not known: name 'real' is not "),
+        ("(h: float,", "(h,", "update takes h of no type$"),
+        ("(h: float,", "(h: real,", "update has a type that is not known: name 'real' is not "),
         (
-            "Gains) -> tuple[State, Outputs]:\n    return State",
-            "Gains) -> Outputs:\n    return State",
-            r"begin does not return tuple\[State, Outputs\]$",
+            "-> Outputs:",
+            "-> tuple[float, float]:",
+            r"outputs returns tuple\[float, f",
         ),
-        (
-            "advance(h: float,",
-            "advance(h: float, dt: float,",
-            "advance takes dt, which is not one of",
-        ),
+        ("(h: float,", "(h: float, dt: float,", "update takes dt, which is not one of"),
         ("\n\ndef _moved", f"{SEED}\n\ndef _moved", "has seed, but no measured"),
         ("\n\ndef _moved", f"{MEASURED}\n\ndef _moved", "has measured, but no seed"),
         ("def _moved", "RESTARTED = 'again'\n\n\ndef _moved", "has RESTARTED, but no credible"),
@@ -124,9 +124,14 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
         ),
         ("def _moved", "seed = measured = 1\n\n\ndef _moved", "seed is no function, but has the"),
         (
-            "class Outputs(TypedDict)",
-            "Outputs = 1\n\n\nclass Out(TypedDict)",
-            "Outputs is no class",
+            "start(parameters: Gains)",
+            "start(parameters: State)",
+            "outputs takes parameters as Gains",
+        ),
+        (
+            "class Gains(NamedTuple):\n    k: float",
+            "Gains = float",
+            "start takes parameters of the type float; write a NamedTuple",
         ),
         ("(h: float,", "(h: float, derived: State,", "takes derived, but there is no derive"),
         ("    x: float\n", "    x: str\n", "State.x has the type str; use float, int"),
@@ -190,29 +195,33 @@ class Outputs(NamedTuple):
 RESTARTED = "again"
 """
 
-_BOTH = "tuple[State, Derived, Outputs]"
 _Y = "Annotated[Vector, 2]"
 
 #: What each argument and each result is, as the documentation of the hooks says.
 RIGHT: dict[str, dict[str, str]] = {
     "check": {"parameters": "Parameters", "return": "None"},
-    "begin": {"parameters": "Parameters", "inputs": "Inputs", "t": "float", "return": _BOTH},
-    "derive": {"parameters": "Parameters", "state": "State", "return": "Derived"},
+    "start": {"parameters": "Parameters", "inputs": "Inputs", "t": "float", "return": "State"},
+    "derive": {
+        "parameters": "Parameters", "state": "State", "inputs": "Inputs", "t": "float",
+        "return": "Derived",
+    },
+    "outputs": {
+        "parameters": "Parameters", "state": "State", "derived": "Derived", "inputs": "Inputs",
+        "t": "float", "return": "Outputs",
+    },
+    "update": {
+        "parameters": "Parameters", "state": "State", "derived": "Derived", "inputs": "Inputs",
+        "t": "float", "h": "float", "return": "State",
+    },
     "credible": {
         "parameters": "Parameters", "state": "State", "inputs": "Inputs", "return": "bool",
     },
     "restarted": {
         "parameters": "Parameters", "state": "State", "inputs": "Inputs", "return": "State",
     },
-    "advance": {
-        "parameters": "Parameters", "state": "State", "derived": "Derived", "inputs": "Inputs",
-        "t": "float", "h": "float", "n": "int", "return": _BOTH,
-    },
     "seed": {"parameters": "Parameters", "return": "int"},
     "measured": {"parameters": "Parameters", "n": "tuple[float, float]", "y": _Y, "return": _Y},
-    "expected": {
-        "parameters": "Parameters", "state": "State", "outputs": "Outputs", "return": "Outputs",
-    },
+    "check_state": {"parameters": "Parameters", "state": "State", "return": "None"},
 }  # fmt: skip
 
 WRONG = (
@@ -259,8 +268,8 @@ def test_no_other_type_is_taken(monkeypatch, hook, argument):
             read_behaviour(module)
         told = str(caught.value)
         assert len(told.splitlines()) == 1
-        # What begin takes is what the others are held against.
-        assert caught.value.place[0] == hook or hook == "begin"
+        # What some return is what others are held against.
+        assert caught.value.place[0] == hook or hook in ("start", "outputs")
         assert argument in (*caught.value.place, "return"), wrong
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from xml.etree import ElementTree
 
 import pytest
 
-from fmus.discovery import source_of
 from fmus.ports.definition import define
+from fmus.ports.description import fmi2_description
 from fmus.ports.groups import Nothing
-from fmus.ports.port import H_MAX, Misdeclared
+from fmus.ports.port import Misdeclared, largest_step
 from support.own import imported
 
 
@@ -31,19 +32,35 @@ def test_one_module_says_it_all(defined):
     assert lag.behaviour.state.__name__ == "State"
 
 
-def test_a_component_of_the_bundle_is_defined_by_two():
-    definition = source_of("PathPlanner").definition
-    assert (definition.name, definition.ports[0].name) == ("PathPlanner", "y_d.x")
+def test_a_component_that_splits_its_steps_has_a_parameter_for_it(defined):
+    lag = defined(("class State", "H_MAX = 0.5\n\n\nclass State"))
+    assert lag.ports[-1] == largest_step(0.5)
 
 
-def test_internal_steps_give_it_their_longest(defined):
-    lag = defined(("h: float", "h: float, n: int"))
-    assert lag.ports[-1] is H_MAX
+def test_a_component_states_its_experiment(defined):
+    lag = defined(("class State", "STEP_SIZE = 10\nSTOP_TIME = 3600.0\n\n\nclass State"))
+    assert (lag.behaviour.step, lag.behaviour.stop) == (10.0, 3600.0)
+    said = ElementTree.fromstring(fmi2_description(lag, "{1}")).find("DefaultExperiment")
+    assert said is not None
+    assert said.attrib == {"startTime": "0.0", "stopTime": "3600.0", "stepSize": "10.0"}
 
 
-TAKES = ("begin(parameters: Parameters)", "begin(parameters: Parameters, inputs: Inputs)")
-AND_TIME = ("inputs: Inputs) ->", "inputs: Inputs, t: float) ->")
+TAKES = ("outputs(state: State)", "outputs(state: State, inputs: Inputs)")
+AND_TIME = ("inputs: Inputs) -> Outputs", "inputs: Inputs, t: float) -> Outputs")
 SAID = ('Variable("m", "Value")', 'Variable("m", "Value", feedthrough=())')
+STARTS = ("start(parameters: Parameters)", "start(parameters: Parameters, inputs: Inputs)")
+DERIVES = (
+    "def outputs(state: State)",
+    "def derive(inputs: Inputs, t: float) -> float:\n    return inputs.u + t\n\n\n"
+    "def outputs(state: State, derived: float)",
+)
+GUARDED = (
+    "def outputs",
+    "RESTARTED = 'again'\n\n\ndef credible(state: State, inputs: Inputs) -> bool:\n"
+    "    return state.x < inputs.u\n\n\ndef restarted(state: State) -> State:\n    return state"
+    "\n\n\ndef outputs",
+)
+SAMPLED = ("class State", "SAMPLED = True\n\n\nclass State")
 
 
 @pytest.mark.parametrize(
@@ -53,25 +70,29 @@ SAID = ('Variable("m", "Value")', 'Variable("m", "Value", feedthrough=())')
         ([TAKES], ("u",), ()),
         ([TAKES, AND_TIME], ("u", "time"), ()),
         ([SAID], (), ()),
-        ([TAKES, SAID], (), ("u",)),
-        ([TAKES, AND_TIME, SAID], (), ("u",)),
+        ([STARTS], (), ("u",)),
+        ([STARTS, TAKES], ("u",), ()),
+        ([STARTS, TAKES, SAID], (), ("u",)),
+        ([STARTS, (SAID[0], SAID[1].replace("=()", "=(), initially=()"))], (), ()),
         ([(SAID[0], SAID[1].replace("()", '("u", "time")'))], ("u", "time"), ()),
+        ([DERIVES], ("u", "time"), ()),
+        ([GUARDED], ("u",), ()),
+        ([TAKES, SAMPLED], ("u",), ()),
     ],
 )
-def test_outputs_depend_on_what_begin_takes_unless_they_say(
+def test_outputs_depend_on_what_hooks_take_unless_they_say(
     defined, changes, feedthrough, initially
 ):
     [x] = [port for port in defined(*changes).ports if port.causality == "output"]
     assert (x.feedthrough, x.initially) == (feedthrough, initially)
 
 
-def test_what_is_not_needed_may_be_missing(monkeypatch, tmp_path):
+def test_all_but_outputs_may_be_missing(monkeypatch, tmp_path):
     text = """\
 from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from fmus.ports.groups import Nothing
 from auv_fmu import Variable
 
 
@@ -79,12 +100,8 @@ class Outputs(NamedTuple):
     y: Annotated[float, Variable()]
 
 
-def begin(t: float) -> tuple[Nothing, Outputs]:
-    return Nothing(), Outputs(t)
-
-
-def advance(t: float, h: float) -> tuple[Nothing, Outputs]:
-    return Nothing(), Outputs(t + h)
+def outputs(t: float) -> Outputs:
+    return Outputs(t)
 """
     (tmp_path / "own_clock.py").write_text(text)
     monkeypatch.syspath_prepend(tmp_path)
@@ -118,12 +135,6 @@ def advance(t: float, h: float) -> tuple[Nothing, Outputs]:
             ("Parameters", "time"),
         ),
         (
-            "    T: Anno",
-            "    h_max: Anno",
-            "Parameters.h_max has a name that every component has",
-            ("Parameters", "h_max"),
-        ),
-        (
             '"Value")',
             '"Value", feedthrough=("v",))',
             "Outputs.x depends on 'v'; there are u, time",
@@ -131,37 +142,40 @@ def advance(t: float, h: float) -> tuple[Nothing, Outputs]:
         ),
         ("class Inputs", "class Ins(NamedTuple):\n    pass\n\n\nclass Inputs", None, None),
         (
-            "inputs: Inputs",
-            "inputs: State",
-            "inputs are of the type State; call it Inputs",
-            ("advance", "inputs"),
-        ),
-        (
             "state: State, inputs: Inputs",
             "state: State",
             "Inputs is there, but no hook takes inputs",
             ("Inputs",),
         ),
         (
-            'Outputs]:\n    """State and outputs after',
-            'Inputs]:\n    """State and outputs after',
-            "own_lag.advance does not return tuple[State, Outputs]",
-            ("advance",),
+            "h: float) -> State",
+            "h: float) -> Inputs",
+            "own_lag.update returns Inputs; write State",
+            ("update", "return"),
         ),
-        ("class Outputs", "class Outs", "own_lag has no Outputs", ()),
-        ("def begin", "def start", "own_lag has no begin", ()),
+        ("def outputs", "def _outputs", "own_lag has no function outputs", ()),
+        ("def start", "def _start", "own_lag has update, but no start", ("update",)),
         (
             "def check",
             "def test",
-            "own_lag.test is not one of the hooks check, begin, derive",
+            "own_lag.test is not one of the hooks check, start, derive",
             ("test",),
         ),
         (
             "h: float",
             "dt: float",
-            "own_lag.advance takes dt, which is not one of parameters, sta",
-            ("advance", "dt"),
+            "own_lag.update takes dt, which is not one of parameters, sta",
+            ("update", "dt"),
         ),
+        (
+            "class State",
+            "SAMPLED = True\n\n\nclass State",
+            "own_lag.outputs takes no inputs, so it is not SAMPLED",
+            ("outputs",),
+        ),
+        ("class State", "SAMPLED = 1\n\n\nclass State", "SAMPLED is 1; write True or", ()),
+        ("class State", "H_MAX = 0.0\n\n\nclass State", "H_MAX is 0.0; write seconds, mo", ()),
+        ("class State", "STOP_TIME = '9'\n\n\nclass State", "STOP_TIME is '9'; write sec", ()),
     ],
 )
 def test_mistakes_are_named(defined, old, new, why, place):
@@ -172,3 +186,17 @@ def test_mistakes_are_named(defined, old, new, why, place):
         defined((old, new))
     assert str(caught.value).startswith(why)
     assert caught.value.place == place
+
+
+def test_what_is_sampled_is_discrete_and_depends_on_inputs(defined):
+    [x] = [port for port in defined(TAKES, SAMPLED).ports if port.causality == "output"]
+    assert (x.variability, x.feedthrough) == ("discrete", ("u",))
+    with pytest.raises(Misdeclared, match=r"^Outputs\.x is sampled with the inputs, so it has "):
+        defined(TAKES, SAMPLED, SAID)
+
+
+def test_names_are_told_apart_from_those_that_a_component_has_anyway(defined):
+    own = ("    T: Anno", "    h_max: Anno")
+    assert "h_max" in [port.name for port in defined(own).ports]
+    with pytest.raises(Misdeclared, match=r"Parameters\.h_max has a name that H_MAX has already"):
+        defined(own, ("class State", "H_MAX = 1.0\n\n\nclass State"))

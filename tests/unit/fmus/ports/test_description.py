@@ -9,15 +9,15 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fmus.ports.description import complete, dependencies, value_attributes
-from fmus.ports.port import FAULT, Port, inputs, outputs, parameter
+from fmus.ports.port import FAULT, Port
 
-A, B = inputs("a", {"x": "m"}, "Place")[0], inputs("b", {1: "N"}, "Force")[0]
+REAL = ("continuous", "Real")
 PORTS = (
-    A,
-    B,
-    *outputs("y", {"x": "m"}, "Output", (B,)),
-    parameter("k", 0.25, "1", "Gain", 0.0, 1e3, tunable=True),
-    parameter("big", 1.25e300, "1", "Large"),
+    Port("a.x", "input", *REAL, "Place: x", "m", 0.0),
+    Port("b[1]", "input", *REAL, "Force: 1", "N", 0.0),
+    Port("y.x", "output", *REAL, "Output: x", "m", feedthrough=("b[1]",)),
+    Port("k", "parameter", "tunable", "Real", "Gain", "1", 0.25, 0.0, 1e3),
+    Port("big", "parameter", "fixed", "Real", "Large", "1", 1.25e300),
     Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
     Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
     Port("kind", "parameter", "fixed", "String", "Kind", start="Soft", choices={"Soft": 1}),
@@ -99,7 +99,7 @@ def test_integers_and_truth_values_depend_as_reals_do():
         Port("on", "input", "discrete", "Boolean", "Switch", start=True),
         Port("n", "output", "discrete", "Integer", "Number", feedthrough=("k",)),
         Port("full", "output", "discrete", "Boolean", "Whether", initially=("on",)),
-        parameter("gain", 1.0, "1", "Gain"),
+        Port("gain", "parameter", "fixed", "Real", "Gain", "1", 1.0),
         FAULT,
     )
     assert [*dependencies(ports)] == [(3, [1], [1, 5]), (4, [], [2, 5]), (6, [], [])]
@@ -113,6 +113,6 @@ def test_integers_and_truth_values_depend_as_reals_do():
 @example([-0.0, 0.1 + 0.2, pi / 2])
 def test_numbers_are_read_back_bit_for_bit(numbers: list[float]):
     low, start, high = numbers
-    said = value_attributes(parameter("k", start, "1", "Gain", low, high))
+    said = value_attributes(Port("k", "input", *REAL, "Gain", "1", start, low, high))
     read = [float(said[name]).hex() for name in ("min", "start", "max")]
     assert read == [low.hex(), start.hex(), high.hex()]

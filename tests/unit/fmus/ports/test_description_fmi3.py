@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
 from auv_fmu import __version__
 from fmus.kinds import TARGETS
-from fmus.ports.definition import Definition
+from fmus.ports.definition import Definition, Origin
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
     fmi3_description,
     terminals_and_icons,
 )
-from fmus.ports.port import FAULT, TIME, Port, inputs, outputs, parameter
-from fmus.ports.vehicle import PAPER
+from fmus.ports.port import FAULT, Port
 
-A = inputs("a", {"x": "m"}, "Place")[0]
+REAL = ("continuous", "Real")
 PORTS = (
-    A,
-    *outputs("y", {"x": "m"}, "Output", (A, TIME)),
-    parameter("k", 0.25, "1", "Gain", 0.0, 1e3, tunable=True),
+    Port("a.x", "input", *REAL, "Place: x", "m", 0.0),
+    Port("y.x", "output", *REAL, "Output: x", "m", feedthrough=("a.x", "time")),
+    Port("k", "parameter", "tunable", "Real", "Gain", "1", 0.25, 0.0, 1e3),
     Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
     Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
     Port("kind", "parameter", "fixed", "String", "Kind", start="Soft", choices={"Soft": 1}),
@@ -28,9 +28,8 @@ PORTS = (
 
 DESCRIPTION = """
 <fmiModelDescription fmiVersion="3.0" modelName="It" instantiationToken="{1}"
-  description="A thing. Equation numbers are from the paper &quot;Three-dimensional tracking \
-control of autonomous underwater vehicles with limited torque and without velocity sensors&quot;"
-  author="auv-fmu" version="VERSION" license="MIT" generationTool="auv-fmu VERSION"
+  description="A thing. From a book" author="Me" version="1.2" license="MIT"
+  generationTool="auv-fmu VERSION"
   variableNamingConvention="structured">
   <CoSimulation modelIdentifier="It" needsExecutionTool="false"
     canBeInstantiatedOnlyOncePerProcess="false" canHandleVariableCommunicationStepSize="true"
@@ -52,7 +51,7 @@ control of autonomous underwater vehicles with limited torque and without veloci
     <Category name="logStatusFatal" description="Log messages with fmi3Fatal status."/>
     <Category name="logAll" description="Log all messages."/>
   </LogCategories>
-  <DefaultExperiment startTime="0.0" stopTime="100.0" stepSize="0.02"/>
+  <DefaultExperiment startTime="0.0" stopTime="3600.0" stepSize="10.0"/>
   <ModelVariables>
     <Float64 name="a.x" valueReference="1" description="Place: x" causality="input"
       variability="continuous" declaredType="Length" unit="m" start="0"/>
@@ -111,7 +110,9 @@ def canonical(content: str | bytes) -> str:
 
 def test_description_says_what_the_ports_are():
     nothing: Any = None
-    it = Definition("It", "A thing", PAPER, PORTS, nothing, {}, nothing)
+    origin = Origin("Me", "MIT", "1.2", "From a book")
+    behaviour: Any = SimpleNamespace(step=10.0, stop=3600.0)
+    it = Definition("It", "A thing", origin, PORTS, nothing, (), behaviour)
     found = fmi3_description(it, "{1}")
     assert canonical(found) == canonical(DESCRIPTION)
 
@@ -123,9 +124,11 @@ def test_build_description_names_the_one_file():
 
 
 GROUPS = (
-    *inputs("tau", {"u": "N", "q": "N.m"}, "Command"),
-    *inputs("y", {"x": "m"}, "Place"),
-    *outputs("theta", {1: "N", 2: "kg/s"}, "Parameters"),
+    Port("tau.u", "input", *REAL, "Command: u", "N", 0.0),
+    Port("tau.q", "input", *REAL, "Command: q", "N.m", 0.0),
+    Port("y.x", "input", *REAL, "Place: x", "m", 0.0),
+    Port("theta[1]", "output", *REAL, "Parameters: 1", "N"),
+    Port("theta[2]", "output", *REAL, "Parameters: 2", "kg/s"),
     Port("k", "parameter", "fixed", "Real", "Gain", "1", 1.0),
 )
 

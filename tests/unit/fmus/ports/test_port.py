@@ -7,6 +7,7 @@ from math import inf, nan
 
 import pytest
 
+from auv_fmu import Refusal
 from auv_fmu.quantities import (
     ETA_WITHOUT_ROLL,
     TAU,
@@ -16,10 +17,10 @@ from auv_fmu.quantities import (
     member_of,
     per_axis,
 )
-from fmus.ports.port import Misdeclared, Port, Refusal, inputs, parameter, parameters
+from fmus.ports.port import Misdeclared, Port
 
-REAL = parameter("k", 1.0, "1", "Gain", 0.5, 2.5)
-UNBOUNDED = parameter("k", 1.0, "1", "Gain")
+UNBOUNDED = Port("k", "parameter", "fixed", "Real", "Gain", "1", 1.0)
+REAL = replace(UNBOUNDED, minimum=0.5, maximum=2.5)
 INTEGER = Port("n", "parameter", "fixed", "Integer", "Number", start=0)
 BOOLEAN = Port("on", "parameter", "fixed", "Boolean", "Switch", start=False)
 NAMED = Port("m", "input", "discrete", "Integer", "Kind", start=8, choices={"a": -7, "b": 8})
@@ -88,25 +89,6 @@ def test_choices_stand_for_what_the_equations_take():
 
 def test_a_scalar_is_its_own_member():
     assert [member_of(name) for name in ("u", "tau.u", "K[1,2]", "x_1")] == ["u", "u", "1,2", "x_1"]
-
-
-def test_inputs_start_at_zero_and_parameters_are_fixed():
-    assert inputs("a", {"x": "m"}, "Place") == (
-        Port("a.x", "input", "continuous", "Real", "Place: x", "m", 0.0),
-    )
-    fixed = Port("k", "parameter", "fixed", "Real", "Gain", "1", 2.0)
-    assert parameter("k", 2.0, "1", "Gain") == fixed
-    assert parameters("k", (2.0,), {1: "1"}, "Gain")[0].variability == "fixed"
-
-
-def test_parameters_of_a_group_have_a_start_value_each():
-    made = parameters("K", (1.0, 2.0), {"x": "m", 2: "N"}, "Gain", -9.0, 9.0, tunable=True)
-    assert made == (
-        Port("K.x", "parameter", "tunable", "Real", "Gain: x", "m", 1.0, -9.0, 9.0),
-        Port("K[2]", "parameter", "tunable", "Real", "Gain: 2", "N", 2.0, -9.0, 9.0),
-    )
-    with pytest.raises(TypeError, match="K: 1 start values for 2 members"):
-        parameters("K", (1.0,), {"x": "m", 2: "N"}, "Gain")
 
 
 @pytest.mark.parametrize(("member", "name"), [("x", "y.x"), (3, "y[3]")])

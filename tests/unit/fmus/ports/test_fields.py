@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from enum import IntEnum
 from math import inf, nan
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from types import SimpleNamespace
+from typing import Annotated, Any, NamedTuple, cast
 
 import pytest
 from fmpy.validation import validate_fmu
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import POSITIVE, Variable, declared
-from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.discovery import source_of
+from auv_fmu import POSITIVE, Matrix, Variable, Vector
+from fmus.ports.definition import Definition, Origin
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_description
+from fmus.ports.fields import declared
 from fmus.ports.groups import ParameterSet, ports_in
 from fmus.ports.port import Misdeclared, Port
 
@@ -74,8 +74,8 @@ def test_numbers_have_the_types_of_fmi(hint, start, kind, zero):
 
 def test_an_enumeration_is_chosen_by_name_and_seen_as_a_number():
     [port] = ports("parameter", mode=(Annotated[Mode, PLAIN], Mode.SLOW))
-    assert (port.type, port.start) == ("String", "SLOW")
-    assert port.choices == {"OFF": Mode.OFF, "SLOW": Mode.SLOW, "FAST": Mode.FAST}
+    assert (port.type, port.start) == ("String", "slow")
+    assert port.choices == {"off": Mode.OFF, "slow": Mode.SLOW, "fast": Mode.FAST}
     [port] = ports("output", mode=Annotated[Mode, PLAIN])
     assert (port.type, port.start, port.minimum) == ("Integer", None, None)
     [port] = ports("input", mode=Annotated[Mode, PLAIN])
@@ -94,6 +94,9 @@ def test_an_enumeration_is_chosen_by_name_and_seen_as_a_number():
             ["p[1,1]", "p[1,2]", "p[2,1]", "p[2,2]"],
         ),
         (Annotated[Vector, 1, METRES], ["p[1]"]),
+        (Annotated[Vector, 2, Variable({"x": "m", "z": "m"}, "Place")], ["p.x", "p.z"]),
+        (Annotated[Vector, 2, Variable({2: "m", 3: "m"}, "Place")], ["p[2]", "p[3]"]),
+        (Annotated[Vector, 2, Variable("m", "Place", members=(0, 1))], ["p[0]", "p[1]"]),
     ],
 )
 def test_elements_have_numbers_or_names(hint, names):
@@ -102,6 +105,42 @@ def test_elements_have_numbers_or_names(hint, names):
     labels = [name[1:].strip("[].") for name in names]
     text = "Some" if "int" in str(hint) else "Place"
     assert [port.description for port in found] == [f"{text}: {label}" for label in labels]
+
+
+def test_members_may_have_units_of_their_own():
+    said = Variable({"q": "N.m", "u": "N"}, "Command")
+    found = ports("input", tau=Annotated[tuple[float, float], said])
+    assert [(port.name, port.unit) for port in found] == [("tau.q", "N.m"), ("tau.u", "N")]
+
+
+@pytest.mark.parametrize(
+    ("said", "names"),
+    [
+        (Variable("m", "Place", name="lambda"), ["lambda[1]", "lambda[2]"]),
+        (Variable({"x": "m", "z": "m"}, "Place", name="eta"), ["eta.x", "eta.z"]),
+        (Variable("m", "Place", name="waypoint[{}].x"), ["waypoint[1].x", "waypoint[2].x"]),
+        (Variable("m", "Place", members=(2, 3), name="stage[{}].t"), ["stage[2].t", "stage[3].t"]),
+    ],
+)
+def test_a_name_may_be_another_than_that_of_the_field(said, names):
+    assert [port.name for port in ports("input", p=Annotated[Vector, 2, said])] == names
+
+
+def test_the_name_of_a_class_in_a_class_may_be_another_or_none():
+    fields = {"one": (Gains, Gains()), "two": (Annotated[Gains, Variable(name="")], Gains())}
+    assert [port.name for port in ports("parameter", **fields)] == [
+        "one.k", "one.v[1]", "one.v[2]", "k", "v[1]", "v[2]",
+    ]  # fmt: skip
+    [first, *_] = ports("parameter", p=(Annotated[Gains, Variable(name="a.b")], Gains()))
+    assert first.name == "a.b.k"
+    with pytest.raises(Misdeclared, match=r"^Fields.p is a NamedTuple, of which a Variable says"):
+        ports("parameter", p=(Annotated[Gains, PLAIN], Gains()))
+
+
+def test_choices_that_differ_in_capitals_only_are_refused():
+    alike = IntEnum("Alike", {"A": 0, "a": 1})
+    with pytest.raises(Misdeclared, match="has choices of Alike that differ only in capitals"):
+        ports("input", p=Annotated[alike, PLAIN])
 
 
 def test_elements_start_with_those_of_the_default_value():
@@ -131,11 +170,12 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
     fields = made(
         a=Annotated[float, PLAIN],
         b=Annotated[float, Variable(feedthrough=())],
-        c=Annotated[float, Variable(feedthrough=("u",))],
+        c=Annotated[tuple[float, float], Variable(feedthrough=("u[{}]",), initially=())],
     )
-    found = declared(fields, "output", ("u", "v"))
-    assert [port.feedthrough for field in found.values() for port in ports_in(field)] == [
-        ("u", "v"), (), ("u",),
+    found = declared(fields, "output", ("u", "v"), ("w",))
+    ports = [port for field in found.values() for port in ports_in(field)]
+    assert [(port.feedthrough, port.initially) for port in ports] == [
+        (("u", "v"), ("w",)), ((), ("w",)), (("u[1]",), ()), (("u[2]",), ()),
     ]  # fmt: skip
 
 
@@ -299,14 +339,6 @@ def test_mistakes_are_named(causality, field, why):
     assert caught.value.place == ("Fields", "p")
 
 
-def test_a_class_of_another_kind_is_refused():
-    class Inputs:
-        pass
-
-    with pytest.raises(Misdeclared, match=r"^Inputs is no NamedTuple; write class Inputs\(NamedT"):
-        declared(Inputs, "input")
-
-
 def test_a_type_that_is_not_known_is_named_with_its_field():
     cls = made(u=Annotated[float, METRES], v=float)
     cls.__annotations__ = {"u": "float", "v": "Annotate[float, 3]"}
@@ -383,7 +415,8 @@ def test_what_is_declared_can_be_described(folder, causality, fields):
         assert len(str(flaw).splitlines()) == 1
         assert flaw.place[0] in ("Fields", "Odd", "Far")
         return
-    it = replace(source_of("Sea").definition, ports=tuple(found))
+    nothing, behaviour = cast(Any, None), cast(Any, SimpleNamespace(step=0.02, stop=100.0))
+    it = Definition("It", "A thing", Origin(), tuple(found), nothing, (), behaviour)
     for describe in (fmi2_description, fmi3_description):
         (folder / "modelDescription.xml").write_bytes(describe(it, "{1}"))
         assert validate_fmu(str(folder)) == []

@@ -1,0 +1,14 @@
+"""Allocation of a force and two moments to the fins and the propeller of Remus100."""
+
+from __future__ import annotations
+
+from auv_fmu import __author__, __license__, __version__
+from auv_fmu.allocation import Allocated, Parameters, Wanted, evaluate
+from auv_fmu.tail import __citation__
+
+SAMPLED = True
+
+
+def outputs(parameters: Parameters, inputs: Wanted) -> Allocated:
+    """Commands of fins and propeller, and what they give."""
+    return evaluate(parameters, inputs.tau, inputs.nu_r)

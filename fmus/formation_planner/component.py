@@ -1,0 +1,47 @@
+"""Formation planner: reference of a vehicle that keeps its place beside a leader."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable, __author__, __citation__, __license__, __version__, formation
+from auv_fmu.euler import STEP
+from auv_fmu.formation import FormationState, Known, Parameters
+from auv_fmu.motion_planner import Reference
+from auv_fmu.quantities import ETA_WITHOUT_ROLL
+from auv_fmu.vectors import Vector5
+
+H_MAX = STEP
+
+
+class Outputs(NamedTuple):
+    """The reference, and the posture of a vehicle that points along it."""
+
+    reference: Annotated[Reference, Variable(name="")]
+    eta_d: Annotated[
+        Vector5,
+        Variable(ETA_WITHOUT_ROLL, "Posture of a vehicle that points along its reference"),
+    ]
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse stages that no vehicle can change between."""
+    formation.check(parameters)
+
+
+def start(inputs: Known) -> FormationState:
+    """State at the start."""
+    return formation.first_state(inputs)
+
+
+def update(
+    parameters: Parameters, state: FormationState, inputs: Known, h: float
+) -> FormationState:
+    """State after a step."""
+    return formation.step(parameters, state, inputs, h)
+
+
+def outputs(parameters: Parameters, state: FormationState, inputs: Known, t: float) -> Outputs:
+    """The reference, from what is known of the leader now."""
+    wanted = formation.reference(parameters, state, inputs, t)
+    return Outputs(wanted, formation.posture(parameters, state, wanted))

@@ -1,0 +1,98 @@
+"""Saturated output-feedback tracking controller with velocity observer."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import (
+    Refusal,
+    Variable,
+    __author__,
+    __citation__,
+    __license__,
+    __version__,
+    output_feedback,
+)
+from auv_fmu.adaptation import Estimate
+from auv_fmu.euler import STEP
+from auv_fmu.observer import Form
+from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
+from auv_fmu.quantities import POSITION, TAU, VELOCITY
+from auv_fmu.vectors import Vector3
+
+SAMPLED = True
+
+H_MAX = STEP
+
+#: What is said, at time t [s], of a measurement that is not credible.
+RESTARTED = (
+    "observer restarted at t = {t:g} s: the measured position is further from its estimate than "
+    "innovation_gate"
+)
+
+
+class Outputs(NamedTuple):
+    """The command, and what the controller knows."""
+
+    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments (21), not limited")]
+    y_hat: Annotated[
+        Vector3,
+        Variable(POSITION, "Estimated control point (y_hat)", feedthrough=("y",), initially=()),
+    ]
+    dy_hat: Annotated[
+        Vector3,
+        Variable(
+            VELOCITY,
+            "Estimated velocity of the control point (23)",
+            feedthrough=("y", "y_d", "dy_d"),
+            initially=(),
+        ),
+    ]
+    theta_hat: Estimate
+    e: Annotated[
+        Vector3,
+        Variable(POSITION, "Tracking error y - y_d", feedthrough=("y.{}", "y_d.{}"), initially=()),
+    ]
+    z: Annotated[
+        Vector3, Variable(POSITION, "Estimation error y - y_hat", feedthrough=("y",), initially=())
+    ]
+
+
+def start(parameters: Gains, inputs: Measurement) -> ControllerState:
+    """State at the start."""
+    return output_feedback.initial_state(parameters, inputs.y)
+
+
+def credible(parameters: Gains, state: ControllerState, inputs: Measurement) -> bool:
+    """Whether a run may go on from a state."""
+    return output_feedback.credible(parameters, state, inputs.y)
+
+
+def restarted(parameters: Gains, state: ControllerState, inputs: Measurement) -> ControllerState:
+    """The state that it goes on from if it may not."""
+    return output_feedback.restarted(parameters, state, inputs.y)
+
+
+def derive(parameters: Gains, state: ControllerState, inputs: Measurement) -> Signals:
+    """The signals, for a step as long as the last one."""
+    return output_feedback.evaluate(parameters, state, inputs, state.h)
+
+
+def update(
+    parameters: Gains, state: ControllerState, derived: Signals, inputs: Measurement, h: float
+) -> ControllerState:
+    """State after a step."""
+    if parameters.form == Form.EXACT and h != state.h:
+        derived = output_feedback.evaluate(parameters, state, inputs, h)
+    return output_feedback.step(state, derived, h)
+
+
+def outputs(state: ControllerState, derived: Signals) -> Outputs:
+    """The command, and what the controller knows."""
+    return Outputs(derived.tau, state.y_hat, derived.dy_hat, state.theta_hat, derived.e, derived.z)
+
+
+def check_state(state: ControllerState) -> None:
+    """Refuse a last step that went back."""
+    if state.h < 0.0:
+        raise Refusal("its last step is shorter than zero")

@@ -1,0 +1,53 @@
+"""Adaptive robust PD tracking controller with measured velocity."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable, __author__, __citation__, __license__, __version__, pd
+from auv_fmu.adaptation import Estimate
+from auv_fmu.euler import STEP
+from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
+from auv_fmu.quantities import POSITION, TAU
+from auv_fmu.vectors import Vector3, Vector4
+
+SAMPLED = True
+
+H_MAX = STEP
+
+
+class State(NamedTuple):
+    """The adaptive law is all that has a memory."""
+
+    theta_hat: Vector4
+
+
+class Outputs(NamedTuple):
+    """The command, and what the controller knows."""
+
+    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments (57), not limited")]
+    theta_hat: Estimate
+    e: Annotated[
+        Vector3,
+        Variable(POSITION, "Tracking error y - y_d", feedthrough=("y.{}", "y_d.{}")),
+    ]
+
+
+def start(parameters: PdGains) -> State:
+    """State at the start."""
+    return State(parameters.theta_0)
+
+
+def derive(parameters: PdGains, state: State, inputs: PdMeasurement) -> PdSignals:
+    """The signals."""
+    return pd.evaluate(parameters, state.theta_hat, inputs)
+
+
+def update(state: State, derived: PdSignals, h: float) -> State:
+    """State after a step."""
+    return State(pd.step(state.theta_hat, derived, h))
+
+
+def outputs(state: State, derived: PdSignals) -> Outputs:
+    """The command, and what the controller knows."""
+    return Outputs(derived.tau, state.theta_hat, derived.e)

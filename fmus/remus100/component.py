@@ -1,0 +1,112 @@
+"""REMUS 100: underwater vehicle with fins and a propeller, and noisy position sensor."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Refusal, Variable, __author__, __license__, __version__, plant, remus100
+from auv_fmu.euler import STEP
+from auv_fmu.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
+from auv_fmu.remus100 import Parameters, RemusState
+from auv_fmu.tail import ACTUATOR, __citation__
+from auv_fmu.vectors import Vector3, Vector6
+
+H_MAX = STEP
+
+#: Largest diameter of a hull per length: near 1, Lamb's factors are differences of equal numbers.
+_THICKEST = 0.9
+
+
+class Inputs(NamedTuple):
+    """Commands of fins and propeller, and how the water moves."""
+
+    command: Annotated[Vector3, Variable(ACTUATOR, "Command of rudder, stern planes and propeller")]
+    water: Annotated[
+        Vector3, Variable(VELOCITY, "Velocity of the water in the earth frame, added to current")
+    ]
+    dwater: Annotated[
+        Vector3, Variable(ACCELERATION, "Acceleration of the water in the earth frame")
+    ]
+
+
+class Outputs(NamedTuple):
+    """What is seen of the vehicle."""
+
+    eta: Annotated[
+        Vector6,
+        Variable(ETA, "Position of the centre of buoyancy and Euler angles", initially=()),
+    ]
+    nu: Annotated[Vector6, Variable(NU, "Velocity in the body frame", initially=())]
+    y: Annotated[Vector3, Variable(POSITION, "Measured control point, with noise", initially=())]
+    dy: Annotated[Vector3, Variable(VELOCITY, "True velocity of the control point", initially=())]
+    tau_applied: Annotated[
+        Vector3,
+        Variable(TAU, "Force and moments that fins and propeller give", initially=("water",)),
+    ]
+    nu_r: Annotated[
+        Vector6,
+        Variable(NU, "Velocity through the water in the body frame", initially=("water",)),
+    ]
+    actuator: Annotated[
+        Vector3, Variable(ACTUATOR, "What rudder, stern planes and propeller are", initially=())
+    ]
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse a hull that is no slender one, or that is heavier at its top."""
+    hull = parameters.hull
+    if not hull.diameter <= _THICKEST * hull.length:
+        raise Refusal(
+            f"diameter = {hull.diameter:g} must be at most {_THICKEST:g} times length = "
+            f"{hull.length:g}: the added mass is that of a slender hull"
+        )
+    if not hull.r_bg[2] > 0.0:
+        raise Refusal(
+            f"r_bg.z = {hull.r_bg[2]:g} must be above 0: a vehicle with its centre of mass on top "
+            "capsizes"
+        )
+
+
+def start(parameters: Parameters, inputs: Inputs) -> RemusState:
+    """State at the start."""
+    return remus100.begin(parameters, inputs.water)
+
+
+def update(parameters: Parameters, state: RemusState, inputs: Inputs, h: float) -> RemusState:
+    """State after a step."""
+    command, water, dwater = inputs
+    return remus100.advance(parameters, state, command, water, dwater, h)
+
+
+def outputs(parameters: Parameters, state: RemusState) -> Outputs:
+    """What is seen of the vehicle; y has no noise yet."""
+    y, dy = remus100.control(state, parameters.ell)
+    tau = remus100.tail_forces(parameters.tail, state)
+    return Outputs(
+        (*state.position, *state.euler),
+        state.nu,
+        y,
+        dy,
+        (tau[0], tau[4], tau[5]),
+        remus100.through_water(state),
+        state.actuator,
+    )
+
+
+def seed(parameters: Parameters) -> int:
+    """Of the noise."""
+    return parameters.noise.seed
+
+
+def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
+    """The output y with noise, of three independent standard normal numbers."""
+    return plant.measure(y, n, parameters.noise.std)
+
+
+def check_state(parameters: Parameters, state: RemusState) -> None:
+    """Refuse fins and a propeller beyond their limits, and motions beyond the model."""
+    delta_r, delta_s, n = state.actuator
+    delta_max, n_max = parameters.tail.delta_max, parameters.tail.n_max
+    if not (abs(delta_r) <= delta_max and abs(delta_s) <= delta_max and abs(n) <= n_max):
+        raise Refusal("its fins or its propeller are beyond their limits")
+    remus100.check_speed(state)
