@@ -37,7 +37,8 @@ class Plain:
         self.n = self.random.gauss(0.0, 1.0)
         self.x = ask(module, "start", self.known(None, start))
         self.shown = self.evaluated(self.x, self.n, start)
-        self.is_held = True
+        #: Whether the output is what is shown, and whether it is that of the state.
+        self.is_held = self.is_of_now = True
 
     def known(self, state: Any, t: float, **more: Any) -> dict[str, Any]:
         parameters = self.module.Parameters(self.p)
@@ -82,15 +83,15 @@ class Plain:
                 assert not self.is_held
                 self.fault = True
                 return None
-            self.is_held = True
+            self.is_held = self.is_of_now = True
         return self.shown
 
     def step(self, t: float, h: float) -> bool:
         count = ceil(h / (0.05 * (1.0 + 1e-9))) if self.hooks.is_split else 1
         shown, before = self.shown, self.random.getstate()
-        is_held = self.is_held and (t == self.t or not self.depends("t"))
+        is_there = self.is_held and self.is_of_now and (t == self.t or not self.depends("t"))
         try:
-            if self.hooks.is_sampled and not is_held:
+            if self.hooks.is_sampled and not is_there:
                 shown = self.evaluated(self.x, self.n, t)
             state = self.guarded(self.x)
             for i in range(count):
@@ -106,6 +107,7 @@ class Plain:
             return False
         self.x, self.n, self.t, self.shown = state, n, end, shown
         self.is_held = self.hooks.is_sampled or not self.depends("inputs")
+        self.is_of_now = not self.hooks.is_sampled
         return True
 
 

@@ -325,6 +325,8 @@ def test_outputs_of_a_sampled_component_are_those_before_the_step(monkeypatch, t
     assert slave.get_real([1]) == [x + 3.0]
     slave._set_fmu_state(saved)
     assert slave.get_real([1]) == [4.0]
+    assert slave.do_step(0.1, 0.1)
+    assert slave.get_real([1]) == [x + 3.0], "whether or not an input was set"
 
 
 def test_outputs_that_are_refused_are_the_last_ones(monkeypatch, tmp_path):

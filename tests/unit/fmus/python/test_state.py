@@ -93,7 +93,9 @@ SPOILED = {
     "long quaternion": ("state", lambda saved: [
         saved["state"][0], [1.0, 0.0, 1.0, 0.0], *saved["state"][2:],
     ]),
-    "force beyond its limit": ("state", lambda saved: [*saved["state"][:-1], [1e6, 0.0, 0.0]]),
+    "force beyond its limit": ("state", lambda saved: [
+        *saved["state"][:-2], [1e6, 0.0, 0.0], saved["state"][-1],
+    ]),
     "generator of another version": ("generator", with_generator(0, 2)),
     "generator of no version": ("generator", with_generator(0, "three")),
     "generator too short": ("generator", with_generator(1, lambda numbers: numbers[:-2])),
