@@ -10,9 +10,10 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 
 from __future__ import annotations
 
+import sys
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import inf, isfinite
+from math import isfinite
 from random import Random
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
@@ -42,7 +43,7 @@ from fmus.python.noise import Noise
 from fmus.python.state import Snapshot, checked, from_bytes, to_bytes
 
 #: Longest step of a component that has no internal steps [s].
-_NO_LIMIT = inf
+_NO_LIMIT = sys.float_info.max
 
 
 class Component(Callbacks):
@@ -156,7 +157,8 @@ class Component(Callbacks):
         """What the values of all parameters come to, and the longest step with them [s]."""
         parameters = self.definition.parameters.of(values)
         self.check(parameters)
-        return parameters, longest_step(float(values.get(H_MAX, _NO_LIMIT)))
+        h_max = float(values.get(H_MAX, _NO_LIMIT))
+        return parameters, min(longest_step(h_max), _NO_LIMIT)
 
     def _retune(self, parameters: dict[str, Value]) -> None:
         self._adopt(parameters, self._meaning(parameters))
