@@ -6,37 +6,48 @@ import subprocess
 from collections.abc import Sequence
 from ctypes import CDLL, Array, Structure, byref, c_char, c_char_p, c_double, c_int, c_size_t
 from functools import cache
-from importlib import import_module
 from pathlib import Path
 from tempfile import mkdtemp
-from types import ModuleType
-from typing import Any, get_type_hints
+from typing import Any
 
-from fmus.discovery import components, source_of
+from fmus.discovery import source_of
 from fmus.native.translator import translated
-from fmus.ports.groups import count_values, hints_of, is_record, parts_of
+from fmus.ports.groups import Nothing, count_values, form, hints_of, is_record, is_whole, parts_of
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = ROOT / "fmus/native/runtime"
 
+#: The function in C that calls each hook, its arguments after parameters, and where its result is.
+_CALLED = {
+    "check": ("check", (), None),
+    "check_state": ("check_state", ("state",), None),
+    "start": ("start", ("inputs", "t", "state"), "state"),
+    "credible": ("credible", ("state", "inputs"), None),
+    "restarted": ("restart", ("state", "inputs"), "state"),
+    "derive": ("derive", ("state", "inputs", "t", "derived"), "derived"),
+    "outputs": ("evaluate", ("state", "derived", "inputs", "t", "outputs"), "outputs"),
+    "update": ("update", ("state", "derived", "inputs", "t", "h"), "state"),
+}
+
 _SHIM = """
 #include "equations.c"
 #define OUT __attribute__((visibility("default")))
-OUT void check(model_parameters *p, Error *e) { model_check(p, e); }
-OUT void begin(model_parameters *p, model_inputs *i, double t, model_state *s, model_outputs *o,
-               Error *e) { model_begin(p, i, t, s, o, e); }
-OUT void advance(model_parameters *p, model_state *s, model_inputs *i, double t, double h, int n,
-                 model_outputs *o, Error *e) { model_advance(p, s, i, t, h, n, o, e); }
-OUT void derive(model_parameters *p, model_state *s, Error *e) { model_derive(p, s, e); }
-OUT void expected(model_parameters *p, model_state *s, model_outputs *o, model_outputs *x, Error *e)
-{ model_expected(p, s, o, x, e); }
-OUT int credible(model_parameters *p, model_state *s, model_inputs *i, Error *e)
-{ return model_credible(p, s, i, e); }
-OUT void restart(model_parameters *p, model_state *s, model_inputs *i, Error *e)
-{ model_restart(p, s, i, e); }
-OUT void measure(model_parameters *p, double *n, model_outputs *o, Error *e)
-{ model_measure(p, n, o, e); }
-OUT unsigned long seed(model_parameters *p, Error *e) { return model_seed(p, e); }
+#define P model_parameters *p
+#define S model_state *s
+#define I model_inputs *i
+#define D model_derived *d
+#define O model_outputs *o
+#define E Error *e
+OUT void check(P, E) { model_check(p, e); }
+OUT void check_state(P, S, E) { model_check_state(p, s, e); }
+OUT void start(P, I, double t, S, E) { model_start(p, i, t, s, e); }
+OUT int credible(P, S, I, E) { return model_credible(p, s, i, e); }
+OUT void restart(P, S, I, E) { model_restart(p, s, i, e); }
+OUT void derive(P, S, I, double t, D, E) { model_derive(p, s, i, t, d, e); }
+OUT void evaluate(P, S, D, I, double t, O, E) { model_evaluate(p, s, d, i, t, o, e); }
+OUT void update(P, S, D, I, double t, double h, E) { model_update(p, s, d, i, t, h, e); }
+OUT void measure(P, double *n, O, E) { model_measure(p, n, o, e); }
+OUT unsigned long seed(P, E) { return model_seed(p, e); }
 OUT const char *restarted(void) { return MODEL_RESTARTED; }
 """
 
@@ -63,9 +74,10 @@ def is_series(kind: Any) -> bool:
 @cache
 def structure(kind: Any) -> Any:
     """A type of the equations as ctypes has it."""
+    kind = form(kind)
     if kind is float:
         return c_double
-    if kind in (int, bool):
+    if kind is bool or is_whole(kind):
         return c_int
     if is_series(kind):
         parts = [(f"x{i}", structure(k)) for i, k in enumerate(parts_of(kind) or ())]
@@ -76,14 +88,14 @@ def structure(kind: Any) -> Any:
 
 @cache
 def series(kind: Any) -> Any:
-    """A type as states and outputs are kept: all its numbers as doubles."""
+    """A type as inputs, states and outputs are kept: all its numbers as doubles."""
     parts = hints_of(kind).values() if isinstance(kind, type) else [kind]
     size = sum(map(count_values, parts))
     return type("Series", (Structure,), {"_fields_": [("v", c_double * size)]})
 
 
 def listed(kind: Any, value: Any) -> Any:
-    """A value as states and outputs are kept."""
+    """A value as inputs, states and outputs are kept."""
     made = series(kind)()
     made.v[:] = flat(value)
     return made
@@ -91,13 +103,12 @@ def listed(kind: Any, value: Any) -> Any:
 
 def filled(kind: Any, value: Any) -> Any:
     """A value in a structure of its type."""
-    made = structure(kind)
+    kind, made = form(kind), structure(kind)
     if not issubclass(made, Structure):
         return made(value)
     kinds = parts_of(kind) if is_series(kind) else hints_of(kind).values()
     assert kinds is not None
-    values = value.values() if isinstance(value, dict) else value
-    return made(*(filled(k, v) for k, v in zip(kinds, values, strict=True)))
+    return made(*(filled(k, v) for k, v in zip(kinds, value, strict=True)))
 
 
 def flat(value: Any) -> list[float]:
@@ -106,18 +117,16 @@ def flat(value: Any) -> list[float]:
         value = [getattr(value, name) for name, *_ in value._fields_]
     elif isinstance(value, Array):
         value = list(value)
-    elif isinstance(value, dict):
-        value = value.values()
     if isinstance(value, (float, int)):
         return [value]
     return [number for part in value for number in flat(part)]
 
 
 class Equations:
-    """A component's functions in both languages."""
+    """A component's hooks in both languages."""
 
     def __init__(self, name: str) -> None:
-        self.behaviour: ModuleType = import_module(f"{components()[name]}.behaviour")
+        self.said = source_of(name).definition.behaviour
         folder = Path(mkdtemp(prefix="auv_fmu_equations_"))
         (folder / "equations.c").write_text(translated(source_of(name).definition))
         (folder / "shim.c").write_text(_SHIM)
@@ -126,44 +135,35 @@ class Equations:
         subprocess.run([*command, "-o", library, folder / "shim.c", "-lm"], check=True)
         self.library = CDLL(str(library))
         self.library.restarted.restype = c_char_p
-        hints = {**hints_of(self.behaviour.begin), **hints_of(self.behaviour.advance)}
-        self.parameters, self.state = hints["parameters"], hints["state"]
-        self.inputs = hints.get("inputs", tuple[()])
-        self.derived = hints.get("derived")
-        self.outputs = self.behaviour.Outputs
-        derived = [structure(self.derived)] if self.derived else []
-        parts = [(f"x{i}", kind) for i, kind in enumerate([series(self.state), *derived])]
-        self._kept = type("Kept", (Structure,), {"_fields_": parts})
 
-    def kept(self, state: Any = None) -> Any:
-        """The state as the component keeps it: what is derived from it is not filled in."""
-        made = self._kept()
-        if state is not None:
-            made.x0 = listed(self.state, state)
-        return made
+    def kind(self, argument: str) -> Any:
+        """The type of an argument of hooks."""
+        return float if argument in ("t", "h") else getattr(self.said, argument) or Nothing
 
-    def result(self, name: str, *arguments: Any) -> int:
-        """What a function gives that raises nothing."""
+    def passed(self, argument: str, value: Any = None) -> Any:
+        """An argument of a function in C; None: one without a value."""
+        kind = self.kind(argument)
+        if argument in ("parameters", "derived", "t", "h"):
+            return structure(kind)() if value is None else filled(kind, value)
+        return series(kind)() if value is None else listed(kind, value)
+
+    def c(self, hook: str, **given: Any) -> tuple[str, list[str]]:
+        """What a hook in C raises, or else the numbers that it returns."""
+        name, taken, result = _CALLED[hook]
+        passed = {n: self.passed(n, given.get(n)) for n in ("parameters", *taken)}
         error = Error()
-        result: int = getattr(self.library, name)(*_passed(arguments), byref(error))
-        assert not error.raised
-        return result
+        arguments = [a if isinstance(a, c_double) else byref(a) for a in passed.values()]
+        returned = getattr(self.library, name)(*arguments, byref(error))
+        if error.raised:
+            return error.why.text.decode(), []
+        if hook == "credible":
+            return "", bits([returned])
+        return "", bits(flat(passed[result])) if result else []
 
-    def call(self, name: str, *arguments: Any) -> str:
-        """Call a function with structures and numbers; what it raised."""
-        error = Error()
-        getattr(self.library, name)(*_passed(arguments), byref(error))
-        return error.why.text.decode() if error.raised else ""
-
-    def python(self, name: str, **given: Any) -> Any:
-        """Call the function of the same name with those arguments that it has."""
-        function = getattr(self.behaviour, name)
-        return function(**{n: given[n] for n in get_type_hints(function) if n != "return"})
-
-
-def _passed(arguments: Sequence[Any]) -> list[Any]:
-    kinds = {float: c_double, int: c_int}
-    return [kinds[type(a)](a) if type(a) in kinds else byref(a) for a in arguments]
+    def python(self, hook: str, **given: Any) -> Any:
+        """What a hook in Python returns."""
+        function: Any = self.said.hooks[hook]
+        return function(**{name: given[name] for name in self.said.arguments(hook)})
 
 
 @cache

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from ctypes import byref, c_double, c_ulong
+from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
 from random import Random
@@ -22,28 +23,26 @@ from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.sea import Sea
 from auv_fmu.waves import MOST as MOST_WAVES
-from auv_fmu.waves import SPECTRA, Waves
-from fmus.discovery import components, ports_of, source_of
+from auv_fmu.waves import Spectrum, Waves
+from fmus.discovery import ports_of, source_of
 from fmus.native.functions import function_in_c
 from fmus.native.program import Program
 from fmus.native.shapes import strip_sphinx_marks
 from fmus.native.tables import tables
 from fmus.native.translator import _drawn, translated
-from fmus.ports.groups import class_of, count_values, hints_of, parts_of
+from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
-from fmus.python.callbacks import LONGEST_MESSAGE, describe_error
+from fmus.python.callbacks import LONGEST_MESSAGE, Callbacks
 from support.equations import (
     FLAGS,
     ROOT,
     RUNTIME,
+    Equations,
     Error,
     bits,
     equations,
-    filled,
     flat,
     is_series,
-    listed,
-    series,
     structure,
 )
 from support.settings import NAMES, behaviour_of, parameters_of
@@ -96,8 +95,8 @@ def test_it_is_c_without_warnings(name, standard, tmp_path):
 @every
 def test_each_function_has_its_docstring_above_it(name):
     text, seen = translated(source_of(name).definition), 0
-    behaviour = Path(str(import_module(f"{components()[name]}.behaviour").__file__))
-    for path in (behaviour, *(ROOT / "src/auv_fmu").glob("*.py")):
+    component = Path(str(import_module(source_of(name).module).__file__))
+    for path in (component, *(ROOT / "src/auv_fmu").glob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
                 continue
@@ -229,7 +228,7 @@ def test_parameters_lie_where_the_equations_look_for_them(name: str):
     parameters = [row for row in rows(name) if row["causality"] == "PARAMETER"]
     for row in parameters:
         [member] = re.findall(r"^PARAMETER_AT\((.*)\)$", row["place"])
-        if row["name"] == H_MAX.name:
+        if row["name"] == H_MAX:
             assert member == "h_max"
         elif row["kind"] != "STRING":
             assert at(model, member.removeprefix("model.")) == values[row["name"]]
@@ -263,122 +262,59 @@ def number(random: Random) -> float:
 
 def value(kind: Any, random: Random, wild: float = 0.3) -> Any:
     """Something that a type of the equations can hold; most numbers are tame."""
+    kind = form(kind)
     if kind is float:
         return number(random) if random.random() < wild else random.uniform(-3.0, 3.0)
     if kind in (int, bool):
         return random.randrange(3 if kind is int else 2)
+    if is_class(kind, IntEnum):
+        return random.choice([*kind])
     if is_series(kind):
         numbers = tuple(value(k, random, wild) for k in parts_of(kind) or ())
         return class_of(kind)(numbers) if get_origin(kind) is Annotated else numbers
-    parts = {name: value(k, random, wild) for name, k in hints_of(kind).items()}
-    return parts if issubclass(kind, dict) else kind(**parts)
+    return kind(**{name: value(k, random, wild) for name, k in hints_of(kind).items()})
 
 
-def outcome(made: Any) -> tuple[str, list[str]]:
-    return "", bits(flat(made))
-
-
-def raised(call: Any) -> tuple[str, list[str]]:
-    """What a function gives, or what it raises as a slave would say it."""
+def agree(both: Equations, hook: str, **given: Any) -> Any:
+    """Compare what a hook gives, or what it raises as a slave would say it; None: it raises."""
+    result, why = None, ""
     try:
-        return outcome(call())
+        result = both.python(hook, **given)
     except Exception as error:
-        return describe_error(error)[:LONGEST_MESSAGE], []
+        why = Callbacks.describe(None, error)[:LONGEST_MESSAGE]  # type: ignore[arg-type]
+    assert both.c(hook, **given) == (why, [] if result is None else bits(flat(result)))
+    return result
 
 
 @every
 @given(random=randoms)
-def test_begin(name, random):
+def test_hooks(name, random):
     both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
-    parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
-    t = number(random)
-    given = {"parameters": parameters, "inputs": inputs, "t": t}
-    state, outputs = both.kept(), series(both.outputs)()
-    why = both.call(
-        "begin",
-        filled(both.parameters, parameters),
-        filled(both.inputs, inputs),
-        t,
-        state,
-        outputs,
-    )
-    found = (why, []) if why else outcome([state, outputs])
-    assert found == raised(lambda: both.python("begin", **given))
+    groups = ("parameters", "inputs", "state", "derived")
+    given = {what: value(both.kind(what), random, wild) for what in groups}
+    given |= {"t": number(random), "h": random.random()}
+    for hook in ("check", "start", "credible", "restarted", "derive", "outputs", "update"):
+        if both.said.hooks[hook]:
+            agree(both, hook, **given)
 
 
-@every
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if behaviour_of(name).hooks["check_state"]]
+)
 @given(random=randoms)
-def test_advance(name, random):
-    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
-    parameters, inputs = value(both.parameters, random, wild), value(both.inputs, random, wild)
-    state = value(both.state, random, wild)
-    t, h, n = number(random), random.random(), random.randrange(1, 5)
-    given = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": n}
-    kept, outputs = both.kept(state), series(both.outputs)()
-    why = both.call("derive", filled(both.parameters, parameters), kept)
-    if both.derived:
-        derived = raised(lambda: both.python("derive", **given))
-        assert ((why, []) if why else outcome(kept.x1)) == derived
-        if why:
-            return
-        given["derived"] = both.python("derive", **given)
-    why = both.call(
-        "advance",
-        filled(both.parameters, parameters),
-        kept,
-        filled(both.inputs, inputs),
-        t,
-        h,
-        n,
-        outputs,
-    )
-    found = (why, []) if why else outcome([kept, outputs])
-    assert found == raised(lambda: both.python("advance", **given))
+def test_states_are_refused_alike(name, random):
+    """Most that are random, and some that a run begins with."""
+    both = equations(name)
+    parameters, inputs = (value(both.kind(it), random, 0.0) for it in ("parameters", "inputs"))
+    state = agree(both, "start", parameters=parameters, inputs=inputs, t=random.random())
+    if state is None or random.random() < 0.5:
+        state = value(both.kind("state"), random, random.choice((0.0, 0.02, 0.3)))
+    agree(both, "check_state", parameters=parameters, state=state)
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if behaviour_of(name).hooks["expected"]])
-@given(random=randoms)
-def test_expected(name, random):
-    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
-    parameters, state = value(both.parameters, random, wild), value(both.state, random, wild)
-    outputs = value(both.outputs, random, wild)
-    if hasattr(state, "quaternion") and random.random() < 0.5:
-        state = state._replace(quaternion=(0.6, 0.0, 0.8, 0.0))
-    found = series(both.outputs)()
-    why = both.call(
-        "expected",
-        filled(both.parameters, parameters),
-        both.kept(state),
-        listed(both.outputs, outputs),
-        found,
-    )
-    given = {"parameters": parameters, "state": state, "outputs": outputs}
-    assert ((why, []) if why else outcome(found)) == raised(
-        lambda: both.python("expected", **given)
-    )
-
-
-@given(random=randoms)
-def test_restarts_of_the_observer(random):
-    both, wild = equations("ObserverController"), 0.0
-    parameters = value(both.parameters, random, wild)
-    state, inputs = value(both.state, random, wild), value(both.inputs, random, wild)
-    given = {"parameters": parameters, "state": state, "inputs": inputs}
-    kept = both.kept(state)
-    passed = filled(both.parameters, parameters), kept, filled(both.inputs, inputs)
-    assert bool(both.result("credible", *passed)) == both.python("credible", **given)
-    assert both.call("restart", *passed) == ""
-    assert outcome(kept) == outcome(both.python("restarted", **given))
-    text = both.library.restarted().decode() % 0.02
-    assert text == both.behaviour.RESTARTED.format(t=0.02)
-
-
-@given(random=randoms)
-def test_limits_that_leave_an_actuator_nothing(random):
-    both, wild = equations("AuvPlant"), 0.3
-    parameters = value(both.parameters, random, wild)
-    why = both.call("check", filled(both.parameters, parameters))
-    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+def test_text_of_a_restart_is_that_of_python():
+    both = equations("ObserverController")
+    assert both.library.restarted().decode() % 0.02 == both.said.restarted.format(t=0.02)
 
 
 @given(random=randoms, n=st.integers(0, MOST + 2), timed=st.booleans())
@@ -390,14 +326,12 @@ def test_paths_are_refused_alike(random, n, timed):
     flat_z = tuple(0.2 * z for z in series[2])
     T = random.uniform(1.0, 40.0)
     waypoints = Waypoints(n, *series[:2], flat_z, t, timed, random.uniform(0.05, 1.0), T)
-    parameters = default._replace(waypoints=waypoints)
-    why = both.call("check", filled(both.parameters, parameters))
-    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
+    agree(both, "check", parameters=default._replace(waypoints=waypoints))
 
 
 @given(
     random=randoms,
-    spectrum=st.sampled_from([*SPECTRA.values()]),
+    spectrum=st.sampled_from(Spectrum),
     n=st.integers(1, MOST_WAVES),
     depth=st.sampled_from((0.0, 2.0, 30.0, 6000.0)),
 )
@@ -418,31 +352,22 @@ def test_seas_are_alike(random, spectrum, n, depth):
         Current(speed=random.uniform(0.0, 3.0), seed=random.randrange(-(2**31), 2**31)),
         depth=depth,
     )
-    given = filled(both.parameters, parameters)
-    why = both.call("check", given)
-    assert why == raised(lambda: both.python("check", parameters=parameters) or ())[0]
-    kept, outputs, t = both.kept(), structure(both.outputs)(), random.uniform(0.0, 1e5)
-    inputs = both.inputs((random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), 0.0))
-    assert not both.call("begin", given, filled(both.inputs, inputs), t, kept, outputs)
-    state, derived, seen = both.python("begin", parameters=parameters, inputs=inputs, t=t)
-    assert outcome([kept, outputs]) == outcome([[state, derived], seen])
-    for _ in range(3):
-        h, z = random.uniform(0.0, 10.0), random.uniform(-5.0, 40.0)
-        inputs = both.inputs((*inputs.eta[:2], z))
-        arguments = {"parameters": parameters, "state": state, "derived": derived}
-        assert not both.call("advance", given, kept, filled(both.inputs, inputs), t, h, 1, outputs)
-        state, derived, seen = both.python("advance", **arguments, inputs=inputs, t=t, h=h)
-        assert outcome([kept, outputs]) == outcome([[state, derived], seen])
-        t += h
+
+    def inputs() -> Any:
+        x, y, z = random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), random.uniform(-5.0, 40.0)
+        return both.said.inputs((x, y, z))
+
+    agree(both, "check", parameters=parameters)
+    runs(both, parameters, inputs, random.uniform(0.0, 10.0), 4)
 
 
-@given(random=randoms, shape=st.integers(0, 4), estimated=st.booleans())
+@given(random=randoms, shape=st.sampled_from(formation.Shape), estimated=st.booleans())
 def test_formations_are_the_same_over_many_steps(random, shape, estimated):
     """Leaders that change their minds; the first one that cannot be followed ends a run."""
     both = equations("FormationPlanner")
     stages = formation.Stages(
         4,
-        (shape, 4, random.randrange(5), shape),
+        (shape, formation.Shape.TABLE, random.choice([*formation.Shape]), shape),
         *(tuple(random.uniform(1.0, 6.0) for _ in range(4)) for _ in range(4)),
         (1.0, 3.0, 6.0),
         (1.5, 2.0, 2.5),
@@ -453,11 +378,11 @@ def test_formations_are_the_same_over_many_steps(random, shape, estimated):
 
     def inputs() -> formation.Known:
         """Slow, but anywhere and with any heading."""
-        known = value(both.inputs, random, 0.0)
+        known = value(formation.Known, random, 0.0)
         slow = {name: tuple(0.05 * x for x in getattr(known, name)) for name in ("dy_0", "ddy_0")}
         return known._replace(age=abs(known.age), **slow)
 
-    runs(both, parameters, random, inputs, 0.1)
+    runs(both, parameters, inputs, 0.1)
 
 
 @given(random=randoms)
@@ -472,38 +397,35 @@ def test_links_are_the_same_over_many_steps(random):
         1.0,
         random.uniform(0.0, 2.0),
     )
-    runs(both, parameters, random, lambda: value(both.inputs, random, 0.0), 0.5)
+    runs(both, parameters, lambda: value(both.said.inputs, random, 0.0), 0.5)
 
 
-def runs(both: Any, parameters: Any, random: Random, inputs_at: Any, h: float) -> None:
-    """Compare 40 steps of both, each from where the last one ended, until one is refused."""
-    given, kept, outputs = filled(both.parameters, parameters), both.kept(), series(both.outputs)()
-    state = None
-    for k in range(41):
-        name, inputs, t = "advance" if k else "begin", inputs_at(), max(0, k - 1) * h
-        told = filled(both.inputs, inputs)
-        if name == "begin":
-            why = both.call(name, given, told, t, kept, outputs)
-        else:
-            why = both.call(name, given, kept, told, t, h, 1, outputs)
-        ours = {"parameters": parameters, "state": state, "inputs": inputs, "t": t, "h": h, "n": 1}
-        found = (why, []) if why else outcome([kept, outputs])
-        assert found == raised(lambda name=name, ours=ours: both.python(name, **ours))
-        if why:
+def runs(both: Equations, parameters: Any, inputs_at: Any, h: float, steps: int = 40) -> None:
+    """Compare steps of both, each from where the last one ended, until one is refused."""
+    given = {"parameters": parameters, "inputs": inputs_at(), "t": 0.0, "h": h}
+    given["state"] = agree(both, "start", **given)
+    for k in range(steps):
+        given |= {"inputs": inputs_at(), "t": k * h}
+        if both.said.derived:
+            given["derived"] = agree(both, "derive", **given)
+        if agree(both, "outputs", **given) is None:
             return
-        state, _ = both.python(name, **ours)
+        given["state"] = agree(both, "update", **given)
+        if given["state"] is None:
+            return
 
 
 @given(random=randoms)
 def test_noise_of_the_localisation(random):
     both, wild = equations("AuvPlant"), 0.3
-    parameters, outputs = value(both.parameters, random, wild), value(both.outputs, random, wild)
+    parameters = value(both.said.parameters, random, wild)
+    outputs = value(both.said.outputs, random, wild)
     n = value(tuple[float, float, float], random, wild)
-    passed = listed(both.outputs, outputs)
-    given = filled(both.parameters, parameters)
+    passed = both.passed("outputs", outputs)
+    given = both.passed("parameters", parameters)
     both.library.measure(byref(given), (c_double * 3)(*n), byref(passed), byref(Error()))
-    measured = both.behaviour.measured(parameters, outputs["y"], n)
-    assert outcome(passed) == outcome({**outputs, "y": measured})
+    measured = both.python("measured", parameters=parameters, y=outputs.y, n=n)
+    assert bits(flat(passed)) == bits(flat(outputs._replace(y=measured)))
 
 
 def drawn_type(random: Random, depth: int = 0) -> Any:
@@ -548,7 +470,7 @@ def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
 @pytest.mark.parametrize("seed", [0, 1, -1, 2**31 - 1, -(2**31)])
 def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
     both = equations("AuvPlant")
-    parameters = structure(both.parameters)()
+    parameters = structure(both.said.parameters)()
     parameters.noise.seed = seed
     both.library.seed.restype = c_ulong
     assert both.library.seed(byref(parameters), byref(Error())) == seed % 2**32
