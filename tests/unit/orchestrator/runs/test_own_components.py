@@ -148,7 +148,7 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
     ("arguments", "why"),
     [
         (["build", "none.py"], "none.py: no such Python file"),
-        (["build", "."], "has neither"),
+        (["build", "."], "auv-fmu: .: has no "),
         (["build", "--watch"], "--watch is for your own component: name its script"),
         (["check", "none.py"], "none.py: no such Python file"),
         (
