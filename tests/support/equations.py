@@ -20,10 +20,11 @@ from pathlib import Path
 from tempfile import mkdtemp
 from typing import Any
 
+from auv_fmu.variable import Refusal
 from fmus.discovery import source_of
 from fmus.native.translator import translated
 from fmus.ports.groups import Nothing, count_values, form, hints_of, is_record, parts_of
-from fmus.python.callbacks import LONGEST_MESSAGE, describe_error
+from fmus.python.callbacks import LONGEST_MESSAGE
 
 ROOT = Path(__file__).parents[2]
 RUNTIME = ROOT / "fmus/native/runtime"
@@ -47,7 +48,7 @@ OUT void derive(P, S, I, double t, D, E) { model_derive(p, s, i, t, d, e); }
 OUT void outputs(P, S, D, I, double t, O, E) { model_evaluate(p, s, d, i, t, o, e); }
 OUT void update(P, S, D, I, double t, double h, E) { model_update(p, s, d, i, t, h, e); }
 OUT void measured(P, double *n, O, E) { model_measure(p, n, o, e); }
-OUT const char *message(void) { return MODEL_RESTARTED; }
+OUT const char *logged(void) { return MODEL_RESTARTED; }
 """
 
 #: What the compiled hooks take, and which of it has their result; others return it.
@@ -92,10 +93,13 @@ def is_series(kind: Any) -> bool:
     return parts_of(kind) is not None and not is_record(kind)
 
 
-@cache
 def structure(kind: Any) -> Any:
     """A type of the equations as ctypes has it."""
-    kind = form(kind)
+    return _structure(form(kind))
+
+
+@cache
+def _structure(kind: Any) -> Any:
     if kind is float:
         return c_double
     if not is_series(kind) and not is_record(kind):
@@ -153,7 +157,7 @@ class Equations:
         library = folder / "equations.so"
         subprocess.run([*command, "-o", library, folder / "shim.c", "-lm"], check=True)
         self.library = CDLL(str(library))
-        self.library.message.restype = c_char_p
+        self.library.logged.restype = c_char_p
         self.library.seed.restype = c_ulong
 
     def of_c(self, hook: str, **given: Any) -> Outcome:
@@ -172,8 +176,10 @@ class Equations:
         """What the hook comes to in Python; a refusal as a slave says it."""
         try:
             return outcome(self.call(hook, **given))
+        except Refusal as refusal:
+            return str(refusal), []
         except Exception as error:
-            return describe_error(error)[:LONGEST_MESSAGE], []
+            return f"{type(error).__name__}: {error}"[:LONGEST_MESSAGE], []
 
     def call(self, hook: str, **given: Any) -> Any:
         """What the hook returns."""

@@ -317,7 +317,7 @@ def test_restarts_of_the_observer(random):
     given = drawn(both, random, 0.0)
     assert same(both, "credible", given)
     assert same(both, "restarted", given)
-    assert both.library.message().decode() % 0.02 == both.behaviour.restarted.format(t=0.02)
+    assert both.library.logged().decode() % 0.02 == both.behaviour.restarted.format(t=0.02)
 
 
 @given(random=randoms)
