@@ -331,18 +331,16 @@ def _bad(
         return _item(port, value(port, draw.random), False)
 
 
-def _real_parameters(draw: Draw) -> list[Variable]:
-    return _tunable(draw) or draw.description.of("parameter", "Real")
-
-
-for _whose, _found in (("an input", _inputs), ("a parameter", _real_parameters)):
+for _whose, _found in (("an input", _inputs), ("a parameter", _tunable)):
     _bad(f"NaN for {_whose}", _found, lambda port, random: nan)
     _bad(f"an infinite value for {_whose}", _found, lambda port, random: random.choice((inf, -inf)))
 for _side, _limit, _end in (("below", "minimum", -inf), ("above", "maximum", inf)):
     _bad(
         f"{_side} the range",
         lambda draw, limit=_limit: [
-            port for port in draw.settable("Real") if getattr(port, limit) is not None
+            port
+            for port in draw.settable("Real")
+            if port.variability != "fixed" and getattr(port, limit) is not None
         ],
         lambda port, random, limit=_limit, end=_end: random.choice(
             (nextafter(getattr(port, limit), end), copysign(1e300, end))

@@ -54,7 +54,7 @@ def trials_of(name: str) -> Trials:
     """How a component is tried; one without a trials.toml, and an FMU of others, as any may be."""
     if name not in components():
         return Trials()
-    path = package_folder(components()[name]) / "trials.toml"
+    path = package_folder(components()[name].rpartition(".")[0]) / "trials.toml"
     said: dict[str, Any] = tomllib.loads(path.read_text()) if path.is_file() else {}
     settings = {key: Setting(**said.pop(key)) for key in ("overflow", "no_start") if key in said}
     return Trials(**said, **settings)
