@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.master.experiment import Experiment, Order
+from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI, Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import choose_loop
@@ -51,6 +51,10 @@ def run_table(
     stepping = choose_loop(loop, experiment, isolation)
     simulate_plan(make_plan(system, experiment), [table], isolation, stepping, hooks)
     return table
+
+
+#: Orders in which the FMUs of the bundle can be run.
+BUNDLE_ORDERS = (GAUSS_SEIDEL, JACOBI)
 
 
 def whole(system: System, experiment: Experiment, *args: Any, **how: Any) -> Table:
