@@ -140,6 +140,15 @@ class Experiment:
         return self.stop_time - self.start_time
 
     @property
+    def lag(self) -> int:
+        """How many rows below that of its time what acts in a step stands: 0 or 1.
+
+        It is what follows from inputs of the same time. Along feedthroughs it is there before the
+        row is made; in other orders it is computed in the step that follows.
+        """
+        return 0 if str(self.order) == "feedthrough" else 1
+
+    @property
     def full_steps(self) -> int:
         """How many steps have the whole length."""
         return floor(self._in_steps)

@@ -74,9 +74,10 @@ class Loop:
     y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
     theta_hat = _Group("controller", "theta_hat", quantities.THETA)
     tau = _Group("controller", "tau", ACTUATORS)
-    #: The parameters of (3), and of (2).
+    #: The parameters of (3), of the actuators, and of (2).
     lower_limits = _Group("vehicle", "tau_min", ACTUATORS)
     upper_limits = _Group("vehicle", "tau_max", ACTUATORS)
+    actuator_lags = _Group("vehicle", "actuator.T", ACTUATORS)
     vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))
 
     @property
@@ -241,6 +242,24 @@ def limits(table: Table, loop: Loop = STANDARD) -> tuple[np.ndarray, np.ndarray]
         np.array([real_parameter(table, name) for name in loop.lower_limits]),
         np.array([real_parameter(table, name) for name in loop.upper_limits]),
     )
+
+
+def applied(table: Table, loop: Loop = STANDARD) -> np.ndarray:
+    """What acts on the vehicle in each step, (rows - 1, 3) [N, N.m].
+
+    Actuators with a lag have a state: what they give at the end of the step counts.
+    """
+    at_once = table.step_values(*loop.applied)
+    if not (late := _with_lag(table, loop)).any():
+        return at_once
+    return np.where(late, table.group(*loop.applied)[1:], at_once)
+
+
+def _with_lag(table: Table, loop: Loop) -> np.ndarray:
+    """Which actuators have a lag: of a vehicle that takes no tau, all."""
+    if isinstance(loop, AllocatedLoop):
+        return np.ones(len(ACTUATORS), bool)
+    return np.array([bool(value_of(table, name)) for name in loop.actuator_lags])
 
 
 def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -44,6 +45,20 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
     known = {port_name(name): value for name, value in parameters.items() if name not in without}
     experiment = Experiment(max(n - 1, 1) * STEP, STEP)
     return Table.of(Header(columns, experiment, known, units=UNITS), rows)
+
+
+def at_its_time(table: Table, acting: Collection[str]) -> Table:
+    """The same run with what acts in a step in the row of its beginning.
+
+    The last row then holds what never acts: here it is no number.
+    """
+    experiment = replace(table.header.experiment)
+    object.__setattr__(experiment, "order", "feedthrough")
+    rows = table.rows.copy()
+    places = [table.header.place[name] for name in acting if name in table]
+    rows[:-1, places] = table.rows[1:, places]
+    rows[-1, places] = np.nan
+    return Table.of(replace(table.header, experiment=experiment), rows, table.ending)
 
 
 def fleet(n: int) -> tuple[Loop, ...]:

@@ -18,7 +18,7 @@ from orchestrator.master.observers.table import Table
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD
 from support.machine import contents
-from support.tables import loop_table
+from support.tables import at_its_time, loop_table
 from support.tiers import slow
 
 
@@ -52,6 +52,19 @@ def test_lines_hold_the_numbers_of_the_table():
     x, theta, psi = (table[f"plant.eta.{k}"] for k in ("x", "theta", "psi"))
     error = x + 0.35 * np.cos(psi) * np.cos(theta) - table["planner.y_d.x"]
     np.testing.assert_allclose(lines(panel(figure, "error [m]"))[0][1], error, atol=1e-12)
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_the_row_that_signals_stand_in_changes_no_line(figure):
+    table = loop_table()
+    acting = (*STANDARD.commanded, *STANDARD.dy_hat, *STANDARD.theta_hat)
+    for rows in FIGURES[figure].values():
+        one, other = (
+            [line.tolist() for axes in compose("", rows, [Drawn("run", each)])[0].axes
+             for line in lines(axes)]
+            for each in (table, at_its_time(table, acting))
+        )  # fmt: skip
+        assert one == other
 
 
 @pytest.mark.parametrize("z_up", [False, True])

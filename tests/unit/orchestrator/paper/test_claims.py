@@ -225,7 +225,8 @@ def arriving(force, steps=10):
     offsets = np.array([30.0] * steps + [0.5])
     table = still(offsets)
     columns = {name.replace(".", "__"): table[name] for name in table.columns}
-    pushes = {"plant__tau_applied__u": np.broadcast_to(force, steps + 1)}
+    pushes = {name.replace(".", "__"): 0.0 for name in STANDARD.applied}
+    pushes |= {"plant__tau_applied__u": np.broadcast_to(force, steps + 1)}
     return table_of(table.time, dict(table.parameters), **columns, **pushes)
 
 

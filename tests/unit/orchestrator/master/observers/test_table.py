@@ -1,4 +1,4 @@
-"""Rows kept in memory, and the pairing of a sampled component's values with their times."""
+"""Rows kept in memory, and the pairing of what acts in a step with the time of its beginning."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName
+from support.tables import at_its_time
 
 
 def table(times: list[float]) -> Table:
@@ -30,6 +31,15 @@ def test_steps_keep_their_times_where_rows_were_left_out():
     np.testing.assert_allclose(thinned.step_start, [0.0, 0.9, 1.0, 1.9])
     # The row before 1.0 is not there: its own values stand in, a step later.
     np.testing.assert_allclose(thinned.start_values("a.t")[:, 0], [0.0, 1.0, 1.0, 2.0])
+
+
+def test_without_a_lag_values_of_a_step_stand_in_the_row_of_its_time():
+    """The last row begins no step; where rows were left out, each has its own time."""
+    for times in ([0.0, 0.1, 0.2, 0.3], [0.0, 0.1, 1.0, 1.1, 2.0]):
+        whole = at_its_time(table(times), [])
+        assert whole.step_start.tolist() == times[:-1]
+        assert whole.step_values("a.t")[:, 0].tolist() == times[:-1]
+        assert whole.start_values("a.t")[:, 0].tolist() == times[:-1]
 
 
 def test_unknown_column_has_a_suggestion():
