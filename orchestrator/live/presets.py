@@ -259,7 +259,10 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
             for names in stages(system, GAUSS_SEIDEL)
             for name in names
         ],
+        "passing": [],
         "stages": list(map(_stage, sequence, gathered)),
+        "read": [*system.components],
+        "actingRow": plan.experiment.acting_row,
         "parameters": list(_parameters(system)),
         "events": _events(prepared, owner),
     }

@@ -140,11 +140,11 @@ class Experiment:
         return self.stop_time - self.start_time
 
     @property
-    def lag(self) -> int:
-        """How many rows below that of its time what acts in a step stands: 0 or 1.
+    def acting_row(self) -> int:
+        """In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end.
 
-        It is what follows from inputs of the same time. Along feedthroughs it is there before the
-        row is made; in other orders it is computed in the step that follows.
+        It is all inputs, and the outputs that follow from inputs of the same time. In feedthrough
+        order they pass before the row shows them; in other orders the step computes them.
         """
         return 0 if str(self.order) == "feedthrough" else 1
 

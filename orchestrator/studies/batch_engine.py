@@ -19,7 +19,7 @@ from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from fmus.kinds import AUTO
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import JACOBI, ORDERS, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
@@ -28,6 +28,7 @@ from orchestrator.studies.batch.kernel import (
     END,
     RunSteps,
     columns,
+    computed,
     is_bounded,
     new_accumulators,
     part_of,
@@ -40,7 +41,7 @@ from orchestrator.system.values import Value
 from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen, values_of
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
+from orchestrator.vehicle.signals import ACTUATORS, STANDARD, AllocatedLoop, Loop, with_lag
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
@@ -229,7 +230,7 @@ def _job(loop: _Loop, point: Point) -> _Job:
         stop,
         parts,
         last_parts,
-        experiment.order != ORDERS[0],
+        experiment.order == JACOBI,
     )
     return _Job(loop, system, experiment, setting, run_steps)
 
@@ -254,19 +255,28 @@ def _end(job: _Job, stop_time: float) -> tuple[int, float, float]:
 
 
 def _empty_rows(job: _Job) -> np.ndarray:
-    return np.empty((job.experiment.rows, 1 + len(job.loop.columns)))
+    return np.empty((job.experiment.rows, 1 + len(job.loop.columns) + len(ACTUATORS)))
 
 
 def _table(job: _Job, rows: np.ndarray, failure: str | None = None) -> Table:
-    """Rows of a run, in the columns that it has."""
+    """Rows of a run, in the columns that it has, each where the order has it."""
     parameters = {
         name: job.system.value(name)
         for component in job.system.components.values()
         for name in (PortName(component.name, v.name) for v in component.having("parameter"))
     }
-    there = job.loop.there
+    names, there = job.loop.names, job.loop.there
     header = Header(tuple(compress(job.loop.columns, there)), job.experiment, parameters)
-    return Table.of(header, rows[:, [True, *there]], Ending(failure))
+    width = 1 + len(job.loop.columns)
+    table = Table.of(header, rows[:, :width][:, [True, *there]], Ending(failure))
+    # Actuators without a lag give what they are driven with.
+    at_once = ~with_lag(table, names)
+    applied = [header.place[name] for name in compress(names.applied, at_once)]
+    table.rows[:, applied] = rows[:, width:][:, at_once]
+    if job.experiment.acting_row:
+        late = [*applied, *(header.place[name] for name in computed(names) if name in table)]
+        table.rows[1:, late] = table.rows[:-1, late]
+    return table
 
 
 def _made(

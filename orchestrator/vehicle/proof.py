@@ -196,7 +196,7 @@ def certificates(table: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 def _certificates(header: Header, loop: Loop, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Certificates of some steps, from the rows at their starts and at their ends."""
-    acting = ends if header.experiment.lag else starts
+    acting = ends if header.experiment.acting_row else starts
     return np.array(list(_rows(loop, Table.of(header, starts), Table.of(header, acting))))
 
 

@@ -250,12 +250,12 @@ def applied(table: Table, loop: Loop = STANDARD) -> np.ndarray:
     Actuators with a lag have a state: what they give at the end of the step counts.
     """
     at_once = table.step_values(*loop.applied)
-    if not (late := _with_lag(table, loop)).any():
+    if not (late := with_lag(table, loop)).any():
         return at_once
     return np.where(late, table.group(*loop.applied)[1:], at_once)
 
 
-def _with_lag(table: Table, loop: Loop) -> np.ndarray:
+def with_lag(table: Table, loop: Loop) -> np.ndarray:
     """Which actuators have a lag: of a vehicle that takes no tau, all."""
     if isinstance(loop, AllocatedLoop):
         return np.ones(len(ACTUATORS), bool)

@@ -88,10 +88,11 @@ def _row(before: Instant, now: Instant, tau: tuple[float, ...]) -> list[float]:
     ]  # fmt: skip
     for one in now.scene.reference:
         values += one
+    values += tau
     if isinstance(state, ControllerState):
         values += before.signals.dy_hat
         state = state.theta_hat
-    return [*values, *state, *before.signals.tau, *before.command, *tau, *before.tau_w]
+    return [*values, *state, *before.signals.tau, *before.command, *before.tau_w]
 
 
 def compare_with_straight_line(engine: BatchEngine, point: Point) -> None:

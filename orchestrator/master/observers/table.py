@@ -23,9 +23,9 @@ _ROUNDING = 1e-6
 class Table:
     """An observer that keeps the rows of a run, one at the start and one a step.
 
-    What acts in a step, and what else follows from inputs of the time at which it begins, stands in
-    the row of that time or in the next one, as :attr:`.Experiment.lag` says: :meth:`step_values`,
-    :meth:`start_values` and :attr:`step_start` pair it with what stands there at that time.
+    What acts in a step stands in the row of its beginning or in that of its end, as
+    :attr:`.Experiment.acting_row` says. :meth:`step_values`, :meth:`start_values` and
+    :attr:`step_start` pair it with what the other columns hold when it begins.
 
     Attributes:
         header: of the run: columns, experiment, parameters.
@@ -139,11 +139,11 @@ class Table:
     def _before(self) -> np.ndarray:
         """For every step of :meth:`step_values`, the row of the time at which it began.
 
-        Where rows were left out of a table with a lag, it is the row of its end.
+        Where rows were left out and what acts stands in that of its end, it is that row.
         """
         ends = np.arange(1, self._n)
         follows = np.diff(self.time) <= self.header.experiment.step * (1.0 + _ROUNDING)
-        return np.where(follows | (self.header.experiment.lag == 0), ends - 1, ends)
+        return np.where(follows | (self.header.experiment.acting_row == 0), ends - 1, ends)
 
     @property
     def step_start(self) -> np.ndarray:
@@ -155,8 +155,8 @@ class Table:
 
     def step_values(self, *columns: str) -> np.ndarray:
         """What acts in steps, or follows from inputs of their beginning: of each row but one."""
-        lag = self.header.experiment.lag
-        return self.group(*columns)[lag : len(self) - 1 + lag]
+        first = self.header.experiment.acting_row
+        return self.group(*columns)[first : len(self) - 1 + first]
 
     def start_values(self, *columns: str) -> np.ndarray:
         """What these columns held when these steps began."""
