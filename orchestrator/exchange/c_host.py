@@ -13,7 +13,7 @@ from fmpy.model_description import ScalarVariable
 from fmus.compilers import COMPILERS, LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
 from orchestrator.master.fmi.binary import binary_of
 from orchestrator.master.plan import gathered_connections, stages
 from orchestrator.system.component import Component
@@ -81,11 +81,13 @@ def compile_host(
 
 def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     """What the host is compiled with: FMUs and members in the order of the stages."""
+    if experiment.order == FEEDTHROUGH:
+        raise InputError(f"the C program has no order {FEEDTHROUGH}")
     if system.steps or any(connection.transformation for connection in system.connections):
         raise InputError(
             "the C program supports neither longer steps of components nor transformations"
         )
-    parts = stages(system, experiment.order)
+    parts = stages(system, experiment.order or GAUSS_SEIDEL)
     columns: dict[PortName, int] = {}
     references: list[int] = []
     fmus, parameters, row = [], [], []

@@ -146,7 +146,8 @@ static void initialise(double stop_time) {
 static void make_steps(const run *this, block *rows) {
     static const char *const calls[] = {"fmi2SetReal", "fmi2DoStep", "fmi2GetReal"};
     failure why;
-    switch (advance(this, 0, this->steps, NO_LIMIT, rows, &why)) {
+    size_t made = 0;
+    switch (advance(this, &made, this->steps, NO_LIMIT, rows, &why)) {
     case FAILED:
         check(why.status, calls[why.call],
               &fmus[this->stages[why.stage].members - members + why.member]);
@@ -178,11 +179,12 @@ static void end(void) {
     }
 }
 
-int main(int n, char **arguments) {
-    run all = {stages, row, sizeof stages / sizeof *stages, COLUMNS, START, STEP, 0.0, 0, 0};
+int main(int n_arguments, char **arguments) {
+    const size_t n = sizeof stages / sizeof *stages;
+    run all = {stages, row, n, n, COLUMNS, START, STEP, 0.0, 0, 0};
     block table = {NULL, 0, 1};
     clock_t start;
-    if (n != 3) fail("usage: host STEPS TABLE", "host");
+    if (n_arguments != 3) fail("usage: host STEPS TABLE", "host");
     all.full_steps = all.steps = strtoul(arguments[1], NULL, 10);
     all.stop_time = START + (double)all.steps * STEP;
     table.most = all.steps + 1;

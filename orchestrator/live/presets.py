@@ -19,7 +19,7 @@ from fmus.kinds import NATIVE
 from fmus.ports.quantities import POSITION, TAU, THETA, VELOCITY, Members
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import GAUSS_SEIDEL, LINEAR
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR
 from orchestrator.master.hooks.events import (
     Action,
     Alter,
@@ -223,6 +223,7 @@ def _check(prepared: Prepared) -> None:
     lacking = {
         f"third-party FMUs ({', '.join(foreign)})": foreign,
         "rings of direct feedthroughs": rings(system),
+        "feedthrough order": experiment.order == FEEDTHROUGH,
         "linear inputs": experiment.coupling == LINEAR,
         "components with longer steps": any(n > 1 for n in plan.decimations.values()),
         "transformations of values": any(c.transformation for c in system.connections),
@@ -239,7 +240,7 @@ def _check(prepared: Prepared) -> None:
 
 def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
-    system, order = plan.system, plan.experiment.order
+    system, order = plan.system, plan.experiment.order or GAUSS_SEIDEL
     sequence = stages(system, order)
     gathered = gathered_connections(system, sequence, order=order)
     controller = _controller(system)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from orchestrator.machine.errors import InputError, StartError, shortened
 from orchestrator.master.experiment import (
     DELAY,
+    FEEDTHROUGH,
     FULL,
     GAUSS_SEIDEL,
     LINEAR,
@@ -18,9 +20,16 @@ from orchestrator.master.experiment import (
 )
 from orchestrator.master.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.master.plan import Plan, delays, stages
-from orchestrator.master.ring import Ring
+from orchestrator.master.ring import Ring, why_not_following
 from orchestrator.master.row import Gathering, Row
-from orchestrator.master.schedule import Stage, StageCall, member, schedule, step_members
+from orchestrator.master.schedule import (
+    Schedule,
+    Stage,
+    StageCall,
+    member,
+    schedule,
+    step_members,
+)
 from orchestrator.system.graph import has_feedthrough, rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -150,6 +159,7 @@ class Coupling:
     """The rings of direct feedthroughs of a system, and what follows from them.
 
     Attributes:
+        plan: what is run; once components are initialised, with the order that is taken.
         sequence: all components in stages, once they are initialised.
 
     """
@@ -172,7 +182,7 @@ class Coupling:
             exchange: of values.
 
         """
-        self._plan, self._exchange = plan, exchange
+        self.plan, self._exchange = plan, exchange
         self._system, self._experiment = plan.system, plan.experiment
         self._instances, self._row, self._log = instances, row, log
         self._rings = [self._ring(names) for names in rings(plan.system)]
@@ -184,7 +194,7 @@ class Coupling:
 
         Raises:
             InputError: the values do not come to rest, an FMU refused a value, or a ring is to be
-                solved that cannot be.
+                solved that cannot be, or the order cannot be taken.
             StartError: a value is not finite.
 
         """
@@ -200,8 +210,10 @@ class Coupling:
             self._check_finite()
         for instance in instances.values():
             instance.exit_initialization()
-        self._solved = self._solvable()
-        self.sequence = self._in_stages(self._experiment.order, self._solved)
+        order = self._order_taken()
+        self.plan = replace(self.plan, experiment=replace(self._experiment, order=order))
+        self._solved = self._solvable(order)
+        self.sequence = self._in_stages(order, self._solved)
         if self._exchange.initial == FULL:
             self._settling(self._solved).hand_on(everything=True)
         elif self._exchange.initial == NONE:
@@ -211,18 +223,18 @@ class Coupling:
         if self._log.refusals:
             raise InputError("; ".join(self._log.refusals))
 
-    def schedule(self) -> tuple[list[Stage], list[Gathering]]:
+    def schedule(self) -> tuple[Schedule, list[Gathering]]:
         """The stages of every step, and all that is gathered in one."""
         system, instances, row = self._system, self._instances, self._row
         if self._experiment.coupling == LINEAR:
             settling = self._settling(self._solved)
             steps = _LinearSteps(system, instances, row, settling)
             stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
-            return [stage], settling.gatherings
+            return Schedule([stage]), settling.gatherings
         latest = bool(self._exchange.groups)
-        found = schedule(self._plan, self.sequence, instances, row, self._solved, latest=latest)
+        found = schedule(self.plan, self.sequence, instances, row, self._solved, latest=latest)
         own = [gather for ring in self._solved for gather in ring.gatherings]
-        return found, [stage.gather for stage in found] + own
+        return found, found.gatherings + own
 
     def delayed_ports(self) -> list[PortName]:
         """The inputs that a ring feeds itself, for rings that are not solved as a whole."""
@@ -237,7 +249,31 @@ class Coupling:
             and has_feedthrough(self._system, connection)
         ]
 
-    def _solvable(self) -> list[Ring]:
+    def _order_taken(self) -> Order:
+        """The order that is asked for, or else the best one that the FMUs allow.
+
+        Raises:
+            InputError: values cannot pass through an FMU, and no other order will do.
+
+        """
+        order = self._experiment.order
+        if order not in (None, FEEDTHROUGH):
+            return order
+        if self._experiment.coupling == LINEAR:
+            return GAUSS_SEIDEL
+        tried: set[str] = set()
+        for connection in self._system.connections:
+            component = self._system.components[connection.source.component]
+            if component.digest in tried or not has_feedthrough(self._system, connection):
+                continue
+            tried.add(component.digest)
+            if why := why_not_following(component, self._instances[component.name], self._row):
+                if order is None:
+                    return GAUSS_SEIDEL
+                raise InputError(f"order {FEEDTHROUGH}: {why}; --order {GAUSS_SEIDEL} runs it")
+        return FEEDTHROUGH
+
+    def _solvable(self, order: Order) -> list[Ring]:
         """The rings that are solved in every step."""
         system, coupling = self._system, self._experiment.coupling
         if coupling == LINEAR:
@@ -249,14 +285,14 @@ class Coupling:
         else:
             for ring in self._rings:
                 reasons |= ring.unsolved()
-            for name, n in self._plan.decimations.items():
+            for name, n in self.plan.decimations.items():
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
         solved = rings(system, system.components.keys() - reasons.keys())
         if coupling == SOLVE:
             for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
                 raise InputError(f"coupling solve: {delay}")
-        for delay in delays(system, self._experiment.order, solved, reasons):
+        for delay in delays(system, order, solved, reasons):
             self._log.remark(delay)
         return [self._ring(names) for names in solved]
 

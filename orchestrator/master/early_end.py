@@ -7,7 +7,6 @@ same stage, have made their whole steps; the others are stepped in Python to whe
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from ctypes import c_double
 from dataclasses import replace
 from functools import partial
 
@@ -52,6 +51,7 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
     place = _place(run.stages, end)
     stage = run.stages[place]
     end = _stepped_on(stage, end, run.time, planned.length(run.made, _every(stage)))
+    run.passing = run.passing and _without_inputs(run.passing, end.component)
     shorter = _shorter(run, stage, end)
     reached = _reached(run)
     reached[end.component] = shorter.stop_time
@@ -61,14 +61,29 @@ def _finished(run: Run, end: Ended) -> Iterator[None]:
             if stage.decimation is None or stage.decimation.is_due(k - 1, shorter.rows - 1):
                 stage.gather(run.row.values)
                 _step_those_before(stage, run, planned, k, t, reached)
-        if not np.isfinite(run.row.shown).all():
-            return
-        run.blocks.append(after, run.row.shown)
+        if run.passing is None:
+            if not np.isfinite(run.row.shown).all():
+                return
+            run.blocks.append(after, run.row.shown)
         run.made, left = k, run.stages
         if k < shorter.rows - 1:
             yield
+            run.show()
     elsewhere = ", ".join(name for name, time in reached.items() if time != run.time)
     raise Ended(f"{end}; the last row has {elsewhere} at another time" if elsewhere else str(end))
+
+
+def _without_inputs(stages: Sequence[Stage], component: str) -> list[Stage]:
+    """Stages in which values pass, but not to a component that has ended the run."""
+    return [
+        stage._replace(
+            members=[
+                member._replace(set_inputs=[]) if member.instance.name == component else member
+                for member in stage.members
+            ]
+        )
+        for stage in stages
+    ]
 
 
 def _place(stages: Sequence[Stage], end: Ended) -> int:
@@ -103,17 +118,13 @@ def _stepped_on(stage: Stage, end: Ended, t: float, h: float) -> Ended:
     # Isolated ones have all begun their steps before the first is read.
     begun = at + 1 if stage.members[at].instance.is_here else len(names)
     for i, member in enumerate(stage.members):
-        idle = member._replace(set_inputs=[], do_step=_nothing)
+        idle = member._replace(set_inputs=[], do_step=None)
         try:
             step_members([idle if i < begun else member], t, h)
         except Ended as other:
             end = min(end, other, key=lambda one: one.time)
             step_members([idle], t, h)
     return end
-
-
-def _nothing(t: c_double, h: c_double, no_rollback: int) -> int:
-    return int(fmi2OK)
 
 
 def _shorter(run: Run, stage: Stage, end: Ended) -> Experiment:

@@ -13,10 +13,11 @@ from orchestrator.machine.errors import InputError
 from orchestrator.system.component import Component
 from orchestrator.system.structure import System
 
-#: Orders in which components are stepped; the first is the default.
-OrderName: TypeAlias = Literal["gauss-seidel", "jacobi"]
+#: Orders in which values pass and components are stepped; the first is the default where the FMUs
+#: allow it, else the second.
+OrderName: TypeAlias = Literal["feedthrough", "gauss-seidel", "jacobi"]
 ORDERS: tuple[OrderName, ...] = get_args(OrderName)
-GAUSS_SEIDEL, JACOBI = ORDERS
+FEEDTHROUGH, GAUSS_SEIDEL, JACOBI = ORDERS
 
 #: One of these, or the names of all components, one stepped after the other.
 Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
@@ -50,9 +51,9 @@ def read_order(text: str) -> Order:
     return cast(OrderName, text)
 
 
-def format_order(order: Order) -> str:
-    """Write an order as a command line has it."""
-    return order if isinstance(order, str) else ",".join(order)
+def format_order(order: Order | None) -> str:
+    """Write an order as a command line has it; empty: none is stated."""
+    return order if isinstance(order, str) else ",".join(order or ())
 
 
 class Exchange(NamedTuple):
@@ -81,7 +82,9 @@ class Experiment:
     Attributes:
         stop_time: end [s]; the last step is shorter if the run is not a multiple of the step.
         step: communication step [s].
-        order: in which components are stepped, one of :data:`ORDERS` or the names of all of them.
+        order: one of :data:`ORDERS`, or the names of all components, one stepped after the other;
+            None: `feedthrough` where the outputs of the FMUs follow their inputs between steps,
+            else `gauss-seidel`.
         start_time: begin [s].
         coupling: one of :data:`COUPLINGS`; None: rings are solved where their FMUs allow it, and
             else delayed.
@@ -90,7 +93,7 @@ class Experiment:
 
     stop_time: float
     step: float
-    order: Order = ORDERS[0]
+    order: Order | None = None
     start_time: float = 0.0
     coupling: str | None = None
 
@@ -108,8 +111,10 @@ class Experiment:
         self.check_step(self.step)
         if self.coupling not in (None, *COUPLINGS):
             raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
-        if self.coupling == LINEAR and not isinstance(self.order, str):
+        if self.coupling == LINEAR and self.order not in (None, GAUSS_SEIDEL, JACOBI):
             raise InputError("coupling linear steps all components at once: leave out the order")
+        if self.order is None:
+            return
         if not isinstance(self.order, str):
             object.__setattr__(self, "order", tuple(self.order))
         elif self.order not in ORDERS:
@@ -146,7 +151,7 @@ class Experiment:
         It is all inputs, and the outputs that follow from inputs of the same time. In feedthrough
         order they pass before the row shows them; in other orders the step computes them.
         """
-        return 0 if str(self.order) == "feedthrough" else 1
+        return 0 if self.order in (None, FEEDTHROUGH) else 1
 
     @property
     def full_steps(self) -> int:

@@ -17,7 +17,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Run
-from orchestrator.master.schedule import step_members
+from orchestrator.master.schedule import make_stages
 from orchestrator.master.stepper import compile_stepper, load_stepper, step_compiled
 
 #: Loops that can be asked for; the first is the default.
@@ -58,23 +58,21 @@ class Stepping(NamedTuple):
 def step_interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
     values, shown, append = run.row.values, run.row.shown, run.blocks.append
-    experiment, stages, steps = run.experiment, run.stages, run.experiment.rows - 1
+    experiment, stages, passing = run.experiment, run.stages, run.passing
+    last = experiment.rows - 1
     is_not_finite = _watch(shown)
     for k, t, h, end in experiment.steps(run.made):
-        for gather, members, decimation in stages:
-            if decimation is None:
-                # What most stages are costs no call.
-                if gather.is_plain:
-                    values[gather.targets] = values[gather.sources]
-                else:
-                    gather(values)
-                step_members(members, t, h)
-            elif decimation.is_due(k - 1, steps):
-                gather(values)
-                step_members(members, t, experiment.length(k - 1, decimation.every))
-        if is_not_finite():
-            return
-        append(end, shown)
+        step = k - 1, t, h
+        if passing is not None:
+            make_stages(passing, values, experiment, step, last)
+            if is_not_finite():
+                return
+            append(t, shown)
+        make_stages(stages, values, experiment, step, last)
+        if passing is None:
+            if is_not_finite():
+                return
+            append(end, shown)
         run.made = k
         yield
 

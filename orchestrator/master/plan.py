@@ -1,9 +1,12 @@
 """The plan of a run, checked before any FMU is loaded; its stages, and its identity.
 
-Every communication step has stages; which ones, if rings are solved, the loaded FMUs decide. Before
-a stage is stepped its inputs are gathered; the outputs of a component are read as soon as it was
-stepped.
+Every communication step has stages; which ones, the loaded FMUs decide where no order is stated or
+rings are solved. Before a stage is stepped its inputs are gathered; the outputs of a component are
+read as soon as it was stepped.
 
+- `feedthrough`: two parts. First values of t_k pass: a component whose outputs have direct
+  feedthrough takes its inputs and is read without a step, before those it feeds. The row shows
+  them. Then all components are stepped.
 - `jacobi`: one stage. All inputs are outputs of t_k.
 - `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
   stage than those it feeds, so they receive without delay what follows from t_k. Outputs
@@ -29,7 +32,15 @@ from pathlib import Path
 from platform import python_version
 
 from orchestrator.machine.errors import InputError, shortened
-from orchestrator.master.experiment import JACOBI, LINEAR, ORDERS, Experiment, Order, decimations
+from orchestrator.master.experiment import (
+    FEEDTHROUGH,
+    GAUSS_SEIDEL,
+    JACOBI,
+    LINEAR,
+    Experiment,
+    Order,
+    decimations,
+)
 from orchestrator.system.connection import Connection
 from orchestrator.system.graph import delayed_connections, derived_order, has_feedthrough, in_stages
 from orchestrator.system.names import PortName
@@ -138,14 +149,14 @@ def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -
     return in_stages(system, order, solved)
 
 
-def check_order(system: System, order: Order) -> None:
+def check_order(system: System, order: Order | None) -> None:
     """Check that an order that is stated names each component once.
 
     Raises:
         InputError: it does not.
 
     """
-    if isinstance(order, str):
+    if order is None or isinstance(order, str):
         return
     for name in order:
         system.component(name)
@@ -193,7 +204,7 @@ def gathered_connections(
     system: System,
     sequence: Sequence[Sequence[str]],
     solved: Sequence[Sequence[str]] = (),
-    order: Order = ORDERS[0],
+    order: Order = GAUSS_SEIDEL,
     *,
     latest: bool = False,
 ) -> list[list[Connection]]:
@@ -217,8 +228,8 @@ def gathered_connections(
         source, target = stage_of[start], stage_of[end]
         # An output without feedthrough is a state, and must be read before any component advances.
         at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
-        late = at_once and source < target
-        found[target if late else 0].append(connection)
+        there = order == FEEDTHROUGH or (at_once and source < target)
+        found[target if there else 0].append(connection)
     return found
 
 

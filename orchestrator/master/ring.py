@@ -169,34 +169,14 @@ class Ring:
         if len(self._targets) > _MOST_INPUTS:
             return dict.fromkeys(self.names, f"it has more than {_MOST_INPUTS} inputs")
         return {
-            name: f"no Real output of {name} follows a Real input between steps"
-            for name, part in zip(self.names, self._parts, strict=True)
-            if not self._responds(self._components[name], part)
+            part.instance.name: why
+            for part in self._parts
+            if (
+                why := why_not_following(
+                    self._components[part.instance.name], part.instance, part.row
+                )
+            )
         }
-
-    def _responds(self, component: Component, part: _Part) -> bool:
-        """Whether any output that is a Real follows any such input at the same time."""
-        inputs, outputs = (
-            {
-                self._columns[PortName(component.name, variable.name)]: variable
-                for variable in component.having(causality)
-                if type_of(variable) == "Real"
-            }
-            for causality in ("input", "output")
-        )
-        values, places = self._values, list(outputs)
-        here = values[places]
-        follows = False
-        for column, variable in inputs.items():
-            held = values[column]
-            values[column] = _near(held, variable)
-            part.exchange()
-            follows = not np.array_equal(values[places], here)
-            values[column] = held
-            if follows:
-                break
-        part.exchange()
-        return follows
 
     @property
     def is_closed(self) -> bool:
@@ -321,6 +301,43 @@ class Ring:
             if left < 1.0:
                 break
         return left
+
+
+def why_not_following(component: Component, instance: Instance, row: Row) -> str | None:
+    """Why values cannot pass through a component without a step; None: they can.
+
+    They can if any output that is a Real follows any such input.
+    """
+    inputs, outputs = (
+        {
+            row.columns[PortName(component.name, variable.name)]: variable
+            for variable in component.having(causality)
+            if type_of(variable) == "Real"
+        }
+        for causality in ("input", "output")
+    )
+    values, places = row.values, list(outputs)
+
+    def shown() -> np.ndarray:
+        instance.exchange()
+        row.show(component.name)
+        return values[places]
+
+    here = shown()
+    follows = False
+    for column, variable in inputs.items():
+        held = values[column]
+        values[column] = _near(held, variable)
+        follows = not np.array_equal(shown(), here, equal_nan=True)
+        values[column] = held
+        if follows:
+            break
+    shown()
+    return (
+        None
+        if follows
+        else (f"no Real output of {component.name} follows a Real input between steps")
+    )
 
 
 def _differ(

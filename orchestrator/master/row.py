@@ -71,6 +71,12 @@ class Row:
         self.strings = StringTable()
         self.standing: dict[PortName, Standing] = {}
         self._hidden: dict[PortName, int] = {}
+        self._direct = {
+            PortName(name, output.name)
+            for name, component in system.components.items()
+            for output in component.having("output")
+            if component.has_feedthrough(output.name)
+        }
         self._sources = {c.target: c.source for c in system.connections}
         self._ports: dict[str, list[tuple[PortName, str, str]]] = {name: [] for name in instances}
         self._inputs: dict[str, list[int]] = {}
@@ -128,11 +134,13 @@ class Row:
         """Where the inputs of a type are."""
         return self._inputs.get(fmi_type, [])
 
-    def wrong(self, components: Iterable[str]) -> str | None:
+    def wrong(self, components: Iterable[str], passed: bool = False) -> str | None:
         """The first value that is not finite or not of an input's type, in words.
 
         Args:
             components: in the order in which they are stepped: others may have passed it on.
+            passed: whether all values are of one time: then states come first, and of these what
+                no wrong input has reached.
 
         Returns:
             What is wrong and where it comes from; None: nothing is.
@@ -142,6 +150,18 @@ class Row:
         if fit and np.isfinite(self.shown).all():
             return None
         ports = [port for component in components for port in self._ports[component]]
+        if passed:
+            reached = {
+                port.component
+                for port, causality, _ in ports
+                if causality == "input" and not isfinite(self.values[self.columns[port]])
+            }
+            ports.sort(
+                key=lambda one: (
+                    one[1] == "input" or one[0] in self._direct,
+                    one[0].component in reached,
+                )
+            )
         passed_on = None
         for port, causality, fmi_type in ports:
             value = self.values[self.columns[port]]

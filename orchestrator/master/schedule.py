@@ -1,13 +1,16 @@
 """The stages of a communication step, as the loops make them.
 
-Rings of feedthroughs that are solved have stages of their own. Each is closed before its components
-are stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds
-it, and again when all have been stepped: every row shows its solution.
+In `feedthrough` order values pass first, then all components are stepped. Rings of feedthroughs
+that are solved are closed where values come to them.
+
+In other orders such rings have stages of their own. Each is closed before its components are
+stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds it,
+and again when all have been stepped: every row shows its solution.
 
 A component may span n communication steps in one step. It is stepped at every n-th t_k, with
-the inputs of that time, which it holds. What it computes waits in hidden columns of the row: from
-there outputs with direct feedthrough, which hold from t_k on, are shown at once, unless the order
-is `jacobi`; all others when the time has come that they belong to.
+the inputs of that time, which it holds. What it computes waits in hidden columns of the row until
+the time has come that it belongs to. Outputs with direct feedthrough hold from t_k on: they are
+shown when they pass, or as soon as the component was stepped, unless the order is `jacobi`.
 """
 
 from __future__ import annotations
@@ -17,9 +20,10 @@ from ctypes import c_double
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.master.experiment import JACOBI, Order
+from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, restore_mode
 from orchestrator.master.fmi.transfer import CMember, CMove, DoStepCallback, address_of
@@ -32,10 +36,10 @@ from orchestrator.system.names import PortName
 
 
 class Member(NamedTuple):
-    """The calls that step one component."""
+    """The calls that step one component, or let values pass through it."""
 
     set_inputs: list[Callable[[], int]]
-    do_step: Callable[[c_double, c_double, int], int]
+    do_step: Callable[[c_double, c_double, int], int] | None
     get_outputs: list[Callable[[], int]]
     instance: Instance | StageCall
 
@@ -98,10 +102,9 @@ class Decimation(NamedTuple):
     at_end: bool = False
 
     def is_due(self, k: int, steps: int) -> bool:
-        """Whether in the communication step after the k-th of so many."""
-        if self.at_end:
-            return (k + 1) % self.every == 0 or k + 1 == steps
-        return k % self.every == 0
+        """Whether in the communication step after the k-th of so many, or at the end of all."""
+        k += self.at_end
+        return k % self.every == 0 or k == steps
 
 
 class Stage(NamedTuple):
@@ -118,6 +121,30 @@ class Stage(NamedTuple):
     members: list[Member]
     decimation: Decimation | None = None
 
+    @property
+    def acts(self) -> bool:
+        """Whether there is anything to do."""
+        return bool(self.members or len(self.gather.targets))
+
+
+class Schedule(NamedTuple):
+    """The stages of every communication step.
+
+    Attributes:
+        stepping: in which all components are stepped.
+        passing: in which values of t_k pass before a row shows them and all are stepped; None: the
+            row is shown once all have been stepped.
+
+    """
+
+    stepping: list[Stage]
+    passing: list[Stage] | None = None
+
+    @property
+    def gatherings(self) -> list[Gathering]:
+        """What is gathered in them."""
+        return [stage.gather for stage in (*(self.passing or ()), *self.stepping)]
+
 
 def schedule(
     plan: Plan,
@@ -127,11 +154,11 @@ def schedule(
     rings: Sequence[Ring] = (),
     *,
     latest: bool = False,
-) -> list[Stage]:
+) -> Schedule:
     """The stages of every step.
 
     Args:
-        plan: what is run.
+        plan: what is run, in an order that is not left open.
         sequence: its components in :func:`.plan.stages`.
         instances: of all components.
         row: that they are tied to.
@@ -140,23 +167,23 @@ def schedule(
 
     """
     system, order, decimation = plan.system, plan.experiment.order, plan.decimations
+    assert order is not None
+    gathers = gathered_connections(
+        system, sequence, [ring.names for ring in rings], order, latest=latest
+    )
+    if order == FEEDTHROUGH:
+        return _passing_first(plan, sequence, gathers, instances, row, rings)
     ring_of = {ring.names[0]: ring for ring in rings}
     renewed = [Stage(Gathering.along(row, ()), [_action(ring.renew)]) for ring in rings]
     found: list[Stage] = []
     shown: list[Stage] = []
     nothing = Gathering.along(row, ())
-    solved = [ring.names for ring in rings]
-    gathers = gathered_connections(system, sequence, solved, order, latest=latest)
     for names, connections in zip(sequence, gathers, strict=True):
-        taken: dict[int, list[Connection]] = {1: []}
-        for connection in connections:
-            taken.setdefault(decimation[connection.target.component], []).append(connection)
+        slow, gathering = _gatherings(connections, decimation, row)
+        found += slow
         fast = Stage(
-            Gathering.along(row, taken.pop(1)),
-            [member(instances[name]) for name in names if decimation[name] == 1],
+            gathering, [member(instances[name]) for name in names if decimation[name] == 1]
         )
-        # All inputs are gathered before any component is stepped.
-        found += [Stage(Gathering.along(row, some), [], Decimation(n)) for n, some in taken.items()]
         here = [ring_of[name] for name in names if name in ring_of]
         if here:
             # All are stepped before one takes what another has come to.
@@ -178,7 +205,80 @@ def schedule(
                 ]
                 shown.append(Stage(later, [], Decimation(n, at_end=True)))
     found += shown + renewed
-    return [stage for stage in found if stage.members or len(stage.gather.targets)]
+    return Schedule([stage for stage in found if stage.acts])
+
+
+def _passing_first(
+    plan: Plan,
+    sequence: Sequence[Sequence[str]],
+    gathers: Sequence[Sequence[Connection]],
+    instances: Mapping[str, Instance],
+    row: Row,
+    rings: Sequence[Ring],
+) -> Schedule:
+    """The stages in feedthrough order."""
+    components, decimation = plan.system.components, plan.decimations
+    nothing = Gathering.along(row, ())
+    outputs = {
+        name: [PortName(name, output.name) for output in component.having("output")]
+        for name, component in components.items()
+    }
+    direct = {
+        name: [port for port in ports if components[name].has_feedthrough(port.port)]
+        for name, ports in outputs.items()
+    }
+    ringed = {name for ring in rings for name in ring.names}
+    passing: list[Stage] = []
+    for names, connections in zip(sequence, gathers, strict=True):
+        slow, gathering = _gatherings(
+            [one for one in connections if one.target.component not in ringed], decimation, row
+        )
+        through = [name for name in names if direct[name] and name not in ringed]
+        fast = [_passed(instances[name]) for name in through if decimation[name] == 1]
+        passing += [*slow, Stage(gathering, fast)]
+        for name in through:
+            if (n := decimation[name]) > 1:
+                passing += [
+                    Stage(nothing, [_passed(instances[name])], Decimation(n)),
+                    Stage(Gathering(*row.hidden(direct[name])), [], Decimation(n)),
+                ]
+        passing += [
+            Stage(nothing, [_action(partial(ring.renew, True))])
+            for ring in rings
+            if ring.names[0] in names
+        ]
+    place = {name: i for i, names in enumerate(sequence) for name in names}
+    # What passes is read there, and before only where something takes it before.
+    early = {
+        one.source.component
+        for one in plan.system.connections
+        if place[one.source.component] >= place[one.target.component]
+    }
+    stepping: list[Stage] = []
+    later: list[Stage] = []
+    for n in sorted(set(decimation.values())):
+        here = [name for name in place if decimation[name] == n]
+        members = [
+            _stepped(instances[name], name in early or n > 1) if direct[name] else whole
+            for name in here
+            for whole in [member(instances[name])]
+        ]
+        stepping.append(Stage(nothing, members, Decimation(n) if n > 1 else None))
+        if n > 1:
+            ports = [port for name in here for port in outputs[name]]
+            later.append(Stage(Gathering(*row.hidden(ports)), [], Decimation(n, at_end=True)))
+    return Schedule(*([one for one in all_ if one.acts] for all_ in (stepping + later, passing)))
+
+
+def _gatherings(
+    connections: Sequence[Connection], decimation: Mapping[str, int], row: Row
+) -> tuple[list[Stage], Gathering]:
+    """What components that take longer steps gather, and the others, before any is stepped."""
+    taken: dict[int, list[Connection]] = {1: []}
+    for connection in connections:
+        taken.setdefault(decimation[connection.target.component], []).append(connection)
+    fast = Gathering.along(row, taken.pop(1))
+    return [Stage(Gathering.along(row, some), [], Decimation(n)) for n, some in taken.items()], fast
 
 
 def _action(act: Callable[[], object]) -> Member:
@@ -201,8 +301,53 @@ def member(instance: Instance) -> Member:
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
+def _passed(instance: Instance) -> Member:
+    """The calls that let values pass through an instance."""
+    return Member(instance.set_inputs, instance.do_exchange, instance.get_outputs, instance)
+
+
+def _stepped(instance: Instance, is_read: bool) -> Member:
+    """The calls that step an instance which has its inputs already."""
+    # The answer of another process has to be taken.
+    outputs = instance.get_outputs if is_read or not instance.is_here else []
+    return Member([], instance.do_step, outputs, instance)
+
+
+def make_stages(
+    stages: Sequence[Stage],
+    values: np.ndarray,
+    experiment: Experiment,
+    step: tuple[int, float, float],
+    last: int,
+) -> None:
+    """Make some stages of a step.
+
+    Args:
+        stages: to make.
+        values: of the row.
+        experiment: that the step belongs to.
+        step: how many were made before, its beginning and its length [s].
+        last: how many there are.
+
+    """
+    k, t, h = step
+    for gather, members, decimation in stages:
+        if decimation is None:
+            # What most stages are costs no call.
+            if gather.is_plain:
+                values[gather.targets] = values[gather.sources]
+            else:
+                gather(values)
+            step_members(members, t, h)
+        elif decimation.is_due(k, last):
+            gather(values)
+            step_members(members, t, experiment.length(k, decimation.every))
+
+
 def step_members(members: Sequence[Member], t: float, h: float, is_final: bool = True) -> None:
     """Step the components of a stage, which may run side by side until their outputs are asked.
+
+    Values only pass through a component whose calls have no step.
 
     Args:
         members: the components.
@@ -216,7 +361,11 @@ def step_members(members: Sequence[Member], t: float, h: float, is_final: bool =
         for call in set_inputs:
             if (status := call()) != fmi2OK and status != fmi2Warning:
                 raise instance.failed(status, SET_INPUTS)
-        if (status := do_step(time, length, is_final)) != fmi2OK and status != fmi2Warning:
+        if (
+            do_step is not None
+            and (status := do_step(time, length, is_final)) != fmi2OK
+            and status != fmi2Warning
+        ):
             raise instance.failed(status, DO_STEP)
         # To call a function that looks costs more than to look.
         if A * B * C != PRODUCT:

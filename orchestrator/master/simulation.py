@@ -73,6 +73,7 @@ def simulate_plan(
             row = Row(system, instances, slow)
             coupling = Coupling(plan, instances, row, log, exchange)
             coupling.initialise()
+            experiment = coupling.plan.experiment
             header = Header(
                 tuple(map(str, row.columns)),
                 experiment,
@@ -85,11 +86,12 @@ def simulate_plan(
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
             interrupts.hand_over = blocks.hand_over
-            blocks.append(experiment.start_time, row.shown)
+            if scheduled.passing is None:
+                blocks.append(experiment.start_time, row.shown)
             overrides = Overrides(row, gatherings, system.connections)
             run = Run(
-                system, experiment, instances, row, scheduled, overrides, blocks, log, interrupts,
-                hooks,
+                system, experiment, instances, row, scheduled.stepping, scheduled.passing,
+                overrides, blocks, log, interrupts, hooks,
             )  # fmt: skip
             order = [name for names in coupling.sequence for name in names]
             remark = None
@@ -201,11 +203,13 @@ def _advance(
             if run.interrupts.numbers:
                 failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
                 break
+        run.show()
     except ComponentFailed as error:
         failure = f"stopped at t = {run.time:.12g} s: {error}"
     except KeyboardInterrupt:
         failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
     except Ended as end:
+        run.show()
         blocks.hand_over()
         raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
     except (InputError, NotKept):
@@ -214,8 +218,8 @@ def _advance(
         failure = f"stopped at t = {run.time:.12g} s: {unforeseen(error)}"
     surroundings.put_back()
     # Also where another component has refused it in the same step.
-    if wrong := run.row.wrong(order):
-        failure = f"stopped at t = {run.experiment.time(run.made + 1):.12g} s: {wrong}"
+    if wrong := run.row.wrong(order, run.passing is not None):
+        failure = f"stopped at t = {run.experiment.time(blocks.count):.12g} s: {wrong}"
     blocks.hand_over()
     return failure
 

@@ -90,7 +90,10 @@ typedef struct {
 typedef struct {
     const stage *stages;
     double *values; /* the row of all values: first the ones that are shown, then the hidden */
-    size_t n_stages, n_shown;
+    size_t n_stages;
+    size_t shown_after; /* so many of the stages: a row shows what values have passed in them, and
+                           all others follow; if it is all of them, it shows the end of the step */
+    size_t n_shown;
     double start_time, step, stop_time;
     size_t full_steps, steps; /* if there is one more of all steps, it is shorter */
 } run;
@@ -246,9 +249,11 @@ static int outputs_failed(const stage *this, int careful, failure *why) {
     return 0;
 }
 
+/* Values only pass through a component that has no such function. */
 static int do_step(const member *it, double t, double h) {
     told_by_step *told = it->told;
     int status;
+    if (it->do_step.fmi2 == NULL) return 0;
     if (told == NULL) return it->do_step.fmi2(it->component, t, h, 1);
     status = it->do_step.fmi3(it->component, t, h, true, &told->event, &told->terminate,
                               &told->early, &told->last);
@@ -315,10 +320,10 @@ static double length_of(const run *this, size_t k, size_t n) {
     return (double)(this->full_steps - k) * this->step;
 }
 
-/* Make the step after the k-th; whether a component failed. */
-static int step_failed(const run *this, size_t k, failure *why) {
+/* Make some stages of the step after the k-th; whether a component failed. */
+static int stages_failed(const run *this, size_t first, size_t end, size_t k, failure *why) {
     const double t = time_after(this, k), h = length_of(this, k, 1);
-    for (why->stage = 0; why->stage < this->n_stages; why->stage++) {
+    for (why->stage = first; why->stage < end; why->stage++) {
         const stage *it = &this->stages[why->stage];
         const int slow = it->every > 1;
         if (slow && !is_due(it, k, this->steps)) continue;
@@ -340,22 +345,28 @@ static int all_finite(const double values[], size_t n) {
     return sum == 0.0;
 }
 
-/* Make the steps from the k-th on, until so many are made. */
-EXPORTED int advance(const run *this, size_t k, size_t until, double patience, block *rows,
+/* Make the steps that are left until so many are made, and count them. */
+EXPORTED int advance(const run *this, size_t *made, size_t until, double patience, block *rows,
                      failure *why) {
+    const int shown_at_end = this->shown_after == this->n_stages;
     const double due = now() + patience;
     double last = due - patience;
     int unasked = 1; /* steps until the clock is asked again, which takes as long as an FMI call */
-    for (; k < until && rows->n < rows->most; k++) {
+    while (*made < until && rows->n < rows->most) {
         double *row = rows->rows + rows->n * (1 + this->n_shown);
-        if (step_failed(this, k, why)) {
+        if (stages_failed(this, 0, this->shown_after, *made, why)) {
             put_back();
             return FAILED;
         }
         if (!all_finite(this->values, this->n_shown)) return NOT_FINITE;
-        row[0] = time_after(this, k + 1);
+        row[0] = time_after(this, *made + shown_at_end);
         memcpy(row + 1, this->values, this->n_shown * sizeof *row);
         rows->n++;
+        if (stages_failed(this, this->shown_after, this->n_stages, *made, why)) {
+            put_back();
+            return FAILED;
+        }
+        ++*made;
         if (--unasked == 0) {
             const double present = now();
             if (present >= due) break;

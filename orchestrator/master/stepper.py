@@ -20,7 +20,7 @@ from orchestrator.master.fmi.instance import CALLS
 from orchestrator.master.fmi.transfer import CMember
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import CBlock
-from orchestrator.master.schedule import Decimation, Stage
+from orchestrator.master.schedule import Decimation, Member, Stage
 
 SOURCE = Path(__file__).with_name("stepper.c")
 
@@ -73,6 +73,7 @@ class CRun(Structure):
         ("stages", POINTER(CStage)),
         ("values", c_void_p),
         ("n_stages", c_size_t),
+        ("shown_after", c_size_t),
         ("n_shown", c_size_t),
         ("start_time", c_double),
         ("step", c_double),
@@ -93,15 +94,16 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
     advance = library.advance
     advance.restype = c_int
     advance.argtypes = (
-        POINTER(CRun), c_size_t, c_size_t, c_double, POINTER(CBlock),
+        POINTER(CRun), POINTER(c_size_t), c_size_t, c_double, POINTER(CBlock),
         POINTER(CFailure),
     )  # fmt: skip
-    stages, row, experiment, blocks = run.stages, run.row, run.experiment, run.blocks
-    steps = experiment.rows - 1
+    row, experiment, blocks = run.row, run.experiment, run.blocks
+    stages, steps = [*(run.passing or ()), *run.stages], experiment.rows - 1
     c_run = CRun(
         (CStage * len(stages))(*map(_laid_out, stages)),
         row.values.ctypes.data,
         len(stages),
+        len(stages) if run.passing is None else len(run.passing),
         len(row.shown),
         experiment.start_time,
         experiment.step,
@@ -109,14 +111,14 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
         experiment.full_steps,
         steps,
     )
-    block, failure = blocks.block, CFailure()
+    block, failure, made = blocks.block, CFailure(), c_size_t(run.made)
     outcome = _DUE
     while outcome == _DUE and run.made < steps:
         if block.n == block.most:
             blocks.hand_over()
-        before = block.n
-        outcome = advance(c_run, run.made, min(run.due, steps), _GLANCE, block, failure)
-        run.made += block.n - before
+        made.value = run.made
+        outcome = advance(c_run, made, min(run.due, steps), _GLANCE, block, failure)
+        run.made = made.value
         yield
     if outcome == _FAILED:
         member = stages[failure.stage].members[failure.member]
@@ -124,7 +126,7 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
 
 
 def _laid_out(stage: Stage) -> CStage:
-    gather, members = stage.gather, [member.instance.pointers() for member in stage.members]
+    gather, members = stage.gather, [_pointers(member) for member in stage.members]
     mappings = [_mapping(place, gather.mapped[place]) for place in sorted(gather.mapped)]
     return CStage(
         *(array.ctypes.data for array in (gather.targets, gather.sources)),
@@ -136,6 +138,15 @@ def _laid_out(stage: Stage) -> CStage:
         len(members),
         *(stage.decimation or Decimation(1)),
     )
+
+
+def _pointers(member: Member) -> CMember:
+    pointers = member.instance.pointers()
+    if member.do_step is None:
+        pointers.do_step = None
+    pointers.n_inputs *= bool(member.set_inputs)
+    pointers.n_outputs *= bool(member.get_outputs)
+    return pointers
 
 
 def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:

@@ -19,7 +19,7 @@ from auv_fmu.disturbance import Disturbance
 from auv_fmu.euler import STEP
 from auv_fmu.motion_planner import TAU_D
 from auv_fmu.vehicle import Vehicle
-from orchestrator.master.experiment import ORDERS, OrderName
+from orchestrator.master.experiment import JACOBI, OrderName
 from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,
@@ -167,7 +167,7 @@ OF_RUNS = (
         "order",
         (
             Option("everything at t_k"),
-            Option("Jacobi, 20 ms late", order=ORDERS[1]),
+            Option("Jacobi, 20 ms late", order=JACOBI),
         ),
     ),
     Choice(
@@ -251,7 +251,7 @@ def run_of(scenario: str, combination: Sequence[Option], number: int = 0) -> Poi
     parameters = {
         name: value for option in combination for name, value in option.parameters.items()
     }
-    order = next((option.order for option in combination if option.order), ORDERS[0])
+    order = next((option.order for option in combination if option.order), None)
     return Point(number, scenario, parameters, END_TIMES[-1], STEP, order)
 
 

@@ -9,7 +9,13 @@ from pathlib import Path
 
 from auv_fmu.euler import STEP
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import GAUSS_SEIDEL, ORDERS, SOLVE, Experiment, with_common_step
+from orchestrator.master.experiment import (
+    FEEDTHROUGH,
+    GAUSS_SEIDEL,
+    SOLVE,
+    Experiment,
+    with_common_step,
+)
 from orchestrator.master.fmi.isolated import Isolation, isolation_of
 from orchestrator.master.hooks.events import Alter, Event, Events, Set
 from orchestrator.master.hooks.hook import Hook
@@ -154,9 +160,9 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     if step is None:
         system = with_common_step(system)
         step = DEFAULT_STEP if system.step is None else system.step
-    order = request.order or scenario.order or ORDERS[0]
+    order = request.order or scenario.order or None
     coupling = first_given(request.coupling, scenario.coupling)
-    if request.strict and coupling is None and order == GAUSS_SEIDEL:
+    if request.strict and coupling is None and order in (None, FEEDTHROUGH, GAUSS_SEIDEL):
         coupling = SOLVE
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     plan = make_plan(system, experiment)

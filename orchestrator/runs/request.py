@@ -15,6 +15,8 @@ from typing import Annotated, Any, get_type_hints
 from fmus.kinds import AUTO, KINDS, KindName
 from orchestrator.master.experiment import (
     COUPLINGS,
+    FEEDTHROUGH,
+    GAUSS_SEIDEL,
     ORDERS,
     CouplingName,
     Order,
@@ -113,8 +115,9 @@ class Request:
     order: Annotated[
         Order | None,
         CliOption(
-            f"order in which components are stepped: {', '.join(ORDERS)}, or the names of all "
-            f"components; default: from the scenario, else {ORDERS[0]}",
+            f"order in which values pass and components are stepped: {', '.join(ORDERS)}, or the "
+            f"names of all components; default: from the scenario, else {FEEDTHROUGH} where the "
+            f"outputs of the FMUs follow their inputs between steps, else {GAUSS_SEIDEL}",
             type=read_order,
             metavar=f"{'|'.join(ORDERS)}|NAME,...",
         ),

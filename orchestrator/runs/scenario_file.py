@@ -129,8 +129,9 @@ class ScenarioFile(TomlTable):
         "none",
     )
     order: Names = entry(
-        "Order in which components are stepped: `gauss-seidel`, `jacobi`, or the names of all of "
-        "them.",
+        "Order in which values pass and components are stepped: `feedthrough`, `gauss-seidel`, "
+        "`jacobi`, or the names of all components.",
+        "`feedthrough` where the outputs of the FMUs follow their inputs between steps, else "
         "`gauss-seidel`",
     )
     coupling: Annotated[str, OneOf(COUPLINGS)] = entry(

@@ -102,9 +102,10 @@ def simulate(
         stop_time: end of the run [s]; None: the scenario's own.
         step: communication step [s]; None: the scenario's own, else the longest that divides the
             default steps of the FMUs, else 0.02.
-        order: `gauss-seidel`, the paper's scheme, `jacobi`, the scheme of most tools, or the names
-            of all components, stepped one after the other; None: the scenario's own, else
-            `gauss-seidel`.
+        order: `feedthrough`, values of one time pass before all are stepped, `gauss-seidel`, the
+            paper's scheme, `jacobi`, the scheme of most tools, or the names of all components,
+            stepped one after the other; None: the scenario's own, else `feedthrough` where the
+            outputs of the FMUs follow their inputs between steps, else `gauss-seidel`.
         kind: kind of the bundle's FMUs: `python`, `native`, translated to C with the same numbers,
             or `auto`, native where available.
         progress: show a bar on runs that take longer than some seconds.

@@ -23,7 +23,7 @@ from orchestrator.master.experiment import JACOBI, ORDERS, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
-from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.bundle import BUNDLE_ORDER, current_fmus
 from orchestrator.studies.batch.kernel import (
     END,
     RunSteps,
@@ -206,9 +206,9 @@ def _job(loop: _Loop, point: Point) -> _Job:
     changed = [system.component(name.component).variable(name.port) for name in changes]
     if any(variable.causality != "parameter" for variable in changed):
         system.check()
-    experiment = Experiment(point.stop_time, point.step, point.order)
-    if point.order not in ORDERS:
-        raise InputError(f"the batch engine has only the orders {' and '.join(ORDERS)}; {_OTHER}")
+    experiment = Experiment(point.stop_time, point.step, point.order or BUNDLE_ORDER)
+    if experiment.order not in ORDERS:
+        raise InputError(f"the batch engine has only the orders {', '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
     full, stop = experiment.full_steps, experiment.stop_time

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import read_archive
-from orchestrator.master.experiment import ORDERS, Order
+from orchestrator.master.experiment import Order
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
 from orchestrator.master.plan import code_of, make_plan
 from orchestrator.runs.preparation import Prepared
@@ -43,7 +43,7 @@ class Point(NamedTuple):
     parameters: Mapping[str, Any]
     stop_time: float
     step: float
-    order: Order = ORDERS[0]
+    order: Order | None = None
     start_time: float = 0.0
 
     @property

@@ -326,7 +326,7 @@ def faster(space: Space, engine: Engine, means: Means) -> str:
 
 def _unknown_to_batch(experiment: Experiment) -> str:
     """What the batch engine would not do of an experiment, in words."""
-    order = experiment.order if experiment.order in ORDERS else ORDERS[0]
+    order = experiment.order if experiment.order in ORDERS else None
     length = experiment.stop_time - experiment.start_time
     made = vars(Experiment(length, experiment.step, order)) | {"stop_time": experiment.stop_time}
     different = [name for name, value in vars(experiment).items() if value != made[name]]

@@ -14,7 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orchestrator import Result, load, simulate
-from random_systems.evaluator import DELAY, GAUSS_SEIDEL, JACOBI, SOLVE, NoSolution, evaluate
+from random_systems.evaluator import (
+    DELAY,
+    GAUSS_SEIDEL,
+    JACOBI,
+    SOLVE,
+    NoSolution,
+    default_order,
+    evaluate,
+)
 from random_systems.generator import draw, write
 
 LOOPS = ("python", "compiled")
@@ -59,7 +67,9 @@ def outcomes(seed: int) -> Iterator[Outcome]:
     with TemporaryDirectory(prefix="random") as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         path = write(drawn, Path(folder))
-        for order, coupling in product((GAUSS_SEIDEL, JACOBI, tuple(names)), (SOLVE, DELAY)):
+        default = default_order(drawn)
+        orders = dict.fromkeys((default, GAUSS_SEIDEL, JACOBI, tuple(names)))
+        for order, coupling in product(orders, (SOLVE, DELAY)):
             text = order if isinstance(order, str) else ",".join(order)
             text += f" {coupling}"
             try:
@@ -72,26 +82,30 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             elif not has_rings:
                 continue
             ways: list[dict[str, Any]] = [{"loop": loop} for loop in LOOPS]
-            if seed % _ISOLATED == 0 and order == GAUSS_SEIDEL:
+            if seed % _ISOLATED == 0 and order == default:
                 ways.append({"isolate": True})
+            if order == default:
+                # Nobody need name it.
+                ways[0]["order"] = None
             for way in ways:
                 how = f"{text} {way.get('loop', 'isolated')}"
                 try:
                     system = path if random.random() < 0.5 or drawn.as_scenario else load(path)
                     result = simulate(
                         system,
-                        order=order,
                         step=drawn.step,
                         stop_time=drawn.stop_time,
                         # Rings that cannot be solved are delayed, if nothing is said.
                         coupling=None if coupling == SOLVE else coupling,
-                        **way,
+                        **{"order": order} | way,
                     )
                 except ValueError as error:
                     yield Outcome(seed, how, REFUSED, str(error))
                     continue
-                rows = evaluation.rows
-                if drawn.strong and evaluation.late:
+                rows, taken = evaluation.rows, result.header.experiment.order
+                if taken != order:
+                    why = f"it was run in {taken} order"
+                elif drawn.strong and evaluation.late:
                     # It may have to end early.
                     soon = min(_SOON, len(result))
                     why = difference(result, rows[:soon], _GROWING)

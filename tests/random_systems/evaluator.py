@@ -1,7 +1,11 @@
 """What a system shows in every row, by brute force: from its description, and from no schedule.
 
-An output is a list of values, each with the number of the time from which on it holds. Formulas
-are computed as they stand; nothing here is taken from the master.
+Formulas are computed as they stand; nothing here is taken from the master.
+
+Feedthrough order follows from what FMI says of a communication point: there an output is a function
+of the states, the inputs and the time (FMI 2.0.4, section 2.2.8), and doStep leads from one point
+to the next with the inputs of the first (section 4.2.2). So a row holds what is true at its time:
+every input has what feeds it, and every output follows from the inputs of the same row.
 """
 
 from __future__ import annotations
@@ -27,7 +31,7 @@ from random_systems.generator import (
     reached,
 )
 
-GAUSS_SEIDEL, JACOBI = "gauss-seidel", "jacobi"
+FEEDTHROUGH, GAUSS_SEIDEL, JACOBI = "feedthrough", "gauss-seidel", "jacobi"
 DELAY, SOLVE = "delay", "solve"
 
 #: Rounds of a ring until its values must be at rest, and what counts as rest.
@@ -115,6 +119,8 @@ class Machine:
             if one.causality != "output"
         }
         self.states = [state.start for state in part.fmu.states]
+        # What is computed in steps only, between them.
+        self._held: dict[str, Any] = {}
 
     def _scope(self, h: float = 0.0) -> dict[Any, Any]:
         scope: dict[Any, Any] = {"time": self.time, "length": h}
@@ -126,7 +132,9 @@ class Machine:
         return scope
 
     def output(self, name: str) -> Any:
-        """An output with the inputs, states and time of now."""
+        """An output with the inputs, states and time of now, or those of the end of the step."""
+        if name in self._held:
+            return self._held[name]
         value = value_of(self.fmu.outputs[name], self._scope())
         if isinstance(value, float) and not isfinite(value):
             raise NoSolution(name)
@@ -137,6 +145,13 @@ class Machine:
         scope = self._scope(h)
         self.states = [value_of(state.next, scope) for state in self.fmu.states]
         self.time = t + h
+        self.hold()
+
+    def hold(self) -> None:
+        """Compute outputs for the time until the next step, if that is done in steps only."""
+        self._held = {}
+        if not self.fmu.responds:
+            self._held = {one.name: self.output(one.name) for one in self.fmu.having("output")}
 
 
 def has_feedthrough(fmu: Fmu, output: str) -> bool:
@@ -144,6 +159,26 @@ def has_feedthrough(fmu: Fmu, output: str) -> bool:
     if fmu.declares in (ABSENT, UNLISTED):
         return True
     return bool(fmu.having("input") if fmu.declares == ALL else fmu.needs(output))
+
+
+def follows(fmu: Fmu) -> bool:
+    """Whether any output that is a Real follows any input that is one, at once."""
+    return fmu.responds and any(
+        fmu.named(one).type == "Real"
+        for output in fmu.having("output")
+        if output.type == "Real"
+        for one in fmu.needs(output.name)
+    )
+
+
+def default_order(drawn: Drawn) -> str:
+    """The order of a run for which none is stated."""
+    passing = [
+        drawn.parts[a].fmu
+        for a, output in {wire.source for wire in drawn.wires}
+        if has_feedthrough(drawn.parts[a].fmu, output)
+    ]
+    return FEEDTHROUGH if all(map(follows, passing)) else GAUSS_SEIDEL
 
 
 def components(nodes: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> list[list[Any]]:
@@ -210,22 +245,14 @@ class Evaluation:
         responding = set()
         for ring in components(names, edges):
             if is_ring(ring, edges):
-                responding |= {name for name in ring if self._responds(name)}
+                responding |= {
+                    name
+                    for name in ring
+                    if self.drawn.parts[name].every == 1 and follows(self.drawn.parts[name].fmu)
+                }
         rest = [(a, b) for a, b in edges if a in responding and b in responding]
         found = components([name for name in names if name in responding], rest)
         return [sorted(ring, key=names.index) for ring in found if is_ring(ring, rest)]
-
-    def _responds(self, name: str) -> bool:
-        """Whether any output that is a Real follows any input that is one, at once."""
-        part = self.drawn.parts[name]
-        if not part.fmu.responds or part.every > 1:
-            return False
-        return any(
-            part.fmu.named(one).type == "Real"
-            for output in part.fmu.having("output")
-            if output.type == "Real"
-            for one in part.fmu.needs(output.name)
-        )
 
     def _late(self) -> set[int]:
         """The wires with feedthrough that arrive one step late, by their identities."""
@@ -429,8 +456,13 @@ class Evaluation:
     def _run(self) -> None:
         drawn = self.drawn
         self._settle(drawn.wires)
+        for machine in self.machines.values():
+            machine.hold()
         shown = self._computed(list(drawn.parts))
         self._show(shown)
+        if self.order == FEEDTHROUGH:
+            self._run_in_feedthrough_order(shown)
+            return
         spans, batches = self._steps(), self._batches()
         # What will be shown once the time has come that it belongs to.
         waiting: dict[Port, tuple[int, Any]] = {}
@@ -457,6 +489,30 @@ class Evaluation:
             for ring in self.rings:
                 self._renew(ring, shown)
                 shown |= self._computed(ring)
+            self._show(shown)
+
+    def _run_in_feedthrough_order(self, shown: dict[Port, Any]) -> None:
+        """Steps, each to a time at which every input takes what feeds it then."""
+        parts, spans = self.drawn.parts, self._steps()
+        for k, (t, _) in enumerate(spans):
+            for name, part in parts.items():
+                if k % part.every == 0:
+                    end = spans[min(k + part.every, len(spans)) - 1][1]
+                    self.machines[name].step(t, end - t)
+            # Others are in the middle of a longer step.
+            here = {
+                name
+                for name, part in parts.items()
+                if (k + 1) % part.every == 0 or k + 1 == len(spans)
+            }
+            shown |= self._computed(list(here))
+            before = dict(shown)
+            for members in self._sequence():
+                if here.issuperset(members):
+                    for wire in self._outer(members):
+                        self._hand(wire, (before if id(wire) in self.late else shown)[wire.source])
+                    self._settle(self._inner(members))
+                    shown |= self._computed(members)
             self._show(shown)
 
     def _advance(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fmus.ports.quantities import ETA, NU, TAU
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, Experiment, Order
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
@@ -32,7 +32,9 @@ UNITS = {
 }
 
 
-def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Table:
+def loop_table(
+    n: int = 400, without: Collection[str] = (), seed: int = 1, order: Order | None = None
+) -> Table:
     """A closed loop whose signals swing; limits are +-80, ell is 0.35 m."""
     columns = tuple(name for name in COLUMNS if name not in without)
     time = STEP * np.arange(n)
@@ -43,7 +45,7 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
         STANDARD.upper_limits, 80.0
     )
     known = {port_name(name): value for name, value in parameters.items() if name not in without}
-    experiment = Experiment(max(n - 1, 1) * STEP, STEP)
+    experiment = Experiment(max(n - 1, 1) * STEP, STEP, order)
     return Table.of(Header(columns, experiment, known, units=UNITS), rows)
 
 
@@ -52,8 +54,7 @@ def at_its_time(table: Table, acting: Collection[str]) -> Table:
 
     The last row then holds what never acts: here it is no number.
     """
-    experiment = replace(table.header.experiment)
-    object.__setattr__(experiment, "order", "feedthrough")
+    experiment = replace(table.header.experiment, order=FEEDTHROUGH)
     rows = table.rows.copy()
     places = [table.header.place[name] for name in acting if name in table]
     rows[:-1, places] = table.rows[1:, places]

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from auv_fmu import plant
 from auv_fmu.closed_loop import Instant, Setting
 from auv_fmu.closed_loop import closed_loop as straight_line
 from auv_fmu.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, ORDERS, Experiment, Order
+from orchestrator.runs.bundle import BUNDLE_ORDER
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies import batch_engine
 from orchestrator.studies.batch_engine import BatchEngine
@@ -36,6 +36,9 @@ from support.texts import tells
 pytest.importorskip("numba", reason="needs the extra `studies`")
 
 KIND = "native"
+
+#: The orders in which the FMUs are compared.
+FMU_ORDERS = BUNDLE_ORDER, JACOBI
 
 #: The ready studies that the engine makes.
 STUDIES = [name for name in ready_studies() if read_study(name).engine == "batch"]
@@ -61,7 +64,7 @@ def sampled(name: str) -> list[Point]:
     space = Space(study, {scenario: load_scenario(scenario, KIND) for scenario in study.scenario})
     numbers = Random(name).sample(range(len(space)), SAMPLES)
     return [
-        space[number]._replace(stop_time=STEPS * space[number].step, order=ORDERS[i % 2])
+        space[number]._replace(stop_time=STEPS * space[number].step, order=FMU_ORDERS[i % 2])
         for i, number in enumerate(numbers)
     ]
 
@@ -71,33 +74,34 @@ def bits(rows: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(rows).view(np.int64)
 
 
-def straight_rows(setting: Setting, steps: int, delayed: bool) -> np.ndarray:
-    """Time and values after every step: what a row of the FMUs' table holds."""
-    instants = list(straight_line(steps, setting, delayed))
-    acting = [instant.vehicles.plant.tau for instant in instants]
-    flow = plant.flow(setting.plant, instants[0].acts.water.velocity)
-    acting[0] = plant.begin(setting.plant, instants[0].tau, flow)[0].tau
-    pairs = zip([instants[0], *instants[:-1]], instants, acting, strict=True)
-    return np.array([_row(*pair) for pair in pairs])
+def straight_rows(setting: Setting, steps: int, order: Order) -> np.ndarray:
+    """Time and values of every row: what the FMUs' table holds."""
+    instants = list(straight_line(steps, setting, order == JACOBI))
+    acting = instants if order == FEEDTHROUGH else [instants[0], *instants[:-1]]
+    T = setting.plant.T
+    return np.array([_row(*pair, T) for pair in zip(acting, instants, strict=True)])
 
 
-def _row(before: Instant, now: Instant, tau: tuple[float, ...]) -> list[float]:
-    seen, state = now.scene.plant, before.controller_state
+def _row(acting: Instant, now: Instant, T: tuple[float, ...]) -> list[float]:
+    seen, state = now.scene.plant, acting.controller_state
     values = [
         now.t, *now.vehicles.plant.position, *seen.euler, *seen.nu, *now.scene.y, *seen.dy,
     ]  # fmt: skip
     for one in now.scene.reference:
         values += one
-    values += tau
+    # Actuators with a lag give what they have come to.
+    given = zip(T, now.vehicles.plant.tau, acting.tau, strict=True)
+    values += [reached if lag else tau for lag, reached, tau in given]
     if isinstance(state, ControllerState):
-        values += before.signals.dy_hat
+        values += acting.signals.dy_hat
         state = state.theta_hat
-    return [*values, *state, *before.signals.tau, *before.command, *before.tau_w]
+    return [*values, *state, *acting.signals.tau, *acting.command, *acting.tau_w]
 
 
 def compare_with_straight_line(engine: BatchEngine, point: Point) -> None:
     table = engine.table(point)
-    straight = straight_rows(engine.setting(point), len(table) - 1, point.order == "jacobi")
+    order = table.header.experiment.order
+    straight = straight_rows(engine.setting(point), len(table) - 1, order)
     different = np.argwhere(bits(table.rows) != bits(straight))
     # Where nothing is drawn, what is zero is not of a sign.
     different = [at for at in different if table.rows[*at] != straight[*at]]
@@ -168,14 +172,14 @@ def compare_with_fmus(name: str, values: dict[str, Any], order: str, until: floa
         assert one == other
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", FMU_ORDERS)
 @pytest.mark.parametrize("name", OTHERS)
 def test_runs_with_other_blocks_are_those_of_the_fmus(name, order):
     noise = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
     compare_with_fmus(name, noise, order, 30.01)
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", FMU_ORDERS)
 def test_remus_in_a_sea_is_that_of_the_fmus(tmp_path, order):
     path = tmp_path / "both.toml"
     path.write_text(REMUS_IN_A_SEA)
@@ -195,7 +199,7 @@ OTHER_ADDITIONS: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", FMU_ORDERS)
 @pytest.mark.parametrize(("name", "values"), OTHER_ADDITIONS)
 def test_additions_with_other_blocks_are_those_of_the_fmus(name, values, order):
     compare_with_fmus(name, values, order, 2.01)
@@ -216,7 +220,7 @@ OTHERS_REFUSED: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", FMU_ORDERS)
 @pytest.mark.parametrize(("name", "values"), OTHERS_REFUSED)
 def test_what_fmus_of_other_blocks_refuse_is_refused_at_the_same_step(name, values, order):
     compare_refusals(Point(5, name, values, 3.0, 0.02, order))
@@ -278,7 +282,7 @@ def where(failure: str | None) -> str:
     return found.group() if found else str(failure)
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", FMU_ORDERS)
 @pytest.mark.parametrize("values", REFUSED, ids=", ".join)
 def test_what_fmus_refuse_is_refused_at_the_same_step(values, order):
     compare_refusals(Point(5, "fig4", values, 3.0, 0.02, order))
@@ -292,7 +296,7 @@ def compare_refusals(run: Point) -> None:
         assert where(batch.failure) == where(fmus.failure)
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", FMU_ORDERS)
 @pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
 def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
     """With noise, and a shorter step at the end."""

@@ -91,6 +91,10 @@ class Instance(Protocol):
     get_outputs: list[Callable[[], int]]
 
     @property
+    def do_exchange(self) -> Callable[[c_double, c_double, int], int] | None:
+        """What stands in place of doStep where values only pass; None: nothing is called."""
+
+    @property
     def do_step(self) -> Callable[[c_double, c_double, int], int]:
         """FMI's doStep, to be called with time, step size and one."""
 

@@ -223,11 +223,16 @@ class IsolatedInstance:
 
     def do_step(self, t: c_double, h: c_double, _: int) -> int:
         """Have a step begun, whose end the first of `get_outputs` waits for."""
-        outgoing = self._channel.outgoing
-        outgoing[0] = t.value
-        outgoing[1] = h.value
+        return self._begin("doStep", t.value, h.value)
+
+    def do_exchange(self, t: c_double, _h: c_double, _: int) -> int:
+        """Have values exchanged, in the same way; the step has no length."""
+        return self._begin("exchanging values", t.value, 0.0)
+
+    def _begin(self, what: str, t: float, h: float) -> int:
+        self._channel.outgoing[:2] = t, h
         self._put_inputs()
-        self._doing, self._steps = "doStep", True
+        self._doing, self._steps = what, True
         self._send({})
         return 0
 

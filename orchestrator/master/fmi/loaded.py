@@ -41,6 +41,7 @@ class LoadedInstance:
     """An instance whose FMU is called directly: see :class:`.instance.Instance`."""
 
     is_here = True
+    do_exchange = None
 
     def __init__(self, component: Component, library: Library, listener: Listener) -> None:
         """Instantiate an FMU.

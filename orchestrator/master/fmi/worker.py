@@ -164,8 +164,9 @@ def serve(name: str, fmu: Path, digest: str, folder: Path, connection: socket.so
 class _Served:
     """An instance, and the channel on which it answers requests.
 
-    A request without a call is a step. An answer without a note says that all is well; else the
-    note has messages of the FMU, the value that a call has given, or why it has failed.
+    A request without a call is a step; in one of no length, values are exchanged only. An answer
+    without a note says that all is well; else the note has messages of the FMU, the value that a
+    call has given, or why it has failed.
     Both ends number texts alike: each tells the other those that are new, and has its turn.
     """
 
@@ -202,7 +203,10 @@ class _Served:
 
     def _step(self) -> None:
         t, h = self._channel.incoming[:2]
-        step_members([self._member], t, h)
+        if h:
+            step_members([self._member], t, h)
+        else:
+            self._instance.exchange()
 
     def _are_read(self) -> bool:
         """Whether the outputs can be read after the last step."""

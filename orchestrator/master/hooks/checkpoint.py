@@ -155,7 +155,7 @@ class _Stored(NamedTuple):
         every: for how many seconds a checkpoint was written [s].
         of: the run.
         time, made: how far the run had come [s], and in how many steps; None: no row counts yet.
-        rows: digest of all rows.
+        n_rows, rows: how many rows count, and the digest of all of them.
         row: all values, hidden ones too.
         states: of the FMUs, as base64.
         lasting: what else there was to remember.
@@ -167,6 +167,7 @@ class _Stored(NamedTuple):
     of: dict[str, str]
     time: float | None = None
     made: int = 0
+    n_rows: int = 0
     rows: str = ""
     row: Sequence[float] = ()
     states: Mapping[str, str] = {}
@@ -267,7 +268,7 @@ class Checkpoints:
             self._store()
             rows.unlink(missing_ok=True)
         else:
-            self._known, digest = found.made + 1, found.rows
+            self._known, digest = found.n_rows, found.rows
         self._row_log = RowLog(rows, self._token, width, self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
@@ -318,6 +319,7 @@ class Checkpoints:
             self._store(
                 time=run.time,
                 made=run.made,
+                n_rows=run.blocks.count,
                 rows=self._row_log.to_disk(),
                 row=run.row.values.tolist(),
                 states={
@@ -342,7 +344,7 @@ class Checkpoints:
         # First of all what rows mean: an observer that is told them needs it.
         for one, state in zip(_lasting(run), found.lasting, strict=True):
             one.restore(state)
-        first = 1  # which was computed anew
+        first = run.blocks.count  # which was computed anew
         for rows in self._row_log.kept():
             run.blocks.tell(rows[first:])
             run.made += len(rows) - first

@@ -6,12 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
+import numpy as np
+
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.experiment import MOST_STEPS, Experiment
 from orchestrator.master.fmi.instance import Instance, Log
 from orchestrator.master.observers.observer import Blocks, Occurrence
 from orchestrator.master.row import Overrides, Row
-from orchestrator.master.schedule import Stage
+from orchestrator.master.schedule import Stage, make_stages
 from orchestrator.system.structure import System
 
 #: After more steps than any run has.
@@ -27,6 +29,8 @@ class Run:
         instances: of its components, by their names.
         row: of all values.
         stages: of every step.
+        passing: in which values of t_k pass before the row shows them, and the step; None: the row
+            is shown after the step.
         overrides: what is done to values on their way from outputs to inputs.
         blocks: take the rows.
         log: of what the FMUs say.
@@ -43,6 +47,7 @@ class Run:
     instances: Mapping[str, Instance]
     row: Row
     stages: Sequence[Stage]
+    passing: Sequence[Stage] | None
     overrides: Overrides
     blocks: Blocks
     log: Log
@@ -56,6 +61,19 @@ class Run:
     def time(self) -> float:
         """What the components have come to [s]."""
         return self.experiment.time(self.made)
+
+    def pass_on(self) -> None:
+        """Let values of now pass, where a row shows them before the step."""
+        step = self.made, self.time, self.experiment.length(self.made, 1)
+        last = self.experiment.rows - 1
+        make_stages(self.passing or (), self.row.values, self.experiment, step, last)
+
+    def show(self) -> None:
+        """Complete the row of now, which no step follows, and keep it if it is finite."""
+        if self.blocks.count == self.made:
+            self.pass_on()
+            if np.isfinite(self.row.shown).all():
+                self.blocks.append(self.time, self.row.shown)
 
 
 class Hook(Protocol):

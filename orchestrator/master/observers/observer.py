@@ -169,8 +169,14 @@ class Blocks:
         self._times, self._values = self._rows[:, 0], self._rows[:, 1:]
         self.block = CBlock(self._rows.ctypes.data, _ROWS)
         self.due = monotonic() + _PATIENCE
+        self._told = 0
         self._observers, self._ours = observers, ours
         self._rounded = list(rounded)
+
+    @property
+    def count(self) -> int:
+        """How many rows there are by now, told or not."""
+        return self._told + int(self.block.n)
 
     def append(self, t: float, values: np.ndarray) -> None:
         """Take a row."""
@@ -210,6 +216,7 @@ class Blocks:
         self._tell(rows)
 
     def _tell(self, rows: np.ndarray) -> None:
+        self._told += len(rows)
         failures: list[Exception] = []
         for observer in self._observers:
             try:

@@ -93,7 +93,7 @@ def test_text_is_no_time():
 
 
 def test_an_unknown_order_is_refused():
-    with pytest.raises(InputError, match="use one of gauss-seidel, jacobi"):
+    with pytest.raises(InputError, match="use one of feedthrough, gauss-seidel, jacobi"):
         Experiment(1.0, 0.1, "random")
 
 

@@ -39,6 +39,7 @@ def made(limit: float, experiment: Experiment, width: int = 3) -> SimpleNamespac
         rows=rows,
         experiment=experiment,
         stages=stages,
+        passing=None,
         made=0,
     )
 
@@ -47,6 +48,14 @@ def test_stages_come_one_after_the_other_and_slow_ones_when_they_are_due():
     run = made(99.0, Experiment(2.0, 0.5))
     assert len(list(step_interpreted(run))) == run.made == 4
     assert run.rows == [[0.5, 0.5, 0, 0], [1, 1, 0.5, 0], [1.5, 1.5, 1, 1], [2, 2, 1.5, 1.5]]
+
+
+def test_a_row_shows_what_has_passed_and_then_components_are_stepped():
+    run = made(99.0, Experiment(2.0, 0.5))
+    step, show = run.stages
+    run.stages, run.passing = [step], [show._replace(decimation=Decimation(2))]
+    list(step_interpreted(run))
+    assert run.rows == [[0, 0, 0, 0], [0.5, 0.5, 0, 0], [1, 1, 0.5, 0.5], [1.5, 1.5, 1, 0.5]]
 
 
 @pytest.mark.parametrize("width", [3, 4_096, 4_097, 20_000])

@@ -71,7 +71,7 @@ def test_mistakes_are_told_in_the_words_of_the_command_line(name, value, tmp_pat
         ({"system": Path("mine.ssp")}, "mine.ssp"),
         ({"system": "fig4", "stop_time": -1.0}, "must be positive"),
         ({"system": "fig4", "step": 0.0}, "must be positive"),
-        ({"system": "fig4", "order": "random"}, "use one of gauss-seidel, jacobi"),
+        ({"system": "fig4", "order": "random"}, "use one of feedthrough, gauss-seidel, jacobi"),
     ],
 )
 def test_what_cannot_be_run_is_told(arguments, complaint):

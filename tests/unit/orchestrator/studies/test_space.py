@@ -40,7 +40,7 @@ def test_grid_is_every_combination_whose_last_value_changes_fastest():
     assert len(runs) == 12
     assert [runs[i].parameters for i in range(12)] == expected
     assert {type(runs[0].parameters[name]) for name in ("plant.eta0.y", "plant.ell")} == {float}
-    assert runs[5] == Point(5, "fig5", expected[5], 100.0, 0.02, "gauss-seidel")
+    assert runs[5] == Point(5, "fig5", expected[5], 100.0, 0.02)
     assert runs.columns == {"plant.ell": float, "controller.saturation": str, "plant.eta0.y": float}
 
 

@@ -76,7 +76,7 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ({"scenario": []}, "scenario = []: write a name, or list of names"),
         ({"vari": {}}, "unknown entry 'vari'; did you mean vary"),
         ({"engine": "gpu"}, "engine = 'gpu': write fmu or batch"),
-        ({"order": "random"}, "order = 'random': write gauss-seidel or jacobi"),
+        ({"order": "random"}, "order = 'random': write feedthrough, gauss-seidel or jacobi"),
         ({"vary": {"plant.ell": 1.0}}, "vary: plant.ell: write [values], or { from = 1.0"),
         ({"vary": {"plant.ell": []}}, "vary: plant.ell: write [values]"),
         ({"vary": {"plant.ell": {"from": 1, "to": 2}}}, "vary: plant.ell: lacks n"),

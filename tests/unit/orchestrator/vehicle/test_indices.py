@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
 from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
@@ -46,21 +46,21 @@ SIGNALS = {
     "plant.dy.z": lambda t: 0.0 * t,
     "plant.nu.v": lambda t: 3.0 * t / T,
     "plant.nu.w": lambda t: -4.0 * t / T,
-    # A controller is sampled: a row holds what it made of the instant a step before.
-    "controller.dy_hat.x": lambda t: 3.0 * np.cos(t - H) + np.sin(2.0 * pi * (t - H)),
-    "controller.dy_hat.y": lambda t: 4.0 * np.cos(t - H),
+    "controller.dy_hat.x": lambda t: 3.0 * np.cos(t) + np.sin(2.0 * pi * t),
+    "controller.dy_hat.y": lambda t: 4.0 * np.cos(t),
     "controller.dy_hat.z": lambda t: 0.0 * t + 2.0,
-    **{f"controller.theta_hat[{i}]": lambda t, i=i: i * t for i in range(1, 5)},
+    # A step ends a step later.
+    **{f"controller.theta_hat[{i}]": lambda t, i=i: i * (t + H) for i in range(1, 5)},
 }
 ESTIMATES = (*STANDARD.dy_hat, *STANDARD.theta_hat)
 TIME = H * np.arange(round(T / H) + 1)
 
 
-def table_with(signals=SIGNALS, more=()) -> Table:
+def table_with(signals=SIGNALS, order=FEEDTHROUGH, more=()) -> Table:
     ends = dict.fromkeys(STANDARD.lower_limits, -2.0) | dict.fromkeys(STANDARD.upper_limits, 2.0)
     values = {STANDARD.ell: ELL, **ends, **dict(more)}
     parameters = {port_name(name): value for name, value in values.items()}
-    header = Header(tuple(signals), Experiment(T, H), parameters)
+    header = Header(tuple(signals), Experiment(T, H, order), parameters)
     return Table.of(header, np.column_stack([TIME, *(of(TIME) for of in signals.values())]))
 
 
@@ -117,14 +117,14 @@ def test_blocks_in_which_rows_come_change_nothing(blocks):
 @pytest.mark.parametrize("blocks", [1, 7, len(TIME)])
 def test_the_row_that_signals_stand_in_changes_nothing(blocks):
     """To the last bit; the last row holds what never acts."""
-    lagged = table_with(noise())
+    lagged = table_with(noise(), GAUSS_SEIDEL)
     acting = (*ESTIMATES, *STANDARD.commanded, *STANDARD.applied)
     assert indices_of(at_its_time(lagged, acting), blocks) == indices_of(lagged)
 
 
 def test_of_actuators_with_a_lag_the_end_of_a_step_counts():
     """What they give is a state, which stands in the row of its time."""
-    lagged = table_with(noise(), {"plant.actuator.T.q": 0.1}.items())
+    lagged = table_with(noise(), GAUSS_SEIDEL, {"plant.actuator.T.q": 0.1}.items())
     u, q, r = STANDARD.applied
     moved = at_its_time(lagged, (*ESTIMATES, *STANDARD.commanded, u, r))
     assert indices_of(moved) == indices_of(lagged)
