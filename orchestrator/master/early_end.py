@@ -17,7 +17,7 @@ from orchestrator.master.experiment import ROUNDING, Experiment
 from orchestrator.master.fmi.instance import Ended
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.loop import Steps
-from orchestrator.master.schedule import Stage, step_members
+from orchestrator.master.schedule import Member, Stage, step_members
 
 
 def make_steps(steps: Steps, run: Run) -> Iterator[None]:
@@ -78,12 +78,17 @@ def _without_inputs(stages: Sequence[Stage], component: str) -> list[Stage]:
     return [
         stage._replace(
             members=[
-                member._replace(set_inputs=[]) if member.instance.name == component else member
+                _idle(member) if member.instance.name == component else member
                 for member in stage.members
             ]
         )
         for stage in stages
     ]
+
+
+def _idle(member: Member) -> Member:
+    """The calls that only read outputs."""
+    return member._replace(set_inputs=[], do_step=None)
 
 
 def _place(stages: Sequence[Stage], end: Ended) -> int:
@@ -118,7 +123,7 @@ def _stepped_on(stage: Stage, end: Ended, t: float, h: float) -> Ended:
     # Isolated ones have all begun their steps before the first is read.
     begun = at + 1 if stage.members[at].instance.is_here else len(names)
     for i, member in enumerate(stage.members):
-        idle = member._replace(set_inputs=[], do_step=None)
+        idle = _idle(member)
         try:
             step_members([idle if i < begun else member], t, h)
         except Ended as other:

@@ -117,6 +117,7 @@ def linear(
     cached: bool = False,
     can: bool = True,
     forgets: bool = False,
+    tunable: bool = False,
 ) -> Path:
     """The FMU.
 
@@ -127,9 +128,10 @@ def linear(
         cached: whether its outputs are computed in steps only.
         can: give its state and derivatives, and let inputs change in a step.
         forgets: whether an input that is set no longer changes.
+        tunable: whether parameters are.
 
     """
-    fmu = folder / f"linear-{says.replace(' ', '-')}-{cached:d}{can:d}{forgets:d}.fmu"
+    fmu = folder / f"linear-{says.replace(' ', '-')}-{cached:d}{can:d}{forgets:d}{tunable:d}.fmu"
     if fmu.exists():
         return fmu
     causes = dict.fromkeys(INPUTS, "input") | dict.fromkeys(OUTPUTS, "output")
@@ -139,9 +141,14 @@ def linear(
         'canGetAndSetFMUstate="true" canInterpolateInputs="true" '
         'canSerializeFMUstate="true" providesDirectionalDerivative="true"'
     )
+    variables = [variable(name, i, causes[name]) for i, name in enumerate(causes)]
+    if tunable:
+        variables = [
+            one.replace('variability="fixed"', 'variability="tunable"') for one in variables
+        ]
     text = description(
         "linear",
-        (variable(name, i, causes[name]) for i, name in enumerate(causes)),
+        variables,
         (unknown(3 + i, dependencies) for i, dependencies in enumerate(said.get(says, ()))),
         f'canHandleVariableCommunicationStepSize="true" {able if can else ""}',
     )

@@ -2,7 +2,7 @@
 
 An event acts between two steps, at the first t_k that its time is not after, or after the first
 step at whose end its condition has become true. The step that begins there is the first that it
-acts on, in every order and loop.
+acts on, in every order and loop. In feedthrough order the row of that time shows what it does.
 
 Several events may act on one signal or parameter: the latest counts, and when it ends, the one
 before it counts again.
@@ -77,6 +77,9 @@ def _tune(run: Run, target: PortName, value: Value) -> None:
         raise ComponentFailed(
             f"{target} was set to {literal(value)}, but the FMU holds {literal(held)}"
         )
+    if run.passing is not None:
+        # Outputs that follow from it are of now.
+        instance.exchange()
 
 
 _EFFECTS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
@@ -236,9 +239,9 @@ class Reset:
         for name in self.components:
             instance = run.instances[name]
             values = {**run.system.parameters_of(name), **layers.tuned(name)}
+            run.refresh(name)
             instance.reset()
             instance.enter_initialization(values, run.time)
-            run.overrides.refresh(name)
             instance.exchange()
             instance.exit_initialization()
             instance.exchange()
@@ -344,7 +347,9 @@ class Events:
             return False
         if event.when is None:
             return _due(run, event) <= run.made
-        was_true, progress_of.was_true = progress_of.was_true, event.when.holds(run.row)
+        was_true = progress_of.was_true
+        with run.ahead():
+            progress_of.was_true = event.when.holds(run.row)
         return progress_of.was_true and not was_true
 
     def _waits(self, number: int) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -67,6 +68,22 @@ class Run:
         step = self.made, self.time, self.experiment.length(self.made, 1)
         last = self.experiment.rows - 1
         make_stages(self.passing or (), self.row.values, self.experiment, step, last)
+
+    @contextmanager
+    def ahead(self) -> Iterator[None]:
+        """Have the row as it is shown if nothing more happens now, and then as it was."""
+        before = self.row.values.copy()
+        self.pass_on()
+        yield
+        self.row.values[:] = before
+
+    def refresh(self, component: str) -> None:
+        """Let the inputs of a component take at once what feeds them now."""
+        targets = [self.row.columns[wire.target] for wire in self.system.feeding[component]]
+        with self.ahead():
+            self.overrides.refresh(component)
+            taken = self.row.values[targets]
+        self.row.values[targets] = taken
 
     def show(self) -> None:
         """Complete the row of now, which no step follows, and keep it if it is finite."""

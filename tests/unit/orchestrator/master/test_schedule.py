@@ -8,7 +8,18 @@ from types import SimpleNamespace
 import pytest
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.master.schedule import Decimation, Member, StageCall, step_members
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.plan import make_plan, stages
+from orchestrator.master.row import Row
+from orchestrator.master.schedule import (
+    Decimation,
+    Member,
+    Stage,
+    StageCall,
+    schedule,
+    step_members,
+)
+from support.relay import relay, system_of
 
 
 def test_a_slow_component_is_stepped_at_the_beginning_and_shown_at_the_end():
@@ -16,6 +27,33 @@ def test_a_slow_component_is_stepped_at_the_beginning_and_shown_at_the_end():
     assert [k for k in range(8) if begins.is_due(k, 8)] == [0, 3, 6]
     # Also where the run ends within its step.
     assert [k for k in range(8) if ends.is_due(k, 8)] == [2, 5, 7]
+
+
+def test_in_feedthrough_order_each_value_is_moved_as_often_as_it_is_needed(tmp_path):
+    """All pass something on; only the plant's state is taken before it has passed it on itself."""
+    fmus = dict.fromkeys(("plant", "meter", "law"), relay(tmp_path))
+    wires = {"law.u": "plant.y", "plant.u": "law.g", "meter.u": "law.g"}
+    system = system_of(fmus, wires)
+    plan = make_plan(system, Experiment(1.0, 0.1, "feedthrough"))
+    instances = {
+        name: SimpleNamespace(
+            name=name, is_here=True, do_exchange=None, do_step="step",
+            set_inputs=["set"], get_outputs=["get"], tie=lambda *_: None,
+        )
+        for name in fmus
+    }  # fmt: skip
+    row = Row(system, instances)
+    found = schedule(plan, stages(system, "feedthrough"), instances, row)
+
+    def calls(some: list[Stage]) -> list[list[str]]:
+        return [
+            [" ".join([one.instance.name, *one.set_inputs, *[one.do_step] * bool(one.do_step),
+                       *one.get_outputs]) for one in stage.members]
+            for stage in some
+        ]  # fmt: skip
+
+    assert calls(found.passing) == [["law set get"], ["plant set get", "meter set get"]]
+    assert calls(found.stepping) == [["law step", "plant step get", "meter step"]]
 
 
 def test_outputs_are_asked_for_when_all_of_a_stage_have_been_stepped():
