@@ -51,8 +51,6 @@ class Loop:
     controller: str = "controller"
     planner: str = "planner"
     disturbance: str = "disturbance"
-    #: Of the place that the planner gives in a formation; empty: it plans for itself, or estimates.
-    leader: str = ""
 
     #: eta: centre of mass [m] and Euler angles [rad], earth frame.
     position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
@@ -66,8 +64,6 @@ class Loop:
     applied = _Group("vehicle", "tau_applied", ACTUATORS)
     #: y_d and its velocity, as they are planned and as the controller was given them.
     y_d, dy_d = _Group("planner", "y_d", AXES), _Group("planner", "dy_d", AXES)
-    #: Where the leader's reference is, and where the planner took it to be, a step before.
-    leading, led = _Group("leader", "y_d", AXES), _Group("planner", "y_0", AXES)
     seen_y_d, seen_dy_d = _Group("controller", "y_d", AXES), _Group("controller", "dy_d", AXES)
     #: What the controller has measured, estimated and computed.
     e, z = _Group("controller", "e", AXES), _Group("controller", "z", AXES)
@@ -108,8 +104,7 @@ class Loop:
 
     def for_tracking(self) -> Needs:
         """What the tracking error follows from."""
-        behind = (*self.leading, *self.led) if self.leader else ()
-        return (*self.posture, *self.y_d, *behind), (self.ell,)
+        return (*self.posture, *self.y_d), (self.ell,)
 
     def for_reference(self) -> Needs:
         """What the path of the reference follows from."""
@@ -201,20 +196,10 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
     controller = feeding(vehicle, "tau", "controller", "input", "y_d.x")
     planner = feeding(controller, "y_d", "planner", "output", "y_d.x")
     disturbance = feeding(vehicle, "tau_w", "disturbance", "output", "tau_w.u")
-    names = vehicle, controller, planner, disturbance, _leader(system, planner)
+    names = vehicle, controller, planner, disturbance
     if _has(system, vehicle, "input", "tau.u"):
         return Loop(*names)
     return AllocatedLoop(*names, feeding(vehicle, "tau", "allocation", "input", "tau.u"))
-
-
-def _leader(system: System, planner: str) -> str:
-    """Whose reference a FormationPlanner adds its place to; empty: nobody's."""
-    if planner not in system.components or not _has(system, planner, "parameter", "estimated"):
-        return ""
-    if system.value(PortName(planner, "estimated")):
-        return ""
-    wires = [(wire.source, wire.target.port) for wire in system.feeding[planner]]
-    return next((a.component for a, b in wires if (a.port, b) == ("y_d.x", "y_0.x")), "")
 
 
 def value_of(table: Table, name: str) -> Value | None:
@@ -288,12 +273,6 @@ def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 
 def tracking_error(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """e = y - y_d with the true control point, both of the same instant, (rows, 3) [m].
-
-    A place in a formation is that beside the leader's reference at the beginning of a step, so at
-    its end the way of the leader in that step is missing.
-    """
+    """e = y - y_d with the true control point, both of the same row, (rows, 3) [m]."""
     error: np.ndarray = true_control_point(table, loop) - table.group(*loop.y_d)
-    if loop.leader:
-        error -= table.group(*loop.leading) - table.group(*loop.led)
     return error

@@ -65,7 +65,7 @@ def at_its_time(table: Table, acting: Collection[str]) -> Table:
 def fleet(n: int) -> tuple[Loop, ...]:
     """The loops of vehicles auv1, auv2, ..."""
     return tuple(
-        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values() if component))
+        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values()))
         for i in range(1, n + 1)
     )
 

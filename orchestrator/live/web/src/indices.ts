@@ -48,27 +48,13 @@ export function reference(result: Result, { planner }: VehicleData): Columns | u
   return AXES.map((axis) => result.column(`${planner}.y_d.${axis}`));
 }
 
-/**
- * e = y - y_d with the true control point [m]; undefined: the vehicle has no reference.
- *
- * A place in a formation is that beside the leader's reference at the beginning of a step: the way
- * of the leader in that step is added.
- */
+/** e = y - y_d with the true control point [m]; undefined: the vehicle has no reference. */
 export function trackingError(result: Result, vehicle: VehicleData): Columns | undefined {
   const wanted = reference(result, vehicle);
   if (wanted === undefined) return undefined;
-  return made(errors, result, vehicle, () => {
-    const { leader, planner } = vehicle;
-    const e = controlPoint(result, vehicle).map((y, i) =>
-      y.map((value, k) => value - wanted[i][k]),
-    );
-    if (!leader) return e;
-    return e.map((one, i) => {
-      const leading = result.column(`${leader}.y_d.${AXES[i]}`);
-      const led = result.column(`${planner}.y_0.${AXES[i]}`);
-      return one.map((value, k) => value - (leading[k] - led[k]));
-    });
-  });
+  return made(errors, result, vehicle, () =>
+    controlPoint(result, vehicle).map((y, i) => y.map((value, k) => value - wanted[i][k])),
+  );
 }
 
 /** Distance between the two centres of mass that are closest [m]; undefined: there is only one. */

@@ -94,8 +94,6 @@ export interface VehicleData {
   readonly controller: string;
   readonly planner: string;
   readonly disturbance: string;
-  /** Whose reference the planner adds a place to; empty: nobody's. */
-  readonly leader: string;
   /** What commands the actuators of a vehicle that takes no tau. */
   readonly allocation: string;
 }

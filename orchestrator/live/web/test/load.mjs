@@ -66,7 +66,6 @@ const vehicle = (prefix) => ({
   controller: `${prefix}controller`,
   planner: `${prefix}planner`,
   disturbance: `${prefix}disturbance`,
-  leader: "",
   allocation: "",
 });
 const loop = (label, controller, more) => ({
