@@ -15,7 +15,7 @@ from time import perf_counter
 from typing import Any
 
 from auv_fmu.euler import STEP
-from orchestrator.master.experiment import ORDERS, Experiment, Order
+from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import PYTHON_LOOP, Stepping
 from orchestrator.master.observers.table import Table
@@ -50,7 +50,7 @@ def timed(function: Callable[[], object], clock: Callable[[], float] = perf_coun
 def steps_time(
     system: System,
     steps: int,
-    order: Order = ORDERS[0],
+    order: Order | None = None,
     stepping: Stepping = PYTHON_LOOP,
     isolation: Isolation | None = None,
 ) -> float:

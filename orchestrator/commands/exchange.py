@@ -149,7 +149,7 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         metavar=f"{'|'.join(ORDERS)}|NAME,...",
         help=f"order in which the tool steps the components: {', '.join(ORDERS)}, or the names of "
         f"all components, joined by + where they are stepped side by side; default: whichever of "
-        f"{' and '.join(ORDERS)} matches better",
+        f"{', '.join(ORDERS)} matches better",
     )
     parser.add_argument(
         "--initial",

@@ -19,13 +19,13 @@ from auv_fmu.closed_loop import PAPER, Sent, Setting, blocks_of
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import JACOBI
 from orchestrator.master.observers.table import Table
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import tracking_error
+from support.runs import BUNDLE_ORDERS
 from support.texts import mentions
 
 H = 0.02
@@ -111,7 +111,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
     assert lost is not None
 
 
-@pytest.mark.parametrize("order", [None, JACOBI])
+@pytest.mark.parametrize("order", BUNDLE_ORDERS)
 @pytest.mark.parametrize("way", WAYS, ids=str)
 def test_events_are_those_of_the_straight_line_bit_for_bit(way, order):
     table = simulate("fig4", stop_time=STEPS * H, order=order, events=EVENTS, **way)
