@@ -108,7 +108,7 @@ def is_straight(engine: BatchEngine, point: Point) -> bool:
     table = engine.table(point)
     delayed = point.order == "jacobi"
     *_, before, last = closed_loop(len(table) - 1, engine.setting(point), delayed)
-    state = before.controller_state
+    state = (before if table.header.experiment.acting_row else last).controller_state
     theta_hat = getattr(state, "theta_hat", state)
     ends = (*last.vehicles.plant.position, *last.scene.plant.nu, *theta_hat)
     return ends == tuple(table.group(*STANDARD.position, *STANDARD.nu, *STANDARD.theta_hat)[-1])

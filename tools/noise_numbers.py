@@ -158,13 +158,14 @@ def later(runs: Runs) -> None:
         estimates: list[float] = []
         for seed in range(1, SOME + 1):
             made = runs.table(name, seed, values, stop_time)
-            beyond = (np.abs(made.group(*STANDARD.commanded)) > limits(made)[1]).any(axis=1)
-            firsts.append(made.time[beyond.argmax()] if beyond.any() else np.inf)
+            commands, time = np.abs(made.step_values(*STANDARD.commanded)), made.step_start
+            beyond = (commands > limits(made)[1]).any(axis=1)
+            firsts.append(time[beyond.argmax()] if beyond.any() else np.inf)
             shares.append(
-                [100.0 * beyond[made.time <= until].mean() for until in (200.0, 500.0, stop_time)]
+                [100.0 * beyond[time <= until].mean() for until in (200.0, 500.0, stop_time)]
             )
-            peaks.append(np.abs(made[STANDARD.commanded[0]]).max())
-            estimates.append(made[STANDARD.theta_hat[0]][-1])
+            peaks.append(commands[:, 0].max())
+            estimates.append(made.step_values(STANDARD.theta_hat[0])[-1, 0])
         rows.append(
             [
                 f"`{name}` {values}",
@@ -206,7 +207,7 @@ def faults() -> None:
     measures: Mapping[str, Callable[[Table], float]] = {
         "peak of tau_u [N]": lambda made: metrics_of(made).found()["peak_command"][0],
         "peak of tau_u from 60 s on": lambda made: np.abs(
-            made["controller.tau.u"][made.time > 60.0]
+            made.step_values("controller.tau.u")[made.step_start >= 60.0]
         ).max(),
         "largest |e| from 30 to 50 s [m]": partial(largest, start=30.0, stop=50.0),
         "largest |e| from 50 s on": partial(largest, start=50.0, stop=100.0),

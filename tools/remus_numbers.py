@@ -76,12 +76,13 @@ def _numbers(scenario: str, changes: Mapping[str, Any]) -> str:
     ahead /= np.linalg.norm(ahead, axis=1, keepdims=True) + (ahead == 0.0).all(axis=1)[:, None]
     beside = error - (error * ahead).sum(axis=1)[:, None] * ahead
     across = np.linalg.norm(beside, axis=1)[result.time >= 120.0].max()
+    attained = "allocation.tau_attained"
     missed = [
-        np.abs(result[f"controller.tau.{k}"] - result[f"allocation.tau_attained.{k}"])[1:] > 1e-9
+        np.abs(np.subtract(*result.step_values(f"controller.tau.{k}", f"{attained}.{k}").T)) > 1e-9
         for k in "qr"
     ]
     pitch, yaw = (100.0 * one.mean() for one in missed)
-    command = np.abs(result["controller.tau.r"]).max()
+    command = np.abs(result.step_values("controller.tau.r")).max()
     turned = np.abs(np.diff(np.degrees(result["plant.actuator.delta_r"])))
     rate = turned.sum() / result.time[-1]
     return f"{first:6.2f}{late:6.3f}{across:6.3f}{pitch:4.0f}{yaw:4.0f}{command:7.1f}{rate:6.0f}"

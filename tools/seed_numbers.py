@@ -81,11 +81,11 @@ def numbers(scenario: str, result: Result, loops: Sequence[Loop]) -> dict[str, f
         found[f"error from {start:g} s to {min(end, result.time[-1]):g} s [m]"] = sizes[
             :, here
         ].max()
-    commands = [result.group(*loop.commanded)[1:] for loop in loops]
+    commands = [result.step_values(*loop.commanded) for loop in loops]
     found["peak command u [N]"] = max(np.abs(one[:, 0]).max() for one in commands)
     found["peak command q, r [N.m]"] = max(np.abs(one[:, 1:]).max() for one in commands)
     if scenario == "remus":
-        attained = result.group(*(f"allocation.tau_attained.{k}" for k in "uqr"))[1:]
+        attained = result.step_values(*(f"allocation.tau_attained.{k}" for k in "uqr"))
         beyond = [np.abs(commands[0] - attained) > 1e-9]
     else:
         beyond = [

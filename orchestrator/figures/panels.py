@@ -274,7 +274,7 @@ def _show_limits(
     words = (
         f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
     )
-    peaks = ((_peak(run.result[run.loop.commanded[k]]), colour) for run, colour in runs)
+    peaks = ((_peak(run.result.step_values(run.loop.commanded[k])), colour) for run, colour in runs)
     peak, colour = max(peaks, key=lambda one: abs(one[0]))
     if abs(peak) < _NEAR * min(upper, -lower):
         bottom, top = axes.get_ylim()

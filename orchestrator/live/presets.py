@@ -19,7 +19,7 @@ from fmus.discovery import components, ports_of
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
 from orchestrator.master.hooks.events import (
     Action,
     Alter,
@@ -31,7 +31,7 @@ from orchestrator.master.hooks.events import (
     Stop,
 )
 from orchestrator.master.plan import gathered_connections, stages
-from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.bundle import BUNDLE_ORDER, current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
@@ -223,7 +223,6 @@ def _check(prepared: Prepared) -> None:
     lacking = {
         f"third-party FMUs ({', '.join(foreign)})": foreign,
         "rings of direct feedthroughs": rings(system),
-        "feedthrough order": experiment.order == FEEDTHROUGH,
         "linear inputs": experiment.coupling == LINEAR,
         "components with longer steps": any(n > 1 for n in plan.decimations.values()),
         "transformations of values": any(c.transformation for c in system.connections),
@@ -240,9 +239,7 @@ def _check(prepared: Prepared) -> None:
 
 def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
-    system, order = plan.system, plan.experiment.order or GAUSS_SEIDEL
-    sequence = stages(system, order)
-    gathered = gathered_connections(system, sequence, order=order)
+    system, order = plan.system, plan.experiment.order or BUNDLE_ORDER
     controller = _controller(system)
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
@@ -260,9 +257,39 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
             for names in stages(system, GAUSS_SEIDEL)
             for name in names
         ],
-        "stages": list(map(_stage, sequence, gathered)),
+        **_step(system, order),
+        "actingRow": replace(plan.experiment, order=order).acting_row,
         "parameters": list(_parameters(system)),
         "events": _events(prepared, owner),
+    }
+
+
+def _step(system: System, order: Order) -> Plain:
+    """What passes before a row shows it, what is stepped, and what of that is read at once."""
+    sequence = stages(system, order)
+    gathered = gathered_connections(system, sequence, order=order)
+    if order != FEEDTHROUGH:
+        made = list(map(_stage, sequence, gathered))
+        return {"passing": [], "stages": made, "read": [*system.components]}
+    direct = {
+        name
+        for name, part in system.components.items()
+        if any(part.has_feedthrough(output.name) for output in part.having("output"))
+    }
+    place = {name: i for i, names in enumerate(sequence) for name in names}
+    # What passes is read there, and before only where something takes it before.
+    early = {
+        one.source.component
+        for one in system.connections
+        if place[one.source.component] >= place[one.target.component]
+    }
+    return {
+        "passing": [
+            _stage([name for name in names if name in direct], connections)
+            for names, connections in zip(sequence, gathered, strict=True)
+        ],
+        "stages": [_stage([*place], [])],
+        "read": [name for name in place if name not in direct or name in early],
     }
 
 

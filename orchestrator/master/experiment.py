@@ -145,6 +145,15 @@ class Experiment:
         return self.stop_time - self.start_time
 
     @property
+    def acting_row(self) -> int:
+        """In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end.
+
+        It is all inputs, and the outputs that follow from inputs of the same time. In feedthrough
+        order they pass before the row shows them; in other orders the step computes them.
+        """
+        return 0 if self.order in (None, FEEDTHROUGH) else 1
+
+    @property
     def full_steps(self) -> int:
         """How many steps have the whole length."""
         return floor(self._in_steps)

@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD, real_parameter
+from orchestrator.vehicle.signals import STANDARD, applied, real_parameter
 
 #: Control efforts of section 4.2, in the order u, q, r.
 EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
@@ -81,8 +81,7 @@ def approach_of(table: Table) -> Approach | None:
     first = int(near.argmax())
     if not near[first] or not first:
         return None
-    # A row holds what was applied in the step that ends there: the first one holds none.
-    force = table[STANDARD.applied[0]][1 : first + 1]
+    force = applied(table)[:first, 0]
     return Approach(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
 
 
@@ -102,10 +101,9 @@ def numbers_of(table: Table, end_times: Sequence[float]) -> np.ndarray:
     begins = np.searchsorted(table.time, table.time[ends] - LAST_SECONDS)
     error = np.abs(errors(table))
     final = np.stack([error[i : k + 1].max(axis=0) for i, k in zip(begins, ends, strict=True)])
-    # A row holds the signal of the step that ends there: the first one holds none.
     efforts = (
-        np.sqrt(np.cumsum(table.group(*names)[1:] ** 2 * h, axis=0)[ends - 1])
-        for names in (STANDARD.applied, STANDARD.commanded)
+        np.sqrt(np.cumsum(signal**2 * h, axis=0)[ends - 1])
+        for signal in (applied(table), table.step_values(*STANDARD.commanded))
     )
     return np.stack([np.hstack((effort, final)) for effort in efforts])
 
@@ -118,8 +116,8 @@ def turning_radius(table: Table) -> float:
 
 def total_variation_until(table: Table, stop_time: float) -> np.ndarray:
     """Sum of |difference| of each applied signal up to a time, in the order u, q, r."""
-    applied = table.group(*STANDARD.applied)[table.time <= stop_time]
-    variation: np.ndarray = np.abs(np.diff(applied[1:], axis=0)).sum(axis=0)
+    signal = applied(table)[table.time[1:] <= stop_time]
+    variation: np.ndarray = np.abs(np.diff(signal, axis=0)).sum(axis=0)
     return variation
 
 
@@ -130,4 +128,4 @@ def largest_error_after(table: Table, start: float) -> float:
 
 def largest_estimate(table: Table) -> float:
     """Largest component of theta_hat in a run."""
-    return float(table.group(*STANDARD.theta_hat).max())
+    return float(table.step_values(*STANDARD.theta_hat).max())

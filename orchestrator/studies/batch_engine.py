@@ -19,15 +19,16 @@ from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from fmus.kinds import AUTO
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI, Experiment
+from orchestrator.master.experiment import JACOBI, ORDERS, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
-from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.bundle import BUNDLE_ORDER, current_fmus
 from orchestrator.studies.batch.kernel import (
     END,
     RunSteps,
     columns,
+    computed,
     is_bounded,
     new_accumulators,
     part_of,
@@ -40,10 +41,7 @@ from orchestrator.system.values import Value, named
 from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen, values_of
 from orchestrator.vehicle.indices import INDICES, Indices
 from orchestrator.vehicle.reducers import LAST_SECONDS
-from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
-
-#: The orders that it has; without one it takes the first.
-_ORDERS = GAUSS_SEIDEL, JACOBI
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, with_lag
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
@@ -208,9 +206,9 @@ def _job(loop: _Loop, point: Point) -> _Job:
     changed = [system.component(name.component).variable(name.port) for name in changes]
     if any(variable.causality != "parameter" for variable in changed):
         system.check()
-    experiment = Experiment(point.stop_time, point.step, point.order or GAUSS_SEIDEL)
-    if experiment.order not in _ORDERS:
-        raise InputError(f"the batch engine has only the orders {' and '.join(_ORDERS)}; {_OTHER}")
+    experiment = Experiment(point.stop_time, point.step, point.order or BUNDLE_ORDER)
+    if experiment.order not in ORDERS:
+        raise InputError(f"the batch engine has only the orders {', '.join(ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
     full, stop = experiment.full_steps, experiment.stop_time
@@ -261,16 +259,22 @@ def _empty_rows(job: _Job) -> np.ndarray:
 
 
 def _table(job: _Job, rows: np.ndarray, failure: str | None = None) -> Table:
-    """Rows of a run, in the columns that it has."""
+    """Rows of a run, in the columns that it has, each where the order has it."""
     parameters = {
         name: named(variable, job.system.value(name))
         for component in job.system.components.values()
         for variable in component.having("parameter")
         for name in (PortName(component.name, variable.name),)
     }
-    there = job.loop.there
+    names, there = job.loop.names, job.loop.there
     header = Header(tuple(compress(job.loop.columns, there)), job.experiment, parameters)
-    return Table.of(header, rows[:, [True, *there]], Ending(failure))
+    table = Table.of(header, rows[:, [True, *there]], Ending(failure))
+    if job.experiment.acting_row:
+        # Actuators without a lag give at once what they are told.
+        given = compress(names.applied, ~with_lag(table, names))
+        late = [header.place[name] for name in (*given, *computed(names)) if name in table]
+        table.rows[1:, late] = table.rows[:-1, late]
+    return table
 
 
 def _made(

@@ -17,7 +17,7 @@ from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI, Experiment
+from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.loop import LOOPS, LoopName
 from orchestrator.master.observers.observer import progress_bar
 from orchestrator.master.plan import PACKAGES
@@ -326,7 +326,7 @@ def faster(space: Space, engine: Engine, means: Means) -> str:
 
 def _unknown_to_batch(experiment: Experiment) -> str:
     """What the batch engine would not do of an experiment, in words."""
-    order = experiment.order if experiment.order in (GAUSS_SEIDEL, JACOBI) else None
+    order = experiment.order if experiment.order in ORDERS else None
     length = experiment.stop_time - experiment.start_time
     made = vars(Experiment(length, experiment.step, order)) | {"stop_time": experiment.stop_time}
     different = [name for name, value in vars(experiment).items() if value != made[name]]

@@ -69,7 +69,8 @@ class Seen(NamedTuple):
     """What the rows of a run have shown of a loop.
 
     Attributes:
-        rho_hat: largest theta_hat[1], the part of the bound that is there at any speed [N].
+        rho_hat: largest theta_hat[1] of a step, the part of the bound that is there at any speed
+            [N].
         vertical: when the pitch had first passed 90 degrees [s].
 
     """
@@ -174,16 +175,20 @@ class Watch:
         ]
         self._seen = [Seen() for _ in self._loops]
         self._first = np.empty(0)
+        self._last = np.empty((0, 1 + len(header.columns)))
 
     def take(self, rows: np.ndarray) -> None:
         """Look at some rows."""
         if not self._n:
             self._first = rows[0].copy()
         self._n += len(rows)
-        for i, (estimate, pitch) in enumerate(self._places):
+        steps = Table.of(self._header, np.vstack((self._last, rows)))
+        self._last = rows[-1:].copy()
+        for i, (loop, (estimate, pitch)) in enumerate(zip(self._loops, self._places, strict=True)):
             rho_hat, vertical = self._seen[i]
             if estimate is not None:
-                rho_hat = max(rho_hat, float(rows[:, estimate].max()))
+                estimates = steps.step_values(loop.theta_hat[0])
+                rho_hat = max(rho_hat, float(estimates.max(initial=-inf)))
             if pitch is not None and vertical == inf:
                 beyond = np.cos(rows[:, pitch]) * np.cos(self._first[pitch]) <= 0.0
                 vertical = float(rows[beyond.argmax(), 0]) if beyond.any() else inf

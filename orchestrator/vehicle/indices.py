@@ -22,6 +22,7 @@ from orchestrator.system.structure import System
 from orchestrator.system.values import named
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.reducers import (
+    BEFORE,
     LAST_SECONDS,
     SMALLEST_DISTANCE,
     Fold,
@@ -143,7 +144,7 @@ INDICES: tuple[Index, ...] = (
         TAU,
         "largest absolute value of the commanded signal",
         Loop.for_commands,
-        partial(Fold, lambda rows: np.abs(rows.ends(*rows.loop.commanded)), largest),
+        partial(Fold, lambda rows: np.abs(rows.acting(*rows.loop.commanded)), largest),
         "peak",
         is_metric=True,
     ),
@@ -212,7 +213,7 @@ INDICES: tuple[Index, ...] = (
         THETA,
         "theta_hat halfway through the run",
         Loop.for_parameter_estimates,
-        partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat)[rows.late], first),
+        partial(Fold, LoopRows.late_estimates, first),
         "half",
         symbol=r"\hat{\theta}",
     ),
@@ -222,7 +223,7 @@ INDICES: tuple[Index, ...] = (
         THETA,
         "theta_hat at the end of the run",
         Loop.for_parameter_estimates,
-        partial(Fold, lambda rows: rows.at(*rows.loop.theta_hat), last),
+        partial(Fold, lambda rows: rows.acting(*rows.loop.theta_hat), last),
         "end",
         symbol=r"\hat{\theta}",
     ),
@@ -312,7 +313,7 @@ class Indices:
         for name, before in self.together.items():
             apart = smallest_distances(Table.of(self._header, rows), self._loops)
             self.together[name] = min(before, float(apart.min()))
-        self._last, self._end = rows[-1:].copy(), float(rows[-1, 0])
+        self._last, self._end = table.rows[-BEFORE:].copy(), float(rows[-1, 0])
         self._n += len(rows)
 
     def end(self, ending: Ending) -> None:

@@ -206,10 +206,11 @@ def certificates(table: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 def _certificates(header: Header, loop: Loop, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Certificates of some steps, from the rows at their starts and at their ends."""
-    return np.array(list(_rows(loop, Table.of(header, starts), Table.of(header, ends))))
+    acting = ends if header.experiment.acting_row else starts
+    return np.array(list(_rows(loop, Table.of(header, starts), Table.of(header, acting))))
 
 
-def _rows(loop: Loop, start: Table, end: Table) -> Iterator[list[float]]:
+def _rows(loop: Loop, start: Table, acting: Table) -> Iterator[list[float]]:
     plant = vehicle(lambda name: real_parameter(start, name), loop)
     *K2_names, lambda_name, saturation = _gains(loop)
     ell, lambda_ = real_parameter(start, loop.ell), real_parameter(start, lambda_name)
@@ -219,9 +220,8 @@ def _rows(loop: Loop, start: Table, end: Table) -> Iterator[list[float]]:
 
     y, dy = true_control_point(start, loop), start.group(*loop.dy)
     euler = start.group(*loop.attitude)
-    # The controller is sampled: the row at the end of a step has its values of the start.
     y_d, dy_d, y_hat, dy_hat, z_measured, tau = (
-        end.group(*group)
+        acting.group(*group)
         for group in (loop.seen_y_d, loop.seen_dy_d, loop.y_hat, loop.dy_hat, loop.z, loop.tau)
     )
 

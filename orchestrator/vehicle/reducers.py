@@ -14,7 +14,7 @@ from operator import itemgetter
 import numpy as np
 
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.signals import Loop, Needs, limits, tracking_error
+from orchestrator.vehicle.signals import Loop, Needs, applied, limits, tracking_error
 
 #: T_L of section 4.2 [s].
 LAST_SECONDS = 5.0
@@ -22,6 +22,10 @@ LAST_SECONDS = 5.0
 #: The index of several vehicles: its name in files, and in words.
 SMALLEST_DISTANCE = "smallest_distance"
 SMALLEST_DISTANCE_LABEL = "smallest distance between vehicles"
+
+#: So many rows before its own a block takes along: the beginning of its first step, and the one
+#: in which that step's predecessor may have what acted in it.
+BEFORE = 2
 
 #: So many numbers are compared at once.
 _AT_ONCE = 1_000_000
@@ -44,8 +48,8 @@ class LoopRows:
         Args:
             loop: whose signals count.
             number: of the first of them in the run.
-            table: of these rows, which begins with the one before them, if there is one.
-            new: how many there are before them, 0 or 1.
+            table: of these rows, which begins with the ones before them, up to :data:`BEFORE`.
+            new: how many those are.
 
         """
         self.loop, self.number = loop, number
@@ -53,6 +57,8 @@ class LoopRows:
         self.start = experiment.start_time
         self.half = self.start + 0.5 * (experiment.stop_time - self.start)
         self._table, self._new = table, new
+        # The row of the table that the first of the steps begins at.
+        self._begin = max(new - 1, 0)
         self._groups: dict[tuple[str, ...], np.ndarray] = {}
 
     @property
@@ -76,11 +82,19 @@ class LoopRows:
 
     def starts(self, *columns: str) -> np.ndarray:
         """Values at the beginning of each step that ends at one of the rows."""
-        return self._group(columns)[:-1]
+        return self._group(columns)[self._begin : -1]
 
     def ends(self, *columns: str) -> np.ndarray:
         """Values at the end of each of these steps."""
-        return self._group(columns)[1:]
+        return self._group(columns)[self._begin + 1 :]
+
+    def acting(self, *columns: str) -> np.ndarray:
+        """Values that act in each of these steps, or follow from inputs of its beginning."""
+        return self._table.step_values(*columns)[self._begin :]
+
+    @cached_property
+    def _applied(self) -> np.ndarray:
+        return applied(self._table, self.loop)
 
     def _group(self, columns: tuple[str, ...]) -> np.ndarray:
         if columns not in self._groups:
@@ -105,28 +119,33 @@ class LoopRows:
     def energy(self) -> np.ndarray:
         """Integral of the square of the applied signal, over each step."""
         h: np.ndarray = self.ends("time") - self.starts("time")
-        energy: np.ndarray = self.ends(*self.loop.applied) ** 2 * h
+        energy: np.ndarray = self._applied[self._begin :] ** 2 * h
         return energy
 
     def outside(self) -> np.ndarray:
         """1 for each step whose command is outside the limits, else 0."""
-        commanded, (lower, upper) = self.ends(*self.loop.commanded), limits(self._table, self.loop)
+        commanded = self.acting(*self.loop.commanded)
+        lower, upper = limits(self._table, self.loop)
         outside: np.ndarray = ((commanded < lower) | (commanded > upper)).astype(float)
         return outside
 
     def change(self) -> np.ndarray:
         """How far the applied signal moves from step to step."""
-        change: np.ndarray = np.abs(self.ends(*self.loop.applied) - self.starts(*self.loop.applied))
-        if self.number <= 1:
-            # Before the first step nothing was applied.
-            change[:1] = 0.0
-        return change
+        # Before the first step nothing was applied.
+        change: np.ndarray = np.abs(np.diff(self._applied, axis=0, prepend=self._applied[:1]))
+        return change[self._begin :]
 
     def miss(self) -> np.ndarray:
-        """Squares of dy_hat - dy: a row holds the estimate of the instant its step began at."""
+        """Squares of dy_hat - dy at the beginning of each step in the second half."""
         late = self.starts("time")[:, 0] >= self.half
-        miss: np.ndarray = (self.ends(*self.loop.dy_hat) - self.starts(*self.loop.dy))[late] ** 2
+        miss: np.ndarray = (self.acting(*self.loop.dy_hat) - self.starts(*self.loop.dy))[late] ** 2
         return miss
+
+    def late_estimates(self) -> np.ndarray:
+        """theta_hat in each step that ends in the second half."""
+        late = self.ends("time")[:, 0] >= self.half
+        estimates: np.ndarray = self.acting(*self.loop.theta_hat)[late]
+        return estimates
 
 
 #: Many terms to one, column by column. A sum goes row by row: it does not depend on the blocks in

@@ -51,8 +51,6 @@ class Loop:
     controller: str = "controller"
     planner: str = "planner"
     disturbance: str = "disturbance"
-    #: Of the place that the planner gives in a formation; empty: it plans for itself, or estimates.
-    leader: str = ""
 
     #: eta: centre of mass [m] and Euler angles [rad], earth frame.
     position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
@@ -66,17 +64,16 @@ class Loop:
     applied = _Group("vehicle", "tau_applied", ACTUATORS)
     #: y_d and its velocity, as they are planned and as the controller was given them.
     y_d, dy_d = _Group("planner", "y_d", AXES), _Group("planner", "dy_d", AXES)
-    #: Where the leader's reference is, and where the planner took it to be, a step before.
-    leading, led = _Group("leader", "y_d", AXES), _Group("planner", "y_0", AXES)
     seen_y_d, seen_dy_d = _Group("controller", "y_d", AXES), _Group("controller", "dy_d", AXES)
     #: What the controller has measured, estimated and computed.
     e, z = _Group("controller", "e", AXES), _Group("controller", "z", AXES)
     y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
     theta_hat = _Group("controller", "theta_hat", quantities.THETA)
     tau = _Group("controller", "tau", ACTUATORS)
-    #: The parameters of (3), and of (2).
+    #: The parameters of (3), of the actuators, and of (2).
     lower_limits = _Group("vehicle", "tau_min", ACTUATORS)
     upper_limits = _Group("vehicle", "tau_max", ACTUATORS)
+    actuator_lags = _Group("vehicle", "actuator.T", ACTUATORS)
     vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))
 
     @property
@@ -107,8 +104,7 @@ class Loop:
 
     def for_tracking(self) -> Needs:
         """What the tracking error follows from."""
-        behind = (*self.leading, *self.led) if self.leader else ()
-        return (*self.posture, *self.y_d, *behind), (self.ell,)
+        return (*self.posture, *self.y_d), (self.ell,)
 
     def for_reference(self) -> Needs:
         """What the path of the reference follows from."""
@@ -200,20 +196,10 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
     controller = feeding(vehicle, "tau", "controller", "input", "y_d.x")
     planner = feeding(controller, "y_d", "planner", "output", "y_d.x")
     disturbance = feeding(vehicle, "tau_w", "disturbance", "output", "tau_w.u")
-    names = vehicle, controller, planner, disturbance, _leader(system, planner)
+    names = vehicle, controller, planner, disturbance
     if _has(system, vehicle, "input", "tau.u"):
         return Loop(*names)
     return AllocatedLoop(*names, feeding(vehicle, "tau", "allocation", "input", "tau.u"))
-
-
-def _leader(system: System, planner: str) -> str:
-    """Whose reference a FormationPlanner adds its place to; empty: nobody's."""
-    if planner not in system.components or not _has(system, planner, "parameter", "estimated"):
-        return ""
-    if system.value(PortName(planner, "estimated")):
-        return ""
-    wires = [(wire.source, wire.target.port) for wire in system.feeding[planner]]
-    return next((a.component for a, b in wires if (a.port, b) == ("y_d.x", "y_0.x")), "")
 
 
 def value_of(table: Table, name: str) -> Value | None:
@@ -243,6 +229,24 @@ def limits(table: Table, loop: Loop = STANDARD) -> tuple[np.ndarray, np.ndarray]
     )
 
 
+def applied(table: Table, loop: Loop = STANDARD) -> np.ndarray:
+    """What acts on the vehicle in each step, (rows - 1, 3) [N, N.m].
+
+    Actuators with a lag have a state: what they give at the end of the step counts.
+    """
+    at_once = table.step_values(*loop.applied)
+    if not (late := with_lag(table, loop)).any():
+        return at_once
+    return np.where(late, table.group(*loop.applied)[1:], at_once)
+
+
+def with_lag(table: Table, loop: Loop) -> np.ndarray:
+    """Which actuators have a lag: of a vehicle that takes no tau, all."""
+    if isinstance(loop, AllocatedLoop):
+        return np.ones(len(ACTUATORS), bool)
+    return np.array([bool(value_of(table, name)) for name in loop.actuator_lags])
+
+
 def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:
     """The vehicle of (2), whose parameters a function gives by their names `plant.m11`, ..."""
     return Vehicle._make(value(name) for name in loop.vehicle_parameters)
@@ -269,12 +273,6 @@ def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 
 def tracking_error(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """e = y - y_d with the true control point, both of the same instant, (rows, 3) [m].
-
-    A place in a formation is that beside the leader's reference at the beginning of a step, so at
-    its end the way of the leader in that step is missing.
-    """
+    """e = y - y_d with the true control point, both of the same row, (rows, 3) [m]."""
     error: np.ndarray = true_control_point(table, loop) - table.group(*loop.y_d)
-    if loop.leader:
-        error -= table.group(*loop.leading) - table.group(*loop.led)
     return error

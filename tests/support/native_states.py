@@ -17,17 +17,12 @@ from support.status_table import MODES
 CHECKSUM = "checksum"
 
 MAGIC = "FMU state 3"
-<<<<<<< HEAD
 
 #: What outputs are: outdated, those of the last step, up to date.
 _FRESHNESS = ((False, False), (True, True), (True, False))
-=======
->>>>>>> letter
 
 #: A generator of noise: words of its state and the place of the next, and its kind.
 _WORDS, _VERSION = 625, 3
-
-#: What outputs that are kept may be: `fresh` and `held`, as the JSON of the Python kind has it.
 
 
 class NativeState(dict[str, Any]):
@@ -42,10 +37,6 @@ class _Layout(NamedTuple):
     #: Types of the parts of a state.
     state: Sequence[Any]
     draws: int
-<<<<<<< HEAD
-=======
-    is_sampled: bool
->>>>>>> letter
     parameters: Sequence[Port]
     inputs: Sequence[Any]
     #: None are kept of a component that is not sampled.
@@ -66,12 +57,8 @@ def _layout(name: str) -> _Layout:
         for causality in ("input", "output")
     )
     state = [*hints_of(behaviour.state).values()]
-<<<<<<< HEAD
     kept = outputs if behaviour.is_sampled else []
     return _Layout(state, behaviour.draws, of["parameter"], inputs, kept)
-=======
-    return _Layout(state, behaviour.draws, behaviour.is_sampled, of["parameter"], inputs, outputs)
->>>>>>> letter
 
 
 class _Reader:
@@ -147,15 +134,9 @@ def _read(source: _Reader) -> NativeState | None:
             words, has_next, following = source.words(_WORDS), source.word(), source.real()
             said["generator"] = [_VERSION, words, following if has_next else None]
             said["draws"] = source.reals(layout.draws)
-<<<<<<< HEAD
         if layout.outputs:
             said["outputs"] = [source.value(kind) for kind in layout.outputs]
             said["fresh"], said["held"] = _FRESHNESS[source.word()]
-=======
-        if layout.is_sampled:
-            said["outputs"] = [source.value(kind) for kind in layout.outputs]
-            said["fresh"], said["held"] = _KEPT[source.word()]
->>>>>>> letter
     said["fault"] = bool(source.word())
     said[CHECKSUM] = source.word()
     return said
@@ -218,15 +199,9 @@ def _written(said: NativeState) -> bytes:
             _, words, following = said["generator"]
             parts += [_words(*words, following is not None), _reals(following or 0.0)]
             parts += _values([float] * layout.draws, said["draws"])
-<<<<<<< HEAD
         if layout.outputs:
             parts += _values(layout.outputs, said["outputs"])
             parts.append(_words(_FRESHNESS.index((said["fresh"], said["held"]))))
-=======
-        if layout.is_sampled:
-            parts += _values(layout.outputs, said["outputs"])
-            parts.append(_words(_KEPT.index((said["fresh"], said["held"]))))
->>>>>>> letter
     return b"".join(parts) + _words(said["fault"], said[CHECKSUM])
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from auv_fmu.quantities import ETA, NU, TAU
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, Experiment, Order
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
@@ -31,7 +32,9 @@ UNITS = {
 }
 
 
-def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Table:
+def loop_table(
+    n: int = 400, without: Collection[str] = (), seed: int = 1, order: Order | None = None
+) -> Table:
     """A closed loop whose signals swing; limits are +-80, ell is 0.35 m."""
     columns = tuple(name for name in COLUMNS if name not in without)
     time = STEP * np.arange(n)
@@ -42,14 +45,27 @@ def loop_table(n: int = 400, without: Collection[str] = (), seed: int = 1) -> Ta
         STANDARD.upper_limits, 80.0
     )
     known = {port_name(name): value for name, value in parameters.items() if name not in without}
-    experiment = Experiment(max(n - 1, 1) * STEP, STEP)
+    experiment = Experiment(max(n - 1, 1) * STEP, STEP, order)
     return Table.of(Header(columns, experiment, known, units=UNITS), rows)
+
+
+def at_its_time(table: Table, acting: Collection[str]) -> Table:
+    """The same run with what acts in a step in the row of its beginning.
+
+    The last row then holds what never acts: here it is no number.
+    """
+    experiment = replace(table.header.experiment, order=FEEDTHROUGH)
+    rows = table.rows.copy()
+    places = [table.header.place[name] for name in acting if name in table]
+    rows[:-1, places] = table.rows[1:, places]
+    rows[-1, places] = np.nan
+    return Table.of(replace(table.header, experiment=experiment), rows, table.ending)
 
 
 def fleet(n: int) -> tuple[Loop, ...]:
     """The loops of vehicles auv1, auv2, ..."""
     return tuple(
-        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values() if component))
+        Loop(*(f"auv{i}.{component}" for component in vars(STANDARD).values()))
         for i in range(1, n + 1)
     )
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
 from auv_fmu import motion_planner, plant
 from auv_fmu.blocks import measurement
-from auv_fmu.closed_loop import Instant, Setting, closed_loop
+from auv_fmu.closed_loop import PAPER, Instant, Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.observer import EXACT, INTEGRAL
 from auv_fmu.output_feedback import Gains
@@ -37,8 +37,16 @@ def quiet(system: System) -> Table:
     return run(system.with_parameters(QUIET), 100.0, 0.02)
 
 
-def row(now: Instant, before: Instant) -> dict[str, float]:
-    """What every port of the FMU loop must hold at the end of a step that began at `before`."""
+def rows_of(instants: Sequence[Instant], setting: Setting, table: Table) -> list[dict[str, float]]:
+    """What every port of the FMU loop must hold in each row of a table."""
+    late = [instants[0], *instants[:-1]] if table.header.experiment.acting_row else instants
+    # Actuators with a lag give what they have come to.
+    T = setting.plant.T if isinstance(setting.plant, plant.Parameters) else (0.0,) * 3
+    return [row(now, acting, T) for now, acting in zip(instants, late, strict=True)]
+
+
+def row(now: Instant, acting: Instant, T: tuple[float, ...]) -> dict[str, float]:
+    """The values of the ports where what acts, and what else follows at once, is of an instant."""
     values: dict[str, float] = {}
 
     def group(name: str, members, numbers) -> None:
@@ -48,12 +56,12 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
         for name in names:
             group(name, members, numbers)
 
-    signals, state, told = before.signals, before.controller_state, measurement(before.scene)
+    signals, state, told = acting.signals, acting.controller_state, measurement(acting.scene)
     vehicle, seen = now.vehicles.plant, now.scene.plant
     planned, reference = now.vehicles.planner, now.scene.reference
     both(("plant.tau", "controller.tau"), UQR, signals.tau)
-    both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", before.tau_w)
-    group("disturbance.nu", "uvwpqr", before.scene.plant.nu_r)
+    both(("plant.tau_w", "disturbance.tau_w"), "uvwpqr", acting.tau_w)
+    group("disturbance.nu", "uvwpqr", acting.scene.plant.nu_r)
     group("plant.water", XYZ, (0.0, 0.0, 0.0))
     group("plant.dwater", XYZ, (0.0, 0.0, 0.0))
     group("plant.eta", (*XYZ, "phi", "theta", "psi"), (*vehicle.position, *seen.euler))
@@ -61,7 +69,8 @@ def row(now: Instant, before: Instant) -> dict[str, float]:
     group("plant.nu_r", "uvwpqr", seen.nu_r)
     group("plant.y", XYZ, now.scene.y)
     group("plant.dy", XYZ, seen.dy)
-    group("plant.tau_applied", UQR, before.tau if now is before else vehicle.tau)
+    given = zip(T, vehicle.tau, acting.tau, strict=True)
+    group("plant.tau_applied", UQR, [state if lag else tau for lag, state, tau in given])
     group("controller.y", XYZ, told.y)
     group("controller.eta", ("phi", "theta", "psi"), told.euler)
     group("controller.y_d", XYZ, told.y_d)
@@ -84,8 +93,7 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
     """Every port, 5,000 steps, with noise and disturbance on."""
     assert noisy.failure is None
     instants = list(closed_loop(STEPS))
-    # The first row holds the values of initialisation, all at t = 0.
-    rows = [row(now, before) for before, now in pairwise([instants[0], *instants])]
+    rows = rows_of(instants, PAPER, noisy)
     faults = {name for name in noisy.columns if name.endswith(".fault")}
     assert set(noisy.columns) == set(rows[0]) | faults
     for name in rows[0]:
@@ -138,11 +146,9 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
 def test_additions_are_the_straight_line_bit_for_bit_too(system, values, setting, step):
     changes = {port_name(name): value for name, value in values.items()}
     table = run(system.with_parameters(changes), 200 * step, step)
-    rows = [
-        row(now, before) for before, now in pairwise(closed_loop(200, setting._replace(h=step)))
-    ]
+    rows = rows_of(list(closed_loop(200, setting._replace(h=step))), setting, table)
     for name in rows[0]:
-        assert np.array_equal(table[name][1:], [values[name] for values in rows]), name
+        assert np.array_equal(table[name], [values[name] for values in rows]), name
 
 
 def test_fig4_without_noise_never_reaches_a_limit(quiet: Table):
@@ -167,8 +173,8 @@ def test_fig4_estimates_stay_within_the_bound_of_their_law(quiet: Table):
 
 def test_estimated_velocity_is_the_true_one_after_the_transient(quiet: Table):
     """The observer lags by about 1 / k_d = 20 ms: 1 cm/s at the accelerations of the helix."""
-    true = quiet.group(*(f"plant.dy.{k}" for k in XYZ))[1500:-1]
-    estimated = quiet.group(*(f"controller.dy_hat.{k}" for k in XYZ))[1501:]
+    true = quiet.start_values(*(f"plant.dy.{k}" for k in XYZ))[1500:]
+    estimated = quiet.step_values(*(f"controller.dy_hat.{k}" for k in XYZ))[1500:]
     assert np.abs(true - estimated).max() < 0.01
 
 
@@ -185,7 +191,7 @@ def test_jacobi_changes_the_efforts_by_less_than_4_percent(system: System, noisy
 def test_true_control_point_is_the_measured_one_without_noise(quiet: Table, noisy: Table):
     measured = quiet.group(*(f"plant.y.{k}" for k in XYZ))
     np.testing.assert_allclose(true_control_point(quiet), measured, atol=1e-12)
-    error = quiet.group(*(f"controller.e.{k}" for k in XYZ))[1:]
+    error = quiet.step_values(*(f"controller.e.{k}" for k in XYZ))
     np.testing.assert_allclose(tracking_error(quiet)[:-1], error, atol=1e-12)
     noise = noisy.group(*(f"plant.y.{k}" for k in XYZ)) - true_control_point(noisy)
     assert noise.std() == pytest.approx(0.001, rel=0.03)

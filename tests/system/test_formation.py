@@ -31,19 +31,12 @@ class Fleet:
         return self.result.group(*(f"{name}.{member}" for member in members))
 
     def _error(self, name: str) -> np.ndarray:
-        """|y - y_d|, with (9): y is ell ahead of the centre of mass.
-
-        A known leader's way in a step is missing in y_d: the leader is where it is at its end.
-        """
+        """|y - y_d|, with (9): y is ell ahead of the centre of mass."""
         theta, psi = (self.result[f"{name}.plant.eta.{k}"] for k in ("theta", "psi"))
         level = np.cos(theta)
         bow = np.column_stack((level * np.cos(psi), level * np.sin(psi), -np.sin(theta)))
         y = self.group(f"{name}.plant.eta", "xyz") + 0.35 * bow
-        wanted = self.group(f"{name}.planner.y_d", "xyz")
-        if "leader.y_d.x" in self.result.columns:
-            way = np.diff(self.group("leader.y_d", "xyz"), axis=0)
-            wanted[1:] += way
-        return np.linalg.norm(y - wanted, axis=1)
+        return np.linalg.norm(y - self.group(f"{name}.planner.y_d", "xyz"), axis=1)
 
     def largest(self, after: float) -> float:
         return float(self.errors[:, self.time > after].max())
@@ -119,8 +112,7 @@ def test_places_in_a_v_are_those_of_geometry(fleets):
     """Where the leader runs straight north, its V lies at 45 degrees to both sides."""
     proposed, _ = fleets("formation-v")
     row = int(np.searchsorted(proposed.time, 40.0))
-    # A step takes what the leader shows at its beginning.
-    leader = proposed.group("leader.y_d", "xyz")[row - 1]
+    leader = proposed.group("leader.y_d", "xyz")[row]
     half = 5.0 / np.sqrt(2.0)
     for name, offset in (("auv1", (0, 0)), ("auv2", (-half, half)), ("auv3", (-half, -half))):
         place = proposed.group(f"{name}.planner.y_d", "xyz")[row]

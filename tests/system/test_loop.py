@@ -316,8 +316,7 @@ def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
     assert pushes.times == [0, 10, 620, 650]
     assert (table.failure, table.ending.remark) == (None, "ended at t = 13 s: enough")
     assert len(table) == 651
-    # A row holds the inputs that the step before it was made with.
-    force, command = table["plant.tau.u"], table["controller.tau.u"]
-    free = np.r_[1:11, 621:651]
-    np.testing.assert_array_equal(force[11:621], 0.0)
+    force, command = table.step_values("plant.tau.u", "controller.tau.u").T
+    free = np.r_[1:10, 620:650]
+    np.testing.assert_array_equal(force[10:620], 0.0)
     np.testing.assert_array_equal(force[free], command[free - (order == "jacobi")])

@@ -43,8 +43,10 @@ def test_controllers_follow_the_curve_as_the_remark_and_the_page_say(result):
 def test_fins_are_at_their_limits_as_often_as_is_said(result):
     name, table = result
     moments = [f"{k}" for k in ("tau.q", "tau.r")]
-    wanted = table.group(*(f"controller.{k}" for k in moments))[1:]
-    attained = table.group(*(f"allocation.{k.replace('tau', 'tau_attained')}" for k in moments))[1:]
+    wanted = table.step_values(*(f"controller.{k}" for k in moments))
+    attained = table.step_values(
+        *(f"allocation.{k.replace('tau', 'tau_attained')}" for k in moments)
+    )
     share = (np.abs(wanted - attained) > 1e-9).mean(axis=0)
     said = {"remus": (0.33, 0.44), "remus-pd": (0.0, 0.0)}
     assert share == pytest.approx(said[name], abs=0.01)

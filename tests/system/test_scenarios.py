@@ -211,7 +211,7 @@ def test_certificates_agree_with_the_matrix_form_of_34(run: Runner):
         J_inverse = np.linalg.inv(np.column_stack([R[:, 0], -ell * R[:, 2], ell * R[:, 1]]))
         M_2 = J_inverse.T @ M_1 @ J_inverse
         e, z, dy_hat, y_d, dy_d = (
-            result.group(*(f"controller.{group}.{a}" for a in "xyz"))[k]
+            result.step_values(*(f"controller.{group}.{a}" for a in "xyz"))[k - 1]
             for group in ("e", "z", "dy_hat", "y_d", "dy_d")
         )
         dy = result.group(*(f"plant.dy.{a}" for a in "xyz"))[k - 1]
@@ -224,7 +224,7 @@ def test_certificates_agree_with_the_matrix_form_of_34(run: Runner):
         assert column["V_without_theta"][row] == pytest.approx(V, rel=1e-9)
         np.testing.assert_allclose([column[f"r_1.{a}"][row] for a in "xyz"], r_1, atol=1e-12)
         np.testing.assert_allclose([column[f"r_2.{a}"][row] for a in "xyz"], r_2, atol=1e-12)
-        tau = result["plant.tau.u"][k]
+        [tau] = result.step_values("plant.tau.u")[k - 1]
         assert column["saturation_margin.u"][row] == pytest.approx(80 - abs(tau))
 
 

@@ -54,7 +54,7 @@ def test_vehicle_is_told_the_water_where_it_is(request, kind: str, step: float):
         still = Variation(0.0, 0.0, 1.0)
         expected = sea.water(default, rows, still, place, float(result.time[i]))
         for group, values in zip(("water", "dwater"), expected[:2], strict=True):
-            found = result.group(*(f"plant.{group}.{axis}" for axis in "xyz"))[i + 1]
+            found = result.step_values(*(f"plant.{group}.{axis}" for axis in "xyz"))[i]
             np.testing.assert_allclose(found, values, rtol=1e-9, atol=1e-12)
 
 

@@ -72,7 +72,7 @@ def test_options_are_those_of_the_runs(found):
     variant = found.six.variant(tuple(options))
     for scenario, parameters in ((PROPOSED, {"controller.eps_t": 1.0}), (PD, {})):
         result = simulate(scenario, parameters, stop_time=57.0, order="jacobi", kind="native")
-        applied = np.column_stack([result[f"plant.tau_applied.{k}"][1:] for k in "uqr"])
+        applied = result.step_values(*(f"plant.tau_applied.{k}" for k in "uqr"))
         np.testing.assert_allclose(
             variant.numbers[scenario],
             [*np.sqrt(np.sum(applied**2, axis=0) / 57.0), *result.metrics()["final_error"]],

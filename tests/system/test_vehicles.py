@@ -101,8 +101,8 @@ def test_names_of_components_may_have_dots():
     flat_system = load("fig4", "native")
     system = inner(flat_system)
     [loop] = loops_of(system)
-    named = {role: f"auv1.{name}" for role, name in vars(STANDARD).items() if name}
-    assert vars(loop) == {**named, "leader": ""}
+    named = {role: f"auv1.{name}" for role, name in vars(STANDARD).items()}
+    assert vars(loop) == named
     found, flat = (simulate(one, stop_time=1.0) for one in (system, flat_system))
     for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
         assert found.metrics()[key] == flat.metrics()[key]

@@ -1,7 +1,7 @@
 """Observers of a run: what they are told, in which blocks of rows, a selection, a progress bar.
 
-A row holds, at time t_k, the outputs after the step that ended there, and the inputs that this
-step was made with.
+In feedthrough order a row holds all values of its time t_k; in other orders the outputs after the
+step that ended there, and the inputs that this step was made with.
 """
 
 from __future__ import annotations

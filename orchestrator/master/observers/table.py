@@ -23,10 +23,9 @@ _ROUNDING = 1e-6
 class Table:
     """An observer that keeps the rows of a run, one at the start and one a step.
 
-    A row holds, at time t_k, the outputs after the step that ended there, and the inputs that this
-    step was made with. What a sampled component has computed in a step therefore belongs to the
-    time at which the step began: :meth:`step_values`, :meth:`start_values` and
-    :attr:`step_start` pair the two.
+    What acts in a step stands in the row of its beginning or in that of its end, as
+    :attr:`.Experiment.acting_row` says. :meth:`step_values`, :meth:`start_values` and
+    :attr:`step_start` pair it with what the other columns hold when it begins.
 
     Attributes:
         header: of the run: columns, experiment, parameters.
@@ -138,25 +137,26 @@ class Table:
 
     @cached_property
     def _before(self) -> np.ndarray:
-        """For every row but the first, the row of the time at which its step began.
+        """For every step of :meth:`step_values`, the row of the time at which it began.
 
-        Where rows were left out, it is the row itself, a step later.
+        Where rows were left out and what acts stands in that of its end, it is that row.
         """
         ends = np.arange(1, self._n)
         follows = np.diff(self.time) <= self.header.experiment.step * (1.0 + _ROUNDING)
-        return np.where(follows, ends - 1, ends)
+        return np.where(follows | (self.header.experiment.acting_row == 0), ends - 1, ends)
 
     @property
     def step_start(self) -> np.ndarray:
-        """Times at which the steps began that ended at the second row and all after it [s]."""
+        """Times at which the steps of :meth:`step_values` began [s]."""
         exact = self.time[self._before]
         skipped = self._before == np.arange(1, self._n)
         starts: np.ndarray = np.where(skipped, exact - self.header.experiment.step, exact)
         return starts
 
     def step_values(self, *columns: str) -> np.ndarray:
-        """What these steps were made with, or what sampled components computed in them."""
-        return self.group(*columns)[1:]
+        """What acts in steps, or follows from inputs of their beginning: of each row but one."""
+        first = self.header.experiment.acting_row
+        return self.group(*columns)[first : len(self) - 1 + first]
 
     def start_values(self, *columns: str) -> np.ndarray:
         """What these columns held when these steps began."""

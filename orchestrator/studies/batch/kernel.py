@@ -1,7 +1,6 @@
 """One run of the closed loop, and its indices on the way: the text that is compiled.
 
-It makes the rows that the FMUs make: a row holds, at time t_k, what both vehicles show then, and
-what the controller has computed at the beginning of the step that ends there. The indices equal
+It makes the rows that the FMUs make: a row holds all signals of its time. The indices equal
 :data:`orchestrator.vehicle.indices.INDICES` of these rows bit for bit: sums go on row by row, in
 the same order.
 """
@@ -20,7 +19,7 @@ from auv_fmu.blocks import Blocks
 from auv_fmu.closed_loop import PAPER, Instant, Moment, Setting, Splits, blocks_of
 from auv_fmu.control_point import control_point
 from auv_fmu.euler import LARGEST_STATE
-from auv_fmu.vectors import Vector3, Vector4, Vector6, difference, norm
+from auv_fmu.vectors import Vector3, Vector4, difference, norm
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import AXES, DIRECTIONS, Loop
 
@@ -38,11 +37,18 @@ def columns(loop: Loop) -> tuple[str, ...]:
         *loop.y_d,
         *loop.dy_d,
         *(f"{loop.planner}.ddy_d.{axis}" for axis in AXES),
+        *loop.applied,
+        *computed(loop),
+    )
+
+
+def computed(loop: Loop) -> tuple[str, ...]:
+    """Of these columns, those that follow from others of the same time at once."""
+    return (
         *loop.dy_hat,
         *loop.theta_hat,
         *loop.tau,
         *loop.commanded,
-        *loop.applied,
         *(f"{loop.vehicle}.tau_w.{direction}" for direction in DIRECTIONS),
     )
 
@@ -57,17 +63,6 @@ class RunSteps(NamedTuple):
     parts: Splits  #: of a step of the whole length
     last_parts: Splits  #: of the shorter one
     delayed: bool  #: what blocks tell others acts one step late: Jacobi order
-
-
-class Done(NamedTuple):
-    """What was computed in a step."""
-
-    velocity: Vector3  #: that the controller went by [m/s]
-    theta_hat: Any  #: and parameters
-    commanded: Vector3  #: by the controller (tau_u, tau_q, tau_r) [N, N.m]
-    told: Vector3  #: to the actuators, or to their allocation
-    tau: Vector3  #: that acts
-    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
 
 
 def run(
@@ -100,59 +95,51 @@ def run(
     progress[0] = -1
     n, spare = normals(generator, noisy, (False, 0.0))
     moment = closed_loop.begin(setting, blocks, n)
-    first = closed_loop.act(
-        setting, blocks, moment, run_steps.h, run_steps.parts, run_steps.delayed
-    )
-    acting = blocks.vehicle.acting(setting.plant, moment.vehicles.plant, first.tau)
-    done = done_in(first, acting)
-    if not (is_sound(moment) and nought(done) == 0.0):
+    if not is_sound(moment):
         return moment
+    before = (0.0, 0.0, 0.0)
     k = 0
     while True:
         # Here, where the controller is about to need the sines of the same attitude.
-        row = row_of(setting, moment, done)
+        row = row_of(setting, moment)
         for j in range(len(accumulators)):
             if k <= ends[j].steps:
                 take_row(accumulators[j], row, ends[j])
+        h, parts, end = part_of(run_steps, k)
+        instant = closed_loop.act(setting, blocks, moment, h, parts, run_steps.delayed)
+        if nought(instant.now) != 0.0:
+            break
         if len(rows):
-            fill(rows[k], moment, done)
+            fill(rows[k], setting, instant)
         progress[0] = k
         if k == run_steps.steps:
             break
-        h, parts, end = part_of(run_steps, k)
         n, spare = normals(generator, noisy, spare)
-        instant = closed_loop.act(setting, blocks, moment, h, parts, run_steps.delayed)
-        begun, before = moment, done.tau
         moment = closed_loop.step(setting, blocks, instant, h, parts, end, n)
-        acting = blocks.vehicle.acting(setting.plant, moment.vehicles.plant, instant.tau)
-        done = done_in(instant, acting)
         if not is_sound(moment):
             break
-        miss = difference(done.velocity, begun.scene.plant.dy)
-        one = StepSignals(begun.t, end, done.told, done.tau, before, miss, k == 0)
-        for j in range(len(accumulators)):
-            if k < ends[j].steps:
-                take_step(accumulators[j], one, limits, ends[j])
         k += 1
+        progress[0] = k
+        one = signals_of(setting, instant, moment, before)
+        for j in range(len(accumulators)):
+            if k <= ends[j].steps:
+                take_step(accumulators[j], one, limits, ends[j])
+        before = one.tau
     return moment
 
 
 def part_of(run_steps: RunSteps, k: int) -> tuple[float, Splits, float]:
-    """Length of step k of a run [s], what it is split into, and when it ends [s]."""
-    if k < run_steps.full:
+    """Length of step k of a run [s], what it is split into, and when it ends [s].
+
+    A step that would follow the last one has the whole length.
+    """
+    if k < run_steps.full or k == run_steps.steps:
         return run_steps.h, run_steps.parts, (k + 1) * run_steps.h
     return run_steps.stop - k * run_steps.h, run_steps.last_parts, run_steps.stop
 
 
-def done_in(instant: Instant, tau: Vector3) -> Done:
-    """What was computed in the step that an instant begins, after which tau [N, N.m] acts."""
-    scene, state, signals = instant.scene, instant.controller_state, instant.signals
-    velocity, theta_hat = blocks.controller.estimates(scene, state, signals)
-    return Done(velocity, theta_hat, signals.tau, instant.command, tau, instant.tau_w)
-
-
 def is_sound(moment: Moment) -> bool:
-    """Whether every component accepts a step: the states that it ends with, and all outputs.
+    """Whether every component accepts a step: the states that it ends with, and what they show.
 
     Outputs that are finite if the states are need no look.
     """
@@ -162,7 +149,7 @@ def is_sound(moment: Moment) -> bool:
         and is_bounded(vehicles.planner)
         and is_bounded(vehicles.water)
         and is_bounded(moment.controller_state)
-        and nought((scene.y, scene.plant.dy, scene.reference, moment.before)) == 0.0
+        and nought((scene.y, scene.plant.dy, scene.reference)) == 0.0
     )
 
 
@@ -198,8 +185,8 @@ def gauss(
     return cos(angle) * radius, (True, sin(angle) * radius)
 
 
-def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
-    """What the indices need of a row, as it follows from the ports."""
+def row_of(setting: Setting, moment: Moment) -> RowSignals:
+    """What the indices need of a time, as it follows from the ports."""
     seen = moment.scene.plant
     phi, theta, psi = seen.euler
     rotation = rotation_from_euler(phi, theta, psi)
@@ -211,15 +198,43 @@ def row_of(setting: Setting, moment: Moment, done: Done) -> RowSignals:
         difference(y, moment.scene.reference.y_d),
         seen.dy,
         sqrt(v * v + w * w),
-        done.theta_hat,
     )
 
 
-def fill(row: np.ndarray, moment: Moment, done: Done) -> None:
+def signals_of(setting: Setting, instant: Instant, moment: Moment, before: Vector3) -> StepSignals:
+    """What the indices need of a step from an instant to a moment.
+
+    Args:
+        setting: of the loop.
+        instant: that it begins with.
+        moment: that it ends with.
+        before: what was applied in the step before [N, N.m].
+
+    """
+    scene = instant.scene
+    velocity, theta_hat = blocks.controller.estimates(
+        scene, instant.controller_state, instant.signals
+    )
+    return StepSignals(
+        instant.t,
+        moment.t,
+        instant.command,
+        blocks.vehicle.acting(setting.plant, moment.vehicles.plant, instant.tau),
+        before,
+        difference(velocity, scene.plant.dy),
+        theta_hat,
+    )
+
+
+def fill(row: np.ndarray, setting: Setting, instant: Instant) -> None:
     """Fill a row with the time and the values of :func:`columns`."""
-    scene, seen = moment.scene, moment.scene.plant
-    shown = moment.vehicles.plant.position, seen.euler, seen.nu, scene.y, seen.dy
-    values = flat((moment.t, shown, scene.reference, done))
+    scene, state = instant.scene, instant.vehicles.plant
+    seen = scene.plant
+    shown = state.position, seen.euler, seen.nu, scene.y, seen.dy
+    estimates = blocks.controller.estimates(scene, instant.controller_state, instant.signals)
+    computed = estimates, instant.signals.tau, instant.command, instant.tau_w
+    given = blocks.vehicle.acting(setting.plant, state, instant.tau)
+    values = flat((instant.t, shown, scene.reference, given, computed))
     for i in range(len(values)):
         row[i] = values[i]
 
@@ -264,7 +279,6 @@ class RowSignals(NamedTuple):
     e: Vector3  #: y - y_d with the true control point [m]
     dy: Vector3  #: velocity of the control point [m/s]
     drift: float  #: |(v, w)| [m/s]
-    theta_hat: Vector4
 
 
 class StepSignals(NamedTuple):
@@ -276,7 +290,7 @@ class StepSignals(NamedTuple):
     tau: Vector3  #: applied [N, N.m]
     before: Vector3  #: applied in the step before [N, N.m]
     miss: Vector3  #: dy_hat - dy at its beginning [m/s]
-    is_first: bool
+    theta_hat: Vector4
 
 
 def new_accumulators(n: int) -> np.ndarray:
@@ -294,18 +308,12 @@ def take_row(accumulator: Any, row: RowSignals, end: Any) -> None:
         accumulator.reached = row.t
     accumulator.speed = max(accumulator.speed, norm(row.dy))
     accumulator.drift = max(accumulator.drift, row.drift)
-    accumulator.rho_hat = max(accumulator.rho_hat, row.theta_hat[0])
     if isnan(accumulator.upright):
         accumulator.upright = row.cos_pitch
     if row.cos_pitch * accumulator.upright <= 0.0:
         accumulator.vertical = min(accumulator.vertical, row.t)
-    for i in range(4):
-        accumulator.end[i] = row.theta_hat[i]
     if row.t >= end.late:
         accumulator.late = max(accumulator.late, error)
-        if isnan(accumulator.half[0]):
-            for i in range(4):
-                accumulator.half[i] = row.theta_hat[i]
     if row.t >= end.last:
         for i in range(3):
             accumulator.final[i] = max(accumulator.final[i], abs(row.e[i]))
@@ -316,11 +324,17 @@ def take_step(accumulator: Any, step: StepSignals, limits: Limits, end: Any) -> 
     h = step.ended - step.begun
     for i in range(3):
         accumulator.square[i] += step.tau[i] * step.tau[i] * h
-        if not step.is_first:
+        if step.begun > 0.0:
             accumulator.variation[i] += abs(step.tau[i] - step.before[i])
         accumulator.peak[i] = max(accumulator.peak[i], abs(step.command[i]))
         if not limits.tau_min[i] <= step.command[i] <= limits.tau_max[i]:
             accumulator.outside[i] += 1
+    accumulator.rho_hat = max(accumulator.rho_hat, step.theta_hat[0])
+    is_half = step.ended >= end.late and isnan(accumulator.half[0])
+    for i in range(4):
+        accumulator.end[i] = step.theta_hat[i]
+        if is_half:
+            accumulator.half[i] = step.theta_hat[i]
     if step.begun >= end.late:
         accumulator.instants += 1
         for i in range(3):

@@ -4,6 +4,7 @@ export { Refusal } from "./experiment";
 export {
   commandName,
   controlPoint,
+  inSteps,
   limits,
   metrics,
   reference,

@@ -48,27 +48,13 @@ export function reference(result: Result, { planner }: VehicleData): Columns | u
   return AXES.map((axis) => result.column(`${planner}.y_d.${axis}`));
 }
 
-/**
- * e = y - y_d with the true control point [m]; undefined: the vehicle has no reference.
- *
- * A place in a formation is that beside the leader's reference at the beginning of a step: the way
- * of the leader in that step is added.
- */
+/** e = y - y_d with the true control point [m]; undefined: the vehicle has no reference. */
 export function trackingError(result: Result, vehicle: VehicleData): Columns | undefined {
   const wanted = reference(result, vehicle);
   if (wanted === undefined) return undefined;
-  return made(errors, result, vehicle, () => {
-    const { leader, planner } = vehicle;
-    const e = controlPoint(result, vehicle).map((y, i) =>
-      y.map((value, k) => value - wanted[i][k]),
-    );
-    if (!leader) return e;
-    return e.map((one, i) => {
-      const leading = result.column(`${leader}.y_d.${AXES[i]}`);
-      const led = result.column(`${planner}.y_0.${AXES[i]}`);
-      return one.map((value, k) => value - (leading[k] - led[k]));
-    });
-  });
+  return made(errors, result, vehicle, () =>
+    controlPoint(result, vehicle).map((y, i) => y.map((value, k) => value - wanted[i][k])),
+  );
 }
 
 /** Distance between the two centres of mass that are closest [m]; undefined: there is only one. */
@@ -94,6 +80,19 @@ export function smallestDistance(
   const found = squares.map(Math.sqrt);
   gaps.set(result, found);
   return found;
+}
+
+/** What acts in each step, or follows from inputs of its beginning. */
+export function inSteps(result: Result, name: string): Float64Array {
+  return result.column(name).subarray(result.actingRow, result.rows - 1 + result.actingRow);
+}
+
+/** What is applied in each step: of actuators with a lag, what they give at its end. */
+function applied(result: Result, { vehicle, allocation }: VehicleData, actuator: string) {
+  const name = `${vehicle}.tau_applied.${actuator}`;
+  const hasLag =
+    allocation !== "" || Number(result.parameters[`${vehicle}.actuator.T.${actuator}`]);
+  return hasLag ? result.column(name).subarray(1) : inSteps(result, name);
 }
 
 /** What is commanded: what the vehicle takes, or the allocation of one that takes no tau. */
@@ -132,15 +131,15 @@ export function metrics(
   const end = time[steps];
   const [square, peak, outside, variation] = [0, 0, 0, 0].map(() => new Array<number>(3).fill(0));
   ACTUATORS.forEach((actuator, i) => {
-    const applied = result.column(`${vehicle.vehicle}.tau_applied.${actuator}`);
-    const commanded = result.column(commandName(result, vehicle, actuator));
+    const force = applied(result, vehicle, actuator);
+    const commanded = inSteps(result, commandName(result, vehicle, actuator));
     const [lower, upper] = limits(result, vehicle, actuator) ?? [-Infinity, Infinity];
-    for (let k = 1; k < rows; k++) {
-      square[i] += applied[k] ** 2 * (time[k] - time[k - 1]);
+    for (let k = 0; k < steps; k++) {
+      square[i] += force[k] ** 2 * (time[k + 1] - time[k]);
       peak[i] = Math.max(peak[i], Math.abs(commanded[k]));
       if (commanded[k] < lower || commanded[k] > upper) outside[i] += 1;
       // Before the first step nothing was applied.
-      if (k > 1) variation[i] += Math.abs(applied[k] - applied[k - 1]);
+      if (k > 0) variation[i] += Math.abs(force[k] - force[k - 1]);
     }
   });
   const error = trackingError(result, vehicle);

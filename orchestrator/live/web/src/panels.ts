@@ -1,6 +1,6 @@
 // What the charts show of a run.
 
-import { commandName, limits, smallestDistance, trackingError } from "./engine";
+import { commandName, inSteps, limits, smallestDistance, trackingError } from "./engine";
 import type { Data, Result, VehicleData } from "./types";
 
 /** Colour and style of a line: of a controller, of what is true or wanted, or of all vehicles. */
@@ -119,13 +119,13 @@ export function lines(
   const whole = longest(results);
   const time = whole?.time ?? new Float64Array(0);
   const rows = Math.max(0, (whole?.rows ?? 0) - 1);
-  /** Times at which steps begin: the row at whose end they stand has their signals. */
+  /** Times at which steps begin. */
   const starts = time.subarray(0, rows);
   const of = <T>(make: (result: Result, chosen: Chosen) => T): (T | undefined)[] =>
     results.map((result, place) => result && make(result, chosen[place]));
   const errors = of((result, { vehicle }) => trackingError(result, vehicle));
   const steps = (result: Result | undefined, name: string) =>
-    result?.has(name) ? result.column(name).subarray(1) : undefined;
+    result?.has(name) ? inSteps(result, name) : undefined;
   const observed = results.findIndex((result, place) =>
     result?.has(`${chosen[place].vehicle.controller}.dy_hat.x`),
   );

@@ -25,6 +25,12 @@ interface LinkedStage {
   readonly members: readonly Instance[];
 }
 
+/** Some of a stage's instances take their inputs in it, and some are read. */
+interface Stepping extends LinkedStage {
+  readonly taking: ReadonlySet<Instance>;
+  readonly read: readonly Instance[];
+}
+
 /** Runs loops in the compiled module. */
 export class Engine {
   private constructor(
@@ -182,19 +188,31 @@ class Simulation {
   }
 
   private linked({ connections, components }: Stage): LinkedStage {
-    const members = components
-      .map((name) => this.instances.get(name))
-      .filter((one) => one !== undefined);
-    return { gathering: new Gathering(this.row, connections), members };
+    return { gathering: new Gathering(this.row, connections), members: this.named(components) };
+  }
+
+  private stepping(stage: Stage): Stepping {
+    const { passing, read } = this.loop;
+    const passed = new Set(passing.flatMap(({ components }) => components));
+    return {
+      ...this.linked(stage),
+      taking: new Set(this.named(stage.components.filter((name) => !passed.has(name)))),
+      read: this.named(stage.components.filter((name) => read.includes(name))),
+    };
+  }
+
+  private named(components: readonly string[]): readonly Instance[] {
+    return components.map((name) => this.instances.get(name)).filter((one) => one !== undefined);
   }
 
   /** Step to the end, or to the first failure. */
   private advance(events: Events, spare: Result | undefined): Result {
-    const { experiment, instances, row } = this;
-    const stages = this.loop.stages.map((stage) => this.linked(stage));
+    const { experiment, instances, row, loop } = this;
+    const passing = loop.passing.map((stage) => this.linked(stage));
+    const stages = loop.stages.map((stage) => this.stepping(stage));
     const overrides = new Overrides(
       row,
-      stages.map(({ gathering }) => gathering),
+      [...passing, ...stages].map(({ gathering }) => gathering),
     );
     const run: Run = { experiment, instances, row, overrides, values: this.given, made: 0 };
     const width = 1 + row.names.length;
@@ -203,11 +221,16 @@ class Simulation {
     const free = spare?.table.buffer;
     const isFit = free instanceof ArrayBuffer && free.byteLength === REAL * size;
     const table = isFit ? new Float64Array(free) : new Float64Array(size);
-    /** Keep the row of now; whether all of it is finite. */
-    const append = (): boolean => {
+    let rows = 0;
+    /** Let values pass, and keep the row of now, unless something in it is not finite. */
+    const show = (): boolean => {
+      for (const { gathering, members } of passing) {
+        gathering.gather();
+        for (const instance of members) instance.exchange();
+      }
       const { values } = row;
-      const first = run.made * width;
-      table[first] = experiment.time(run.made);
+      const first = rows * width;
+      table[first] = experiment.time(rows);
       // One by one: for so few values, `set` takes ten times as long. Times zero, what is finite is
       // zero and what is not is nan.
       let sum = 0;
@@ -216,45 +239,49 @@ class Simulation {
         table[first + 1 + k] = value;
         sum += value * 0;
       }
-      return sum === 0;
+      if (sum !== 0) return false;
+      rows += 1;
+      return true;
     };
-    append();
+    if (loop.actingRow) show();
     let [failure, remark]: [string | undefined, string | undefined] = [undefined, undefined];
     const now = () => `t = ${general(experiment.time(run.made), 12)} s`;
     try {
-      let due = events.act(run);
-      while (run.made < experiment.steps) {
+      for (let due = 0; ; run.made += 1) {
+        // What an event sets acts on the values that pass then.
+        if (run.made >= due) due = events.act(run);
+        if (!loop.actingRow && !show()) break;
+        if (run.made === experiment.steps) break;
         const [time, length] = [experiment.time(run.made), experiment.length(run.made)];
-        for (const { gathering, members } of stages) {
+        for (const { gathering, members, taking, read } of stages) {
           gathering.gather();
           for (const instance of members) {
-            instance.setInputs();
+            if (taking.has(instance)) instance.setInputs();
             instance.doStep(time, length);
           }
-          for (const instance of members) instance.getOutputs();
+          for (const instance of read) instance.getOutputs();
         }
-        run.made += 1;
-        if (!append()) {
-          run.made -= 1;
-          break;
-        }
-        if (run.made >= due) due = events.act(run);
+        if (loop.actingRow && !show()) break;
       }
     } catch (error) {
-      if (error instanceof Ended) remark = `ended at ${now()}: ${error.message}`;
-      else if (error instanceof ComponentFailed) failure = `stopped at ${now()}: ${error.message}`;
+      if (error instanceof Ended) {
+        if (!loop.actingRow) show();
+        remark = `ended at ${now()}: ${error.message}`;
+      } else if (error instanceof ComponentFailed)
+        failure = `stopped at ${now()}: ${error.message}`;
       else throw error;
     }
     if (remark === undefined) {
       // Also where another component has refused it in the same step.
-      const wrong = this.wrong(this.loop.stages.flatMap(({ components }) => components));
-      const time = experiment.time(Math.min(run.made + 1, experiment.steps));
+      const wrong = this.wrong(loop.stages.flatMap(({ components }) => components));
+      const time = experiment.time(Math.min(rows, experiment.steps));
       if (wrong !== undefined) failure = `stopped at t = ${general(time, 12)} s: ${wrong}`;
     }
-    const whole = table.subarray(0, (run.made + 1) * width);
+    const whole = table.subarray(0, rows * width);
     const more = this.heard - this.messages.length;
     if (more > 0) this.messages.push(`and ${more} more messages`);
     return new Table(
+      loop.actingRow,
       row.names,
       whole,
       this.parameters,
@@ -269,7 +296,8 @@ class Simulation {
   private wrong(components: readonly string[]): string | undefined {
     const { row, loop, data } = this;
     if (areFinite(row.values)) return undefined;
-    const sources = new Map(loop.stages.flatMap(({ connections }) => connections));
+    const all = [...loop.passing, ...loop.stages];
+    const sources = new Map(all.flatMap(({ connections }) => connections));
     let passedOn: string | undefined;
     for (const component of components) {
       const inputsFirst = Instance.layout(data.fmus[loop.components[component]]).flatMap(
@@ -315,6 +343,7 @@ class Table implements Result {
   readonly remark?: string;
 
   constructor(
+    readonly actingRow: number,
     readonly columns: readonly string[],
     readonly table: Float64Array,
     readonly parameters: Values,

@@ -80,7 +80,7 @@ export interface EventData {
   readonly canEnd: boolean;
 }
 
-/** Components that are stepped after their inputs have been gathered. */
+/** Components that act after their inputs have been gathered. */
 export interface Stage {
   /** `[target, source]`, names of ports. */
   readonly connections: readonly (readonly [string, string])[];
@@ -94,8 +94,6 @@ export interface VehicleData {
   readonly controller: string;
   readonly planner: string;
   readonly disturbance: string;
-  /** Whose reference the planner adds a place to; empty: nobody's. */
-  readonly leader: string;
   /** What commands the actuators of a vehicle that takes no tau. */
   readonly allocation: string;
 }
@@ -123,7 +121,14 @@ export interface LoopData {
   };
   /** In the order in which they hand on values before the first step. */
   readonly initial: readonly Stage[];
+  /** In which values pass through components before a row shows them. */
+  readonly passing: readonly Stage[];
+  /** In which components are stepped: those that no value passes through take their inputs here. */
   readonly stages: readonly Stage[];
+  /** Components that are read after their step. */
+  readonly read: readonly string[];
+  /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
+  readonly actingRow: number;
   /** All parameters, and inputs that nothing feeds. */
   readonly parameters: readonly Parameter[];
   /** Events by the name of the scenario that has them; `""`: none. */
@@ -192,6 +197,8 @@ export interface Occurrence {
 
 /** A run: rows at t = 0 and after each step. */
 export interface Result {
+  /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
+  readonly actingRow: number;
   /** Names of all ports, as in result.csv after `time`. */
   readonly columns: readonly string[];
   /** How many rows there are. */

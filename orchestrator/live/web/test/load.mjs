@@ -66,7 +66,6 @@ const vehicle = (prefix) => ({
   controller: `${prefix}controller`,
   planner: `${prefix}planner`,
   disturbance: `${prefix}disturbance`,
-  leader: "",
   allocation: "",
 });
 const loop = (label, controller, more) => ({
@@ -75,7 +74,10 @@ const loop = (label, controller, more) => ({
   components: components(controller),
   head: { order: null, vehicles: null, absent: [], only: [], wires: {} },
   initial: [],
+  passing: [],
   stages: [],
+  read: [],
+  actingRow: 0,
   parameters: [...gains, ...ofPlant],
   events,
   ...more,

@@ -14,11 +14,12 @@ from orchestrator.figures.drawing import compose, draw, overlay
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import GAUSS_SEIDEL
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD
 from support.machine import contents
-from support.tables import loop_table
+from support.tables import at_its_time, loop_table
 from support.tiers import slow
 
 
@@ -42,16 +43,29 @@ def test_lines_hold_the_numbers_of_the_table():
     assert notes == []
     estimates = lines(panel(figure, "estimate"))
     for i, line in enumerate(estimates, start=1):
-        # Computed in the step that ends at a row: it belongs to the time at which it began.
         np.testing.assert_array_equal(
-            line, (table.time[:-1], table[f"controller.theta_hat[{i}]"][1:])
+            line, (table.time[:-1], table[f"controller.theta_hat[{i}]"][:-1])
         )
+    # The command of the last row never acts.
     command = lines(panel(figure, r"$\tau_q$ [N·m]"))[0]
-    np.testing.assert_array_equal(command[1][:-1], table["plant.tau.q"][1:])
+    np.testing.assert_array_equal(command[1][:-1], table["plant.tau.q"][:-1])
     # (9) at no attitude at all would be eta + ell e1; here against its x component.
     x, theta, psi = (table[f"plant.eta.{k}"] for k in ("x", "theta", "psi"))
     error = x + 0.35 * np.cos(psi) * np.cos(theta) - table["planner.y_d.x"]
     np.testing.assert_allclose(lines(panel(figure, "error [m]"))[0][1], error, atol=1e-12)
+
+
+@pytest.mark.parametrize("figure", FIGURES)
+def test_the_row_that_signals_stand_in_changes_no_line(figure):
+    table = loop_table(order=GAUSS_SEIDEL)
+    acting = (*STANDARD.commanded, *STANDARD.dy_hat, *STANDARD.theta_hat)
+    for rows in FIGURES[figure].values():
+        one, other = (
+            [line.tolist() for axes in compose("", rows, [Drawn("run", each)])[0].axes
+             for line in lines(axes)]
+            for each in (table, at_its_time(table, acting))
+        )  # fmt: skip
+        assert one == other
 
 
 @pytest.mark.parametrize("z_up", [False, True])

@@ -179,8 +179,8 @@ def applied(values):
 
 
 def test_total_variation_counts_the_steps_until_a_time():
-    """|2 - 5| + |5 - 4| in each of three signals: the first row ends no step."""
-    table = applied([100.0, 2.0, 5.0, 4.0, 50.0])
+    """|2 - 5| + |5 - 4| in each of three signals: the next step ends later."""
+    table = applied([2.0, 5.0, 4.0, 50.0, 100.0])
     assert total_variation_until(table, 3.0).tolist() == [3.0 + 1.0] * 3
 
 
@@ -194,7 +194,7 @@ def test_of_draws_the_largest_peak_of_each_figure_counts():
 
 
 def test_severe_chattering_is_held_against_the_first_minute():
-    smooth, rough = applied([0.0, 1.0, 2.0]), applied([0.0, 1.0, 5.0])
+    smooth, rough = applied([1.0, 2.0, 0.0]), applied([1.0, 5.0, 0.0])
     found = claims.pd_chatters_severely(kept_run(smooth), kept_run(rough))
     assert found.verdict.startswith("agrees") and numbers_in(found.verdict) == [4, 4, 4]
     assert claims.pd_chatters_severely(kept_run(rough), kept_run(smooth)).verdict.startswith("**")
@@ -225,19 +225,20 @@ def arriving(force, steps=10):
     offsets = np.array([30.0] * steps + [0.5])
     table = still(offsets)
     columns = {name.replace(".", "__"): table[name] for name in table.columns}
-    pushes = {"plant__tau_applied__u": np.broadcast_to(force, steps + 1)}
+    pushes = {name.replace(".", "__"): 0.0 for name in STANDARD.applied}
+    pushes |= {"plant__tau_applied__u": np.broadcast_to(force, steps + 1)}
     return table_of(table.time, dict(table.parameters), **columns, **pushes)
 
 
 @given(arrays(float, 11, elements=st.floats(-80.0, 80.0)))
 def test_no_force_has_less_effort_than_its_impulse_takes(force):
-    """The effort by its definition, (59) without 1/T_f; the first row ends no step."""
+    """The effort by its definition, (59) without 1/T_f; the last row begins no step."""
     found = approach_of(arriving(force))
     assert found.duration == 200.0
-    effort = np.sqrt(20.0 * np.sum(force[1:] ** 2))
+    effort = np.sqrt(20.0 * np.sum(force[:-1] ** 2))
     assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
     # Without the step the same force is contradicted by nothing that comes later.
-    coded = np.sqrt(np.sum(force[1:] ** 2) / found.duration)
+    coded = np.sqrt(np.sum(force[:-1] ** 2) / found.duration)
     assume(coded > 1e-9)
     assert found.contradicts_until(coded, 20.0) <= found.duration * (1.0 + 1e-9)
 

@@ -116,7 +116,7 @@ def test_certificates(tables):
     # An instant a step: at t = 0 the command is away from its limit by 80 less what it is.
     u, *_ = figure.axes[2].lines
     assert len(u.get_xdata()) == len(table) - 1
-    assert u.get_ydata()[0] == pytest.approx(80.0 - abs(table["plant.tau.u"][1]))
+    assert u.get_ydata()[0] == pytest.approx(80.0 - abs(table.step_values("plant.tau.u")[0, 0]))
 
 
 def test_an_effect_is_drawn_or_says_why_not(tables, tmp_path):

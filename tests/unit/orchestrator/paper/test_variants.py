@@ -57,9 +57,9 @@ def run_of(rows=10_001, **columns):
 
 
 def test_numbers_are_read_off_rows():
-    """A constant force has the effort |F| sqrt(T); the first row ends no step; e_f is of 5 s."""
+    """A constant force has the effort |F| sqrt(T); the last row begins no step; e_f is of 5 s."""
     force = np.full(10_001, 3.0)
-    force[0] = 1e6
+    force[-1] = 1e6
     # The control point is 0.35 m ahead, which is up at a pitch of 90 degrees; and y_d comes nearer.
     y_d = 1.0 + 0.35 + 2.0 / (1.0 + 0.02 * np.arange(10_001))
     found = numbers_of(
@@ -92,7 +92,7 @@ def test_a_run_that_ends_early_has_no_numbers():
 def test_formulas_are_those_that_someone_would_code():
     """By the rows themselves, at every end time."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 3))
-    columns = zip(STANDARD.applied, np.vstack(([0.0] * 3, tau)).T, strict=True)
+    columns = zip(STANDARD.applied, np.vstack((tau, [0.0] * 3)).T, strict=True)
     numbers = numbers_of(
         run_of(**{name.replace(".", "__"): tau for name, tau in columns}), END_TIMES
     )

@@ -37,7 +37,10 @@ def test_outcome_is_that_of_the_same_run_alone(engine, scenario, order):
             members = "xyz" if group == "final_error" else "uqr"
             assert value == metrics[group][members.index(member)], name
     for i in range(1, 5):
-        assert outcome.indices[f"theta_hat_end[{i}]"] == alone[f"controller.theta_hat[{i}]"][-1]
+        assert (
+            outcome.indices[f"theta_hat_end[{i}]"]
+            == alone.step_values(f"controller.theta_hat[{i}]")[-1]
+        )
 
 
 def test_failure_is_an_outcome_and_the_next_run_is_made(engine):

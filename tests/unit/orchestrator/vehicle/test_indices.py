@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from math import exp, log, pi, sqrt
 
@@ -10,7 +11,7 @@ import pytest
 
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
 from orchestrator.master.loop import choose_loop
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
@@ -27,6 +28,7 @@ from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of
 from orchestrator.vehicle.reducers import Fold, largest
 from orchestrator.vehicle.signals import AXES, EULER, STANDARD, Loop
+from support.tables import at_its_time
 
 T, H, ELL = 10.0, 0.02, 0.35
 
@@ -44,26 +46,45 @@ SIGNALS = {
     "plant.dy.z": lambda t: 0.0 * t,
     "plant.nu.v": lambda t: 3.0 * t / T,
     "plant.nu.w": lambda t: -4.0 * t / T,
-    # A controller is sampled: a row holds what it made of the instant a step before.
-    "controller.dy_hat.x": lambda t: 3.0 * np.cos(t - H) + np.sin(2.0 * pi * (t - H)),
-    "controller.dy_hat.y": lambda t: 4.0 * np.cos(t - H),
+    "controller.dy_hat.x": lambda t: 3.0 * np.cos(t) + np.sin(2.0 * pi * t),
+    "controller.dy_hat.y": lambda t: 4.0 * np.cos(t),
     "controller.dy_hat.z": lambda t: 0.0 * t + 2.0,
-    **{f"controller.theta_hat[{i}]": lambda t, i=i: i * t for i in range(1, 5)},
+    # A step ends a step later.
+    **{f"controller.theta_hat[{i}]": lambda t, i=i: i * (t + H) for i in range(1, 5)},
 }
+ESTIMATES = (*STANDARD.dy_hat, *STANDARD.theta_hat)
 TIME = H * np.arange(round(T / H) + 1)
 
 
-def indices(signals=SIGNALS, blocks=1):
+def table_with(signals=SIGNALS, order=FEEDTHROUGH, more=()) -> Table:
     ends = dict.fromkeys(STANDARD.lower_limits, -2.0) | dict.fromkeys(STANDARD.upper_limits, 2.0)
-    parameters = {port_name(name): value for name, value in {STANDARD.ell: ELL, **ends}.items()}
-    header = Header(tuple(signals), Experiment(T, H), parameters)
-    rows = np.column_stack([TIME, *(signal(TIME) for signal in signals.values())])
+    values = {STANDARD.ell: ELL, **ends, **dict(more)}
+    parameters = {port_name(name): value for name, value in values.items()}
+    header = Header(tuple(signals), Experiment(T, H, order), parameters)
+    return Table.of(header, np.column_stack([TIME, *(of(TIME) for of in signals.values())]))
+
+
+def indices_of(table: Table, blocks=1):
     observer = Indices()
-    observer.begin(header)
-    for block in np.array_split(rows, blocks):
+    observer.begin(table.header)
+    for block in np.array_split(table.rows, blocks):
         observer.take(block)
     observer.end(Ending())
     return observer.values()
+
+
+def indices(signals=SIGNALS, blocks=1):
+    return indices_of(table_with(signals), blocks)
+
+
+def noise() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
+    """Numbers that round, for all that indices are of."""
+    random = np.random.default_rng(1)
+    values = {
+        name: random.normal(scale=3.0, size=len(TIME))
+        for name in (*SIGNALS, *STANDARD.commanded, *STANDARD.applied)
+    }
+    return {name: lambda t, of=of: of for name, of in values.items()}
 
 
 def test_indices_of_signals_that_are_known():
@@ -88,14 +109,25 @@ def test_indices_of_signals_that_are_known():
 @pytest.mark.parametrize("blocks", [2, 7, 251, len(TIME)])
 def test_blocks_in_which_rows_come_change_nothing(blocks):
     """To the last bit, on numbers that round."""
-    random = np.random.default_rng(1)
-    values = {
-        name: random.normal(scale=3.0, size=len(TIME))
-        for name in (*SIGNALS, *STANDARD.commanded, *STANDARD.applied)
-    }
-    signals = {name: lambda t, of=of: of for name, of in values.items()}
+    signals = noise()
     assert indices(signals).keys() >= set(index_columns()) - {"time_to_reach"}
     assert indices(signals, blocks) == indices(signals)
+
+
+@pytest.mark.parametrize("blocks", [1, 7, len(TIME)])
+def test_the_row_that_signals_stand_in_changes_nothing(blocks):
+    """To the last bit; the last row holds what never acts."""
+    lagged = table_with(noise(), GAUSS_SEIDEL)
+    acting = (*ESTIMATES, *STANDARD.commanded, *STANDARD.applied)
+    assert indices_of(at_its_time(lagged, acting), blocks) == indices_of(lagged)
+
+
+def test_of_actuators_with_a_lag_the_end_of_a_step_counts():
+    """What they give is a state, which stands in the row of its time."""
+    lagged = table_with(noise(), GAUSS_SEIDEL, {"plant.actuator.T.q": 0.1}.items())
+    u, q, r = STANDARD.applied
+    moved = at_its_time(lagged, (*ESTIMATES, *STANDARD.commanded, u, r))
+    assert indices_of(moved) == indices_of(lagged)
 
 
 @pytest.mark.parametrize(

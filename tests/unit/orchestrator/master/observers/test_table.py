@@ -1,4 +1,4 @@
-"""Rows kept in memory, and the pairing of a sampled component's values with their times."""
+"""Rows kept in memory, and the pairing of what acts in a step with the time of its beginning."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment, Order
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName
 
 
-def table(times: list[float]) -> Table:
+def table(times: list[float], order: Order = GAUSS_SEIDEL) -> Table:
     """`a.t` holds the time; `a.start` the time at which the step of the row began, 0.1 s before."""
     t = np.array(times)
-    header = Header(("a.t", "a.start"), Experiment(10.0, 0.1), {PortName("a", "gain"): 2.0})
+    header = Header(("a.t", "a.start"), Experiment(10.0, 0.1, order), {PortName("a", "gain"): 2.0})
     return Table.of(header, np.column_stack([t, t, t - 0.1]))
 
 
@@ -30,6 +30,15 @@ def test_steps_keep_their_times_where_rows_were_left_out():
     np.testing.assert_allclose(thinned.step_start, [0.0, 0.9, 1.0, 1.9])
     # The row before 1.0 is not there: its own values stand in, a step later.
     np.testing.assert_allclose(thinned.start_values("a.t")[:, 0], [0.0, 1.0, 1.0, 2.0])
+
+
+def test_without_a_lag_values_of_a_step_stand_in_the_row_of_its_time():
+    """The last row begins no step; where rows were left out, each has its own time."""
+    for times in ([0.0, 0.1, 0.2, 0.3], [0.0, 0.1, 1.0, 1.1, 2.0]):
+        whole = table(times, FEEDTHROUGH)
+        assert whole.step_start.tolist() == times[:-1]
+        assert whole.step_values("a.t")[:, 0].tolist() == times[:-1]
+        assert whole.start_values("a.t")[:, 0].tolist() == times[:-1]
 
 
 def test_unknown_column_has_a_suggestion():
