@@ -86,13 +86,21 @@ def fleet(dist: Path) -> System:
     return replace(system, connections=tuple(wires), left_open={*system.left_open, *lost})
 
 
-#: By how many steps the input of the last of :func:`chain` is late in a host that is not two steps
-#: late, by the order of the components.
-LATE: dict[str, tuple[int, int]] = {}
+#: By how many steps the input of the last of :func:`chain` is late, listed downstream and upstream;
+#: in other hosts it is two.
+LATE = {
+    "cofmupy": (-1, -1), "gemseo-fmu": (-1, -1), "pathsim-fmi": (-1, 2), "pycosimlibrary": (0, 2),
+}  # fmt: skip
 
 
-def chain(folder: Path, names: str) -> System:
-    """The time passes through two components at once, and is then integrated; each is an FMU."""
+def chain(folder: Path, names: Sequence[str]) -> System:
+    """The time passes through two components at once, and is then integrated; each is an FMU.
+
+    Args:
+        folder: for the FMU.
+        names: of the components, in the order of which their inputs are connected, too.
+
+    """
     ports = {"u": "input", "y": "output", "x": "output", "t": "output"}
     text = description(
         "moment",
@@ -100,19 +108,25 @@ def chain(folder: Path, names: str) -> System:
         (unknown(i, "1" if i == 2 else "") for i in (2, 3, 4)),
     )
     fmu = write(folder / "moment.fmu", text, Path(small_fmus.__file__).with_name("moment.c"))
-    wires = {"a.u": "clock.t", "b.u": "a.y", "sum.u": "b.y"}
-    made = connected("chain", dict.fromkeys(names.split(), fmu), wires)
+    sources = {"a": "clock.t", "b": "a.y", "sum": "b.y"}
+    wires = {f"{name}.u": sources[name] for name in names if name in sources}
+    made = connected("chain", dict.fromkeys(names, fmu), wires)
     return replace(made, left_open={PortName("clock", "u")}, step=0.125)
 
 
 @pytest.mark.parametrize("place", [0, 1], ids=["downstream", "upstream"])
-@pytest.mark.parametrize("host", ["libcosim-ssp", *slow(*(set(HOSTS) - {"libcosim-ssp"}))])
+@pytest.mark.parametrize(
+    "host", ["ecos", *slow(*(name for name in HOSTS if name not in ("ecos", "fmuloader")))]
+)
 def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
     tmp_path: Path, host: str, place: int
 ):
-    """None where a tool follows feedthrough, one step for each where it exchanges all at once."""
+    """None where a tool follows feedthrough, one step for each where it exchanges all at once.
+
+    fmuloader is left out: it wants functions for model exchange, and has the loop of fmpy.
+    """
     require(host)
-    system = chain(tmp_path, ("clock a b sum", "sum b a clock")[place])
+    system = chain(tmp_path, ["clock", "a", "b", "sum"][:: (1, -1)[place]])
     assert system.step is not None
     h = system.step
     names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
