@@ -34,6 +34,7 @@ from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prep
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.scenario_events import read_events
+from orchestrator.system.names import listed
 from orchestrator.system.structure import System
 
 #: Writers by the names of their formats.
@@ -66,8 +67,15 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--flat",
         action="store_true",
-        help="write an SSP without systems in it, for tools that read none (libcosim, ecos): "
-        "auv1.plant becomes auv1_plant, and each component has a copy of its FMU",
+        help="write an SSP without systems in it, for tools that read none (libcosim, ecos, "
+        "OMSimulator's C++ program): auv1.plant becomes auv1_plant, and each component has a copy "
+        "of its FMU",
+    )
+    parser.add_argument(
+        "--connectors",
+        action="store_true",
+        help="give the system of an SSP connectors, for tools that take it as one component: its "
+        "components' outputs, and inputs without feed or value",
     )
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
@@ -200,12 +208,23 @@ def _export(options: argparse.Namespace) -> int:
     )
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
+    texts = [
+        str(name)
+        for name, value in system.parameters.items()
+        if isinstance(value, str) and value != system.component(name.component).start(name.port)
+    ]
+    if texts and options.format == "ssp":
+        say(
+            f"warning: {listed(texts)}: parameters of type String, which some tools, such as "
+            "OMSimulator, leave as they are in the FMU"
+        )
     folder = options.out or Path("exports", prepared.scenario.stem)
     write = EXPORT_FORMATS[options.format]
-    if options.flat:
-        if options.format != "ssp":
-            raise InputError("--flat applies only to --format ssp: leave it out")
-        write = partial(write_ssp, flat=True)
+    of_ssp = {name: getattr(options, name) for name in ("flat", "connectors")}
+    if options.format == "ssp":
+        write = partial(write_ssp, **of_ssp)
+    elif given := next((name for name, value in of_ssp.items() if value), None):
+        raise InputError(f"--{given} applies only to --format ssp: leave it out")
     with replace_files(folder, force=options.force) as unfinished:
         written = write(system, unfinished)
     for path in written:

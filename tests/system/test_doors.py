@@ -192,6 +192,18 @@ def test_one_fmu_is_a_system_with_its_own_experiment(tmp_path: Path, capsys):
     assert "has no variants" in capsys.readouterr().err
 
 
+def test_export_names_the_texts_that_other_tools_may_leave_out(tmp_path: Path, capsys):
+    ports = (variable("u", "input"), variable("y", "output"))
+    texts = (variable(f"text{i}", "parameter", "String", start="a") for i in (1, 2))
+    path = fmu(tmp_path / "m.fmu", *ports, *texts)
+    command = ["export", str(path), "--out", str(tmp_path / "x"), "--force"]
+    assert main([*command, "--set", "m.text1=a"]) == 0
+    assert "text" not in capsys.readouterr().err
+    assert main([*command, "--set", "m.text2=b"]) == 0
+    [line] = capsys.readouterr().err.splitlines()
+    assert mentions(line, "m.text2 String OMSimulator") and "text1" not in line
+
+
 @pytest.mark.parametrize("name", ["", "SystemStructure.ssd", "Winter.ssd"])
 def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
     relay(tmp_path)

@@ -116,7 +116,9 @@ def test_nested_values_vary_in_a_study(ssp: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "options", [[], ["--flat"], ["--format", "osp"]], ids=["nested", "flat", "osp"]
+    "options",
+    [[], ["--connectors"], ["--flat", "--connectors"], ["--flat"], ["--format", "osp"]],
+    ids=["nested", "offering", "flat and offering", "flat", "osp"],
 )
 def test_what_is_exported_runs_as_it_did(ssp: Path, tmp_path: Path, options: list[str]):
     assert main(["export", str(ssp), "--out", str(tmp_path / "x"), *options]) == 0
@@ -127,10 +129,12 @@ def test_what_is_exported_runs_as_it_did(ssp: Path, tmp_path: Path, options: lis
     assert ("auv2_plant.eta.x" if "--flat" in options else "auv2.plant.eta.x") in header
 
 
-def test_flat_is_refused_of_other_formats(ssp: Path, tmp_path: Path, capsys):
-    options = ["--flat", "--format", "osp", "--out", str(tmp_path)]
-    assert main(["export", str(ssp), *options]) == 2
-    assert "--flat applies only to --format ssp" in capsys.readouterr().err
+@pytest.mark.parametrize("option", ["--flat", "--connectors"])
+def test_options_of_ssps_are_refused_of_other_formats(
+    ssp: Path, tmp_path: Path, capsys, option: str
+):
+    assert main(["export", str(ssp), option, "--format", "osp", "--out", str(tmp_path)]) == 2
+    assert f"{option} applies only to --format ssp" in capsys.readouterr().err
 
 
 def test_what_is_loaded_is_what_was_written(ssp: Path):

@@ -24,11 +24,14 @@ from orchestrator.exchange.hosts.environments import folder_of, is_whole
 from orchestrator.exchange.verify import verify
 from orchestrator.formats.ssp.writer import structure_xml
 from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import JACOBI, Experiment
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from support import small_fmus
 from support.fleets import fleet_of
+from support.small_fmus import connected, description, unknown, variable, write
 from support.tiers import slow
 
 LIBDIR = sysconfig.get_config_var("LIBDIR")
@@ -42,13 +45,18 @@ APART = [name for name, host in HOSTS.items() if host.pins]
 WITHOUT_PARAMETERS = ["fmpy", "fmpy-ssp"]
 
 
-def check(system: System, host: str, steps: int) -> None:
-    """Hold all Real outputs of a host against ours; without the host the test is skipped."""
+def require(host: str) -> None:
+    """Skip the test without the host."""
     if host == "c-program" and machines_compiler() is None:
         pytest.skip("there is no C compiler")
     pins = HOSTS[host].pins
     if HOSTS[host].label() is None or (pins and not is_whole(folder_of(pins))):
         pytest.skip(f"{HOSTS[host].package} is not installed")
+
+
+def check(system: System, host: str, steps: int) -> None:
+    """Hold all Real outputs of a host against ours."""
+    require(host)
     [verdict] = compare(system, [host], steps, 0.02)
     assert verdict.failure is None
     assert verdict.deviation <= 1e-9
@@ -76,6 +84,57 @@ def fleet(dist: Path) -> System:
     ]  # fmt: skip
     lost = {c.target for c in system.connections} - {c.target for c in wires}
     return replace(system, connections=tuple(wires), left_open={*system.left_open, *lost})
+
+
+#: By how many steps the input of the last of :func:`chain` is late, listed downstream and upstream;
+#: in other hosts it is two.
+LATE = {
+    "cofmupy": (-1, -1), "gemseo-fmu": (-1, -1), "pathsim-fmi": (-1, 2), "pycosimlibrary": (0, 2),
+}  # fmt: skip
+
+
+def chain(folder: Path, names: Sequence[str]) -> System:
+    """The time passes through two components at once, and is then integrated; each is an FMU.
+
+    Args:
+        folder: for the FMU.
+        names: of the components, in the order of which their inputs are connected, too.
+
+    """
+    ports = {"u": "input", "y": "output", "x": "output", "t": "output"}
+    text = description(
+        "moment",
+        (variable(name, i, causality) for i, (name, causality) in enumerate(ports.items())),
+        (unknown(i, "1" if i == 2 else "") for i in (2, 3, 4)),
+    )
+    fmu = write(folder / "moment.fmu", text, Path(small_fmus.__file__).with_name("moment.c"))
+    sources = {"a": "clock.t", "b": "a.y", "sum": "b.y"}
+    wires = {f"{name}.u": sources[name] for name in names if name in sources}
+    made = connected("chain", dict.fromkeys(names, fmu), wires)
+    return replace(made, left_open={PortName("clock", "u")}, step=0.125)
+
+
+@pytest.mark.parametrize("place", [0, 1], ids=["downstream", "upstream"])
+@pytest.mark.parametrize(
+    "host", ["ecos", *slow(*(name for name in HOSTS if name not in ("ecos", "fmuloader")))]
+)
+def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
+    tmp_path: Path, host: str, place: int
+):
+    """None where a tool follows feedthrough, one step for each where it exchanges all at once.
+
+    fmuloader is left out: it wants functions for model exchange, and has the loop of fmpy.
+    """
+    require(host)
+    system = chain(tmp_path, ["clock", "a", "b", "sum"][:: (1, -1)[place]])
+    assert system.step is not None
+    h = system.step
+    names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
+    experiment = Experiment(12 * h, h, JACOBI, 0.0)
+    rows, *_ = comparison._ran(HOSTS[host], "", system, experiment, str)
+    before, after = (dict(zip(names, row, strict=True)) for row in rows[-2:])
+    given = (after["sum.x"] - before["sum.x"]) / h
+    assert (after["clock.t"] - h - given) / h == LATE.get(host, (2, 2))[place]
 
 
 @pytest.mark.parametrize(

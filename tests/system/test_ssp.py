@@ -6,12 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.formats.ssp.writer import structure_xml, write_ssp
 from orchestrator.machine.errors import InputError
-from support.archives import archive, binding, component, connection, connector, described, system
+from orchestrator.system.structure import renamed
+from support.archives import (
+    archive,
+    binding,
+    component,
+    connection,
+    connector,
+    described,
+    parameter_set,
+    system,
+)  # fmt: skip
 from support.relay import relay
+from support.relay import system_of as relays
 
 #: When the run begins and ends, and its step [s].
 START, STOP, STEP = 2.0, 4.0, 0.125
@@ -93,3 +106,20 @@ def test_variant_is_run_with_a_warning_or_refused_by_the_strict(ssp: Path, capsy
     assert result["inner.b.u"][-1] == 2.0 * 3.0 + 5.0
     with pytest.raises(InputError, match="'own'"):
         load(ssp, variant="Other", strict=True)
+
+
+def test_a_system_that_offers_connectors_is_one_component(tmp_path: Path):
+    """In fmpy and here, what is fed from outside is integrated inside, and seen outside."""
+    parts, fmu = ("in", "out"), relay(tmp_path)
+    made = relays(dict.fromkeys(parts, fmu), {"out.u": "in.y"}, step=STEP, stop_time=STOP)
+    made = renamed(made, {name: f"inner.{name}" for name in parts})
+    [path] = write_ssp(made, tmp_path, connectors=True)
+    table = simulate_ssp(str(path), 0.0, STOP, STEP, input={"inner_in_u": lambda t: 5.0})
+    assert np.array_equal(table["inner_in_y"], 5.0 * table["time"])
+    given = f"<ssd:ParameterBindings>{binding(source='set.ssv')}</ssd:ParameterBindings>"
+    text = structure_xml(made, connectors=True).decode()
+    text = text.replace("<ssd:Elements>", f"{given}<ssd:Elements>", 1)
+    values = parameter_set({"inner_in_u": 'Real value="5"'})
+    files = {f"resources/{fmu.name}": fmu, "set.ssv": values}
+    result = simulate(archive(tmp_path / "fed.ssp", text, files))
+    assert np.array_equal(result["inner.in.y"], 5.0 * result.time)

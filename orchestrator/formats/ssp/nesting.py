@@ -8,9 +8,10 @@ only the last connection on its way picks an element, or transforms it.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from fmpy.model_description import ModelVariable
 
@@ -19,7 +20,10 @@ from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.variables import array_of, element_names
+from orchestrator.system.variables import array_of
+
+#: The systems that a component is in, and its name there.
+Place: TypeAlias = tuple[Way, str]
 
 
 class End(NamedTuple):
@@ -42,7 +46,7 @@ class Line(NamedTuple):
 
     Attributes:
         start, end: its ends.
-        connection: whose target it ends at; None: it ends at a border.
+        connection: whose target it ends at; None: there is none.
 
     """
 
@@ -56,8 +60,8 @@ class Crossing(NamedTuple):
 
     Attributes:
         kind: input or output.
-        component: whose output crosses the border there.
-        variable: that output, or an element of the array that it is.
+        component: whose port crosses the border there.
+        variable: that port, or an element of the array that it is.
 
     """
 
@@ -80,7 +84,6 @@ class Nest:
     elements: dict[str, Component | Nest] = field(default_factory=dict)
     connectors: dict[str, Crossing] = field(default_factory=dict)
     lines: list[Line] = field(default_factory=list)
-    _taken: set[str] = field(default_factory=set)
     _crossing: dict[PortName, str] = field(default_factory=dict)
 
     def inner(self, name: str) -> Nest:
@@ -89,33 +92,31 @@ class Nest:
         assert isinstance(nest, Nest)
         return nest
 
-    def cross(self, output: PortName, label: str, crossing: Crossing) -> tuple[str, bool]:
-        """The connector at which an output crosses the border, and whether it is a new one.
+    def cross(self, crossing: Crossing) -> tuple[str, bool]:
+        """The connector at which a port crosses the border, and whether it is a new one.
 
-        Args:
-            output: of a component, as a whole.
-            label: what the connector is called if nothing else is.
-            crossing: what it is.
-
+        It is named after the port in all of the system: an identifier, as OMSimulator takes no
+        other, and one that no other system has, as it puts those of several systems into one.
         """
-        if output in self._crossing:
-            return self._crossing[output], False
-        shape = crossing.variable.shape or ()
-        # Tools take for a port of an element what begins with its name.
-        while (
-            not self._taken.isdisjoint(names := {label, *element_names(label, shape)})
-            or label in self.elements
-            or any(label[:i] in self.elements for i, c in enumerate(label) if c == ".")
-        ):
-            label = f"_{label}"
-        self._taken |= names
-        self._crossing[output] = label
-        self.connectors[label] = crossing
-        return label, True
+        port = PortName(crossing.component.name, array_of(crossing.variable))
+        if port in self._crossing:
+            return self._crossing[port], False
+        name = re.sub(r"\W", "_", str(port), flags=re.ASCII)
+        while name in self.connectors or name in self.elements:
+            name += "_"
+        self._crossing[port] = name
+        self.connectors[name] = crossing
+        return name, True
 
 
-def nested(system: System) -> Nest:
-    """A system, nested as the names of its components say."""
+def nested(system: System, offered: Iterable[Crossing] = ()) -> Nest:
+    """A system, nested as the names of its components say.
+
+    Args:
+        system: it.
+        offered: what crosses the border of the outermost system.
+
+    """
     top = Nest()
     places = {name: _place(name, system.components) for name in system.components}
     for name, (way, local) in places.items():
@@ -129,7 +130,21 @@ def nested(system: System) -> Nest:
             whole = _whole(connection, system, connected)
             written |= whole
             _route(top, places, system, connection, bool(whole))
+    for offer in offered:
+        _offer(top, places[offer.component.name], offer)
     return top
+
+
+def offers(system: System) -> Iterator[Crossing]:
+    """What a system offers to one around it: all outputs, and inputs without feed or value."""
+    for name, component in system.components.items():
+        open_inputs = set(system.open_inputs(name))
+        for causality in ("input", "output"):
+            ports = {array_of(variable): variable for variable in component.having(causality)}
+            for array, variable in ports.items():
+                members = {element.name for element in component.elements(array)}
+                if causality == "output" or members <= open_inputs:
+                    yield Crossing(causality, component, variable)
 
 
 def order_of(nest: Nest) -> list[str]:
@@ -140,8 +155,8 @@ def order_of(nest: Nest) -> list[str]:
     return found
 
 
-def _place(name: str, components: Collection[str]) -> tuple[Way, str]:
-    """The systems that a component is in, and its name there.
+def _place(name: str, components: Collection[str]) -> Place:
+    """Where the name of a component puts it.
 
     A part without letters names no system, nor does one that is the name of another component.
     """
@@ -156,7 +171,7 @@ def _place(name: str, components: Collection[str]) -> tuple[Way, str]:
 
 def _route(
     top: Nest,
-    places: Mapping[str, tuple[Way, str]],
+    places: Mapping[str, Place],
     system: System,
     connection: Connection,
     is_whole: bool,
@@ -165,32 +180,50 @@ def _route(
     source, target = connection.source, connection.target
     component = system.component(source.component)
     variable = component.variable(source.port)
-    array = array_of(variable)
-    output = PortName(source.component, array)
-    (outwards, element), (inwards, last) = places[source.component], places[target.component]
-    path = (*outwards, element)
-    shared = _shared(outwards, inwards)
-    leaving, entering = _nests(top, outwards), _nests(top, inwards)
-    start = End(element, array)
-    for depth in range(len(outwards), shared, -1):
-        label = f"{'_'.join(path[depth:])}_{array}"
-        crossing = Crossing("output", component, variable)
-        name, is_new = leaving[depth].cross(output, label, crossing)
-        if is_new:
-            leaving[depth].lines.append(Line(start, End(None, name)))
-        start = End(outwards[depth - 1], name)
-    for depth in range(shared, len(inwards)):
-        label = f"{'_'.join(path[shared:])}_{array}"
-        crossing = Crossing("input", component, variable)
-        name, is_new = entering[depth + 1].cross(output, label, crossing)
-        if is_new:
-            entering[depth].lines.append(Line(start, End(inwards[depth], name)))
-        start = End(None, name)
+    inwards, last = places[target.component]
+    shared = _shared(places[source.component][0], inwards)
+    start = _out(top, places[source.component], Crossing("output", component, variable), shared)
+    start = _in(top, inwards, start, Crossing("input", component, variable), shared)
     end = End(last, array_of(system.component(target.component).variable(target.port)))
     if not is_whole:
         start = start._replace(indices=_indices(system, source))
         end = end._replace(indices=_indices(system, target))
-    entering[-1].lines.append(Line(start, end, connection))
+    _nests(top, inwards)[-1].lines.append(Line(start, end, connection))
+
+
+def _offer(top: Nest, place: Place, offer: Crossing) -> None:
+    """Draw the lines between a port and the border of the outermost system."""
+    way, local = place
+    name, _ = top.cross(offer)
+    border = End(None, name)
+    if offer.kind == "output":
+        top.lines.append(Line(_out(top, place, offer, 0), border))
+    else:
+        end = End(local, array_of(offer.variable))
+        _nests(top, way)[-1].lines.append(Line(_in(top, way, border, offer, 0), end))
+
+
+def _out(top: Nest, place: Place, crossing: Crossing, shared: int) -> End:
+    """Lead an output out of all systems that it is in but some; returns where it is then."""
+    way, local = place
+    nests, end = _nests(top, way), End(local, array_of(crossing.variable))
+    for depth in range(len(way), shared, -1):
+        name, is_new = nests[depth].cross(crossing)
+        if is_new:
+            nests[depth].lines.append(Line(end, End(None, name)))
+        end = End(way[depth - 1], name)
+    return end
+
+
+def _in(top: Nest, way: Way, start: End, crossing: Crossing, shared: int) -> End:
+    """Lead a value into all systems on a way but some; returns where it is then."""
+    nests = _nests(top, way)
+    for depth in range(shared, len(way)):
+        name, is_new = nests[depth + 1].cross(crossing)
+        if is_new:
+            nests[depth].lines.append(Line(start, End(way[depth], name)))
+        start = End(None, name)
+    return start
 
 
 def _shared(one: Way, other: Way) -> int:

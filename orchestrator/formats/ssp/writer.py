@@ -15,7 +15,7 @@ from zipfile import ZipFile, ZipInfo
 from fmpy.model_description import ModelVariable
 
 from orchestrator.formats.ssp import LEFT_OPEN, OMS, ORDER, OSP, SSC, SSD, SSV, STRUCTURE
-from orchestrator.formats.ssp.nesting import End, Line, Nest, nested, order_of
+from orchestrator.formats.ssp.nesting import End, Line, Nest, nested, offers, order_of
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.machine.user_files import read_archive
 from orchestrator.system.component import Component
@@ -47,27 +47,32 @@ _BOX, _GAP = (40.0, 60.0), 30.0
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def write_ssp(system: System, folder: Path, flat: bool = False) -> list[Path]:
+def write_ssp(
+    system: System, folder: Path, flat: bool = False, connectors: bool = False
+) -> list[Path]:
     """Write `NAME.ssp`; the step is part of the system; arguments as of :func:`ssp_bytes`."""
     path = folder / f"{file_name(system.name)}.ssp"
-    path.write_bytes(ssp_bytes(system, flat))
+    path.write_bytes(ssp_bytes(system, flat, connectors))
     return [path]
 
 
-def ssp_bytes(system: System, flat: bool = False) -> bytes:
+def ssp_bytes(system: System, flat: bool = False, connectors: bool = False) -> bytes:
     """The archive of a system: its structure and its FMUs, the same bytes every time.
 
     Args:
         system: to write.
         flat: for tools that know no systems in systems, or make one instance of an FMU only: names
             have no dots, and each component has a copy of its FMU.
+        connectors: for tools that take it as one component: the system has connectors, of what it
+            :func:`offers <.nesting.offers>`.
 
     """
     system = flattened(system) if flat else system
     sources = _sources(system, flat)
     archive = BytesIO()
     with ZipFile(archive, "w") as content:
-        content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure_xml(system, sources))
+        structure = structure_xml(system, sources, connectors)
+        content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure)
         for name, source in _parameter_sources(system).items():
             values = parameter_set_xml(system.components[name], system.parameters_of(name))
             content.writestr(ZipInfo(source, _EPOCH), values)
@@ -188,7 +193,9 @@ def _check_characters(element: Element, where: str) -> None:
         _check_characters(child, ".".join(filter(None, (where, child.get("name", "")))))
 
 
-def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> bytes:
+def structure_xml(
+    system: System, sources: Mapping[str, str] | None = None, connectors: bool = False
+) -> bytes:
     """SystemStructure.ssd; connectors and units come from the FMUs' own descriptions.
 
     libcosim and OMSimulator each need the step in an annotation of their own.
@@ -196,14 +203,26 @@ def structure_xml(system: System, sources: Mapping[str, str] | None = None) -> b
     Args:
         system: to write.
         sources: where the archive has the FMU of each component; None: each FMU once.
+        connectors: as of :func:`ssp_bytes`.
 
     """
     version = max(map(_version, system.components.values()))
     root = Element(_tag("ssd:SystemStructureDescription"), name=system.name, version=version)
-    structure, nest = _add(root, "ssd:System", name=system.name), nested(system)
+    offered = list(offers(system)) if connectors else []
+    structure, nest = _add(root, "ssd:System", name=system.name), nested(system, offered)
+    fed = {
+        PortName(offer.component.name, element.name)
+        for offer in offered
+        for element in offer.component.elements(array_of(offer.variable))
+    }
     given = _Given(
-        system, sources or _sources(system), _parameter_sources(system), _clear_units(system)
+        system,
+        sources or _sources(system),
+        _parameter_sources(system),
+        _clear_units(system),
+        set(system.left_open) - fed,
     )
+    _add_border(structure, nest, given.units)
     _fill(structure, nest, given)
     if system.step is not None:
         _add_master(structure, system.step)
@@ -221,6 +240,7 @@ class _Given(NamedTuple):
         sources: of the FMUs of components.
         parameter_sources: of the parameter sets of components.
         units: that the description can define.
+        left_out: inputs that nothing feeds, and that have no connectors.
 
     """
 
@@ -228,6 +248,7 @@ class _Given(NamedTuple):
     sources: Mapping[str, str]
     parameter_sources: Mapping[str, str]
     units: Collection[Unit]
+    left_out: Collection[PortName]
 
 
 def _fill(structure: Element, nest: Nest, given: _Given) -> None:
@@ -242,7 +263,7 @@ def _fill(structure: Element, nest: Nest, given: _Given) -> None:
             _fill(inner, component, given)
             continue
         source = given.sources[component.name]
-        element = _add_component(elements, name, component, position, source, system.left_open)
+        element = _add_component(elements, name, component, position, source, given.left_out)
         if component.name in given.parameter_sources:
             bindings = _add(element, "ssd:ParameterBindings")
             source = given.parameter_sources[component.name]
@@ -259,7 +280,7 @@ def _fill(structure: Element, nest: Nest, given: _Given) -> None:
 
 
 def _add_border(structure: Element, nest: Nest, units: Collection[Unit]) -> None:
-    """The connectors of a system in another one."""
+    """The connectors of a system."""
     if not nest.connectors:
         return
     connectors = _add(structure, "ssd:Connectors")
@@ -341,7 +362,7 @@ def _add_component(
     component: Component,
     position: int,
     source: str,
-    left_open: Collection[PortName],
+    left_out: Collection[PortName],
 ) -> Element:
     media_type = "application/x-fmu-sharedlibrary"
     element = _add(elements, "ssd:Component", name=own_name, source=source, type=media_type)
@@ -352,9 +373,8 @@ def _add_component(
         # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends
         # at from another's source. Parameter sets reach variables without a connector.
         is_text = variable.causality == "parameter" and variable.type == "String"
-        is_open = PortName(component.name, variable.name) in left_open
-        left_out = is_text or is_open or name in written
-        if variable.causality in ("input", "output", "parameter") and not left_out:
+        is_out = is_text or PortName(component.name, variable.name) in left_out or name in written
+        if variable.causality in ("input", "output", "parameter") and not is_out:
             written.add(name)
             _add_connector(connectors, name, variable.causality, variable, variable.unit)
     _add_geometry(element, position)

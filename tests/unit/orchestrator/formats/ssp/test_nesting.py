@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -23,7 +24,7 @@ from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped, Transformation
-from support.archives import fmu, fmu3, variable
+from support.archives import archive, fmu, fmu3, variable
 
 #: What an FMU of FMI 2.0 has: two Reals in one unit, one in another, a number, and a parameter.
 PORTS = (
@@ -82,9 +83,9 @@ def system_of(
     )
 
 
-def round_trip(system: System) -> System:
+def round_trip(system: System, offered: bool = False) -> System:
     with TemporaryDirectory() as folder:
-        [path] = write_ssp(system, Path(folder))
+        [path] = write_ssp(system, Path(folder), connectors=offered)
         return read_ssp(path, findings=Findings(strict=True))
 
 
@@ -101,9 +102,9 @@ def check_same(again: System, system: System) -> None:
     assert experiments[0] == experiments[1]
 
 
-def structure(system: System) -> ElementTree.Element:
+def structure(system: System, offered: bool = False) -> ElementTree.Element:
     with TemporaryDirectory() as folder:
-        [path] = write_ssp(system, Path(folder))
+        [path] = write_ssp(system, Path(folder), connectors=offered)
         with ZipFile(path) as content:
             text = content.read("SystemStructure.ssd").decode()
     root = ElementTree.fromstring(text)
@@ -147,21 +148,21 @@ def test_values_cross_borders_by_one_connector_for_each_output(parts: dict[str, 
     assert [one.get("name") for one in a.findall("Elements/Component")] == ["p", "c"]
     assert connectors(outer) == []
     assert set(connectors(a)) == {
-        ("p_y.x", "output"), ("top_m", "input"), ("b_in_p_y.x", "input"),
+        ("a_p_y_x", "output"), ("top_m", "input"), ("b_in_p_y_x", "input"),
     }  # fmt: skip
-    assert set(connectors(b)) == {("a_p_y.x", "input"), ("in_p_y.x", "output")}
-    assert set(connectors(inner)) == {("a_p_y.x", "input"), ("p_y.x", "output")}
+    assert set(connectors(b)) == {("a_p_y_x", "input"), ("b_in_p_y_x", "output")}
+    assert set(connectors(inner)) == {("a_p_y_x", "input"), ("b_in_p_y_x", "output")}
     assert lines(outer) == {
-        ("a:p_y.x", "b:a_p_y.x"), ("a:p_y.x", "top:u.x"), ("top:m", "a:top_m"),
-        ("b:in_p_y.x", "a:b_in_p_y.x"),
+        ("a:a_p_y_x", "b:a_p_y_x"), ("a:a_p_y_x", "top:u.x"), ("top:m", "a:top_m"),
+        ("b:b_in_p_y_x", "a:b_in_p_y_x"),
     }  # fmt: skip
     assert lines(a) == {
-        ("p:y.x", "c:u.x"), ("p:y.x", ":p_y.x"), (":top_m", "p:n"), (":b_in_p_y.x", "p:u.x"),
+        ("p:y.x", "c:u.x"), ("p:y.x", ":a_p_y_x"), (":top_m", "p:n"), (":b_in_p_y_x", "p:u.x"),
     }  # fmt: skip
     assert lines(b) == {
-        (":a_p_y.x", "p:u.x"), (":a_p_y.x", "in:a_p_y.x"), ("in:p_y.x", ":in_p_y.x"),
+        (":a_p_y_x", "p:u.x"), (":a_p_y_x", "in:a_p_y_x"), ("in:b_in_p_y_x", ":b_in_p_y_x"),
     }  # fmt: skip
-    assert lines(inner) == {(":a_p_y.x", "p:u.x"), ("p:y.x", ":p_y.x")}
+    assert lines(inner) == {(":a_p_y_x", "p:u.x"), ("p:y.x", ":b_in_p_y_x")}
     units = {one.get("unit") for one in outer.iterfind(".//System/Connectors/Connector/Real")}
     assert units == {"m"}
     check_same(round_trip(system), system)
@@ -172,11 +173,11 @@ def test_flat_system_has_no_system_in_it(parts: dict[str, Component]):
     assert outer.findall(".//System") == []
 
 
-def test_connector_is_not_named_like_a_port_of_an_element(parts: dict[str, Component]):
+def test_no_two_connectors_of_a_system_are_one_nor_one_an_element(parts: dict[str, Component]):
     """The names of elements here are those that connectors would have."""
     system = system_of(
         parts,
-        {"a.p": "2", "a.p_y": "2", "a.p_m": "2", "a.q.p": "2", "a.q_p": "2", "b": "2", "c": "2"},
+        {"a.p": "2", "a.a_p_m": "2", "a.q.p": "2", "a.q_p": "2", "b": "2", "c": "2"},
         {
             "b:u.x": "a.p:y.x", "b:n": "a.p:m", "c:u.x": "a.q.p:y.x", "c:n": "a.q_p:m",
             "a.p:u.x": "a.q_p:y.x", "b:v": "a.q_p:y.x",
@@ -185,8 +186,18 @@ def test_connector_is_not_named_like_a_port_of_an_element(parts: dict[str, Compo
     )  # fmt: skip
     outer = structure(system)
     names = [name for name, _ in connectors((outer.find("Elements") or [])[0])]
-    assert sorted(names) == ["_p_m", "_p_y.x", "_q_p_y.x", "q_p_m", "q_p_y.x"]
+    assert sorted(names) == ["a_p_m_", "a_p_y_x", "a_q_p_m", "a_q_p_y_x", "a_q_p_y_x_"]
     check_same(round_trip(system), system)
+
+
+def test_connectors_with_dots_are_read_as_well(parts: dict[str, Component], tmp_path: Path):
+    """As archives had them before."""
+    system = system_of(parts, {"a.p": "2", "b.c.p": "2"}, {"b.c.p:u.x": "a.p:y.x"})
+    text = structure_xml(system).decode()
+    assert 'name="a_p_y_x"' in text
+    files = {"resources/2.fmu": parts["2"].fmu}
+    older = archive(tmp_path / "older.ssp", text.replace("a_p_y_x", "p_y.x"), files)
+    check_same(read_ssp(older, findings=Findings(strict=True)), system)
 
 
 def test_a_name_that_begins_another_component_stays_one(parts: dict[str, Component]):
@@ -209,7 +220,7 @@ def test_arrays_cross_borders_as_a_whole(parts: dict[str, Component]):
     system = system_of(parts, dict.fromkeys(("a.p", "b.p", "b.q", "c.p"), "3"), {**whole, **parted})
     outer = structure(system)
     assert lines(outer) == {
-        ("a:p_y", "b:a_p_y"), ("a:p_y", "c:a_p_y"), ("a:p_z", "c:a_p_z"),
+        ("a:a_p_y", "b:a_p_y"), ("a:a_p_y", "c:a_p_y"), ("a:a_p_z", "c:a_p_z"),
     }  # fmt: skip
     sizes = [one.get("size") for one in outer.iterfind(".//System/Connectors/Connector/Dimension")]
     assert sizes == ["3"] * 3
@@ -255,17 +266,19 @@ def test_parameters_steps_open_inputs_and_order_are_read_as_they_were(
     assert b"<Order" not in ssp_bytes(system_of(parts, {"a.p": "2", "a.q": "2", "b": "2"}, {}))
 
 
-def test_fmpy_finds_the_schema_kept(parts: dict[str, Component], tmp_path: Path):
+@pytest.mark.parametrize("offered", [False, True])
+def test_fmpy_finds_the_schema_kept(parts: dict[str, Component], tmp_path: Path, offered: bool):
     system = system_of(
         parts, {"a.p": "2", "b.c.p": "2"}, {"b.c.p:u.x": "a.p:y.x"}, step=0.1, stop_time=1.0
     )
-    [path] = write_ssp(system, tmp_path)
+    [path] = write_ssp(system, tmp_path, connectors=offered)
     top = read_ssd(str(path)).system
     assert [element.name for element in top.elements] == ["a", "b"]
 
 
 @pytest.mark.skipif(find_spec("pyssp_standard") is None, reason="pyssp_standard is not installed")
-def test_nested_ssp_2_is_valid(parts: dict[str, Component]):
+@pytest.mark.parametrize("offered", [False, True])
+def test_nested_ssp_2_is_valid(parts: dict[str, Component], offered: bool):
     """Held against the schema of SSP 2.0, which that package has."""
     found = find_spec("pyssp_standard")
     assert found is not None and found.origin is not None
@@ -274,9 +287,43 @@ def test_nested_ssp_2_is_valid(parts: dict[str, Component]):
     wires |= {"b.r:v": "a.p:z", "a.in.p:x": "b.c.q:y[2]"}
     kinds = {"a.p": "3", "b.r": "2", "b.c.q": "3", "a.in.p": "3"}
     made = {"b.r:v": Linear(0.001)}
-    text = structure_xml(system_of(parts, kinds, wires, made, step=0.1, stop_time=1.0))
+    system = system_of(parts, kinds, wires, made, step=0.1, stop_time=1.0)
+    text = structure_xml(system, connectors=offered)
     etree.XMLSchema(etree.parse(schema)).assertValid(etree.fromstring(text))
 
+
+def test_a_system_offers_its_outputs_and_open_inputs(parts: dict[str, Component]):
+    """An array as a whole, where it is open as a whole."""
+    system = system_of(
+        parts,
+        {"a.p": "2", "b": "3", "c": "3"},
+        {"a.p:u.x": "a.p:y.x", "b:u[2]": "c:z"},
+        parameters={PortName("a.p", "n"): 3},
+        left_open={PortName("a.p", "v"), PortName("a.p", "n"), PortName("c", "x")},
+    )  # fmt: skip
+    outer = structure(system, offered=True)
+    offered = {
+        "a_p_v": "input", "b_x": "input", "b_v": "input", "c_u": "input", "c_x": "input",
+        "c_v": "input", "a_p_y_x": "output", "a_p_m": "output", "b_y": "output", "b_z": "output",
+        "c_y": "output", "c_z": "output",
+    }  # fmt: skip
+    assert dict(connectors(outer)) == offered and len(connectors(outer)) == len(offered)
+    ends = lines(outer)
+    assert {
+        (":a_p_v", "a:a_p_v"),
+        ("a:a_p_y_x", ":a_p_y_x"),
+        (":c_u", "c:u"),
+        ("c:z", ":c_z"),
+    } < ends
+    # What neither another port nor the border feeds has no connector.
+    [inner] = outer.findall(".//System/Elements/Component")
+    assert dict(connectors(inner)) == {
+        "u.x": "input", "v": "input", "y.x": "output", "m": "output", "k": "parameter",
+    }  # fmt: skip
+
+
+#: The rule of OMSimulator's `ComRef.cpp` for names of systems' connectors.
+IDENT = re.compile("[a-zA-Z][a-zA-Z0-9_-]*")
 
 NAMES = st.lists(
     st.lists(st.sampled_from("abc"), min_size=1, max_size=4).map(".".join),
@@ -317,9 +364,15 @@ def nested_systems(draw: st.DrawFn, parts: dict[str, Component]) -> System:
     return system_of(parts, kinds, wires, made, stop_time=1.0)
 
 
-@given(st.data())
-def test_random_systems_are_read_as_they_were(parts: dict[str, Component], data: st.DataObject):
+@given(st.data(), st.booleans())
+def test_random_systems_are_read_as_they_were(
+    parts: dict[str, Component], data: st.DataObject, offered: bool
+):
+    """Connectors of systems in them have names that OMSimulator takes."""
     system = data.draw(nested_systems(parts))
     # Ports of two components may have one name, which is refused.
     assume(not list(system.problems()))
-    check_same(round_trip(system), system)
+    check_same(round_trip(system, offered), system)
+    outer = structure(system, offered)
+    names = [name for one in (outer, *outer.iterfind(".//System")) for name, _ in connectors(one)]
+    assert all(map(IDENT.fullmatch, names))
