@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import pytest
 
 from auv_fmu import Matrix, Variable, Vector
 from auv_fmu.quantities import NU, POSITION, TAU, per_axis
 from fmus.ports.fields import declared
-from fmus.ports.groups import Nothing, ParameterSet, packing, ports_in, slices, unpacking
+from fmus.ports.groups import SCOPE, Nothing, ParameterSet, packed, ports_in, slices, unpacking
 from fmus.ports.port import Port
 
 Vector3 = tuple[float, float, float]
@@ -20,6 +21,12 @@ PLAIN = Variable(description="One of several")
 
 def ports_of(made: type, causality: str = "input") -> list[Port]:
     return [port for field in declared(made, causality).values() for port in ports_in(field)]
+
+
+def packing(made: type) -> Callable[[Any], list[Any]]:
+    """What a slave does with the outputs, whose text it puts into its own."""
+    function: Callable[[Any], list[Any]] = eval(f"lambda it: {packed(made, 'it')}", {**SCOPE})
+    return function
 
 
 class Inputs(NamedTuple):
