@@ -15,9 +15,11 @@ from fmus.native.language import INSTEAD, MATHEMATICS, OUTSIDE, foreign
 ROOT = Path(__file__).parents[2]
 #: Where the package was installed: what stands outside the language is told by that place.
 PACKAGE = Path(str(auv_fmu.__file__)).parent
+#: What annotations and operators are made of.
+DECLARING = ("arrays", "quantities", "variable")
 EQUATIONS = [
-    *sorted({*PACKAGE.glob("*.py")} - {PACKAGE / "arrays.py"}),
-    *(ROOT / package.replace(".", "/") / "behaviour.py" for package in components().values()),
+    *sorted(path for path in PACKAGE.glob("*.py") if path.stem not in DECLARING),
+    *(ROOT / f"{module.replace('.', '/')}.py" for module in components().values()),
 ]
 
 
