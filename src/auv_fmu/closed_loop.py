@@ -157,7 +157,8 @@ def move(
         parts: that the step is split into.
 
     """
-    state, rotation, planner, moving, water = vehicles
+    state, rotation = vehicles.plant, vehicles.rotation
+    planner, moving, water = vehicles.planner, vehicles.moving, vehicles.water
     n, n_d = parts.plant, blocks.planner.parts(parts.planner)
     for _ in range(n):
         state, rotation = blocks.vehicle.step(
