@@ -114,7 +114,7 @@ def test_fixed_parameter_stays_what_it_was_at_the_start(slave):
     initialised(slave).set_boolean([6], [False])
     said = "up is fixed and cannot change after initialisation"
     assert messages_of(slave) == [said]
-    assert answers_of(slave) == [Fmi2Status.discard]
+    assert answers_of(slave) == [Fmi2Status.error]
     assert slave.get_boolean([6]) == [True]
 
 
