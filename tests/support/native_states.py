@@ -18,11 +18,11 @@ CHECKSUM = "checksum"
 
 MAGIC = "FMU state 3"
 
+#: What outputs are: outdated, those of the last step, up to date.
+_FRESHNESS = ((False, False), (True, True), (True, False))
+
 #: A generator of noise: words of its state and the place of the next, and its kind.
 _WORDS, _VERSION = 625, 3
-
-#: What outputs that are kept may be: `fresh` and `held`, as the JSON of the Python kind has it.
-_KEPT = ((False, False), (True, True), (True, False))
 
 
 class NativeState(dict[str, Any]):
@@ -37,9 +37,9 @@ class _Layout(NamedTuple):
     #: Types of the parts of a state.
     state: Sequence[Any]
     draws: int
-    is_sampled: bool
     parameters: Sequence[Port]
     inputs: Sequence[Any]
+    #: None are kept of a component that is not sampled.
     outputs: Sequence[Any]
 
 
@@ -57,7 +57,8 @@ def _layout(name: str) -> _Layout:
         for causality in ("input", "output")
     )
     state = [*hints_of(behaviour.state).values()]
-    return _Layout(state, behaviour.draws, behaviour.is_sampled, of["parameter"], inputs, outputs)
+    kept = outputs if behaviour.is_sampled else []
+    return _Layout(state, behaviour.draws, of["parameter"], inputs, kept)
 
 
 class _Reader:
@@ -133,9 +134,9 @@ def _read(source: _Reader) -> NativeState | None:
             words, has_next, following = source.words(_WORDS), source.word(), source.real()
             said["generator"] = [_VERSION, words, following if has_next else None]
             said["draws"] = source.reals(layout.draws)
-        if layout.is_sampled:
+        if layout.outputs:
             said["outputs"] = [source.value(kind) for kind in layout.outputs]
-            said["fresh"], said["held"] = _KEPT[source.word()]
+            said["fresh"], said["held"] = _FRESHNESS[source.word()]
     said["fault"] = bool(source.word())
     said[CHECKSUM] = source.word()
     return said
@@ -198,9 +199,9 @@ def _written(said: NativeState) -> bytes:
             _, words, following = said["generator"]
             parts += [_words(*words, following is not None), _reals(following or 0.0)]
             parts += _values([float] * layout.draws, said["draws"])
-        if layout.is_sampled:
+        if layout.outputs:
             parts += _values(layout.outputs, said["outputs"])
-            parts.append(_words(_KEPT.index((said["fresh"], said["held"]))))
+            parts.append(_words(_FRESHNESS.index((said["fresh"], said["held"]))))
     return b"".join(parts) + _words(said["fault"], said[CHECKSUM])
 
 
