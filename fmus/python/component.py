@@ -13,7 +13,7 @@ from __future__ import annotations
 import sys
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import isfinite
+from math import inf, isfinite
 from random import Random
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element

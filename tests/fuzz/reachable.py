@@ -57,12 +57,7 @@ def _faults(
         yield "another component"
     if said["mode"] not in MODES:
         yield "no mode"
-    if not _is_number(said["start_time"]):
-        yield "the start time is no number"
-    elif not (_is_number(said["stop_time"]) or said["stop_time"] == inf):
-        yield "the stop time is no number"
-    elif not said["start_time"] < said["stop_time"]:
-        yield "the stop time is not after the start time"
+    yield from _faults_of_times(said["start_time"], said["stop_time"])
     keeps = behaviour_of(description.name).is_sampled and said["state"] is not None
     for key, causality in (("inputs", "input"), *([("outputs", "output")] * keeps)):
         all_ports = [port for port in description.of(causality) if port.name != "fault"]
@@ -91,6 +86,15 @@ def _faults(
     if not keeps and said["outputs"] not in ([], ()):
         yield "outputs that are not kept"
     yield from _faults_of_state(said, samples)
+
+
+def _faults_of_times(start: Any, stop: Any) -> Iterator[str]:
+    if not _is_number(start):
+        yield "the start time is no number"
+    elif not (_is_number(stop) or stop == inf):
+        yield "the stop time is no number"
+    elif not start < stop:
+        yield "the stop time is not after the start time"
 
 
 def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) -> Iterator[str]:
