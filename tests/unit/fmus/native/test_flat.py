@@ -183,7 +183,7 @@ def test_texts_choose_members_and_all_parameters_lie_where_the_equations_have_th
         assert run.look()["doing"] == -7
         run.step()
         assert run.look()["n"] == 0
-        assert run.set("String", mode=b"heat") == Status.Discard
+        assert run.set("String", mode=b"heat") == Status.Error
     answers_agree(runs)
 
 
@@ -481,6 +481,8 @@ def test_run_goes_on_from_the_bytes_of_its_state_as_if_nothing_had_been(variants
             one, other = Run(host), Run(another)
             for call, *arguments in first:
                 getattr(one, call)(*arguments)
+            if any(status == Status.Error for status, *_ in one.answers):
+                continue  # it may be in the state error
             _, state = another.deserialised(host.content())
             if other.note(another.set_state(state)) != Status.OK:
                 continue  # an earlier call has failed
