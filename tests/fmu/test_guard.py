@@ -288,8 +288,11 @@ def test_wrong_argument_is_an_error_with_one_message(host: Host, function, argum
 REFUSED = [
     *(
         (Status.Discard, lambda host, name=name, value=value: put(host, name, value))
-        for name, value in (("y.x", nan), ("k_d", -1.0), ("tau.u", 1.0), ("h_max", 1.0),
-                            ("saturation", b"sigmoid"))
+        for name, value in (("y.x", nan), ("k_d", -1.0))
+    ),
+    *(
+        (ERROR, lambda host, name=name, value=value: put(host, name, value))
+        for name, value in (("tau.u", 1.0), ("h_max", 1.0), ("saturation", b"sigmoid"))
     ),
     (Status.Discard, lambda host: host.step(0.0, -1.0)),
     (ERROR, lambda host: host.get("Real", [UNKNOWN])[0]),
@@ -300,20 +303,45 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("status", "call"), REFUSED)
-def test_what_is_refused_is_told_with_logging_off(of_any_version: Library, status, call):
+@pytest.mark.parametrize("logging", [True, False])
+def test_refusals_are_told_once_and_only_errors_with_logging_off(
+    of_any_version: Library, status, call, logging
+):
     """Each in its call, and answered again where it is not told again."""
-    with initialised(of_any_version, logging=False) as host:
+    with initialised(of_any_version, logging=logging) as host:
         assert [call(host), call(host)] == [status] * 2
-        [message] = host.messages
-        assert (message.status, message.category) == (status, f"logStatus{status.name}")
+        said = [(message.status, message.category) for message in host.messages]
+        is_told = logging or status == ERROR
+        assert said == [(status, f"logStatus{status.name}")] * is_told
         assert host.fault() is (status == Status.Discard)
         assert host.value(host.description.find("y.x")) == 0.0
 
 
+@pytest.mark.parametrize("start", [0.0, -3.0, 1e6])
+def test_sum_of_steps_reaches_the_stop_time_and_no_step_goes_beyond(
+    of_any_version: Library, start: float
+):
+    """Ten times 0.1 is not 1 for a host that adds it up."""
+    with instance(of_any_version) as host:
+        assert host.setup(start, start + 1.0) == host.enter() == host.exit() == OK
+        time = start
+        for _ in range(10):
+            assert host.step(time, 0.1) == OK
+            time += 0.1
+        saved = host.get_state()
+        assert host.step(time, 0.0) == OK
+        assert host.step(time, 0.1) == host.step(time, 0.0) == ERROR
+        assert len(host.messages) == 1
+        assert host.set_state(saved) == OK
+        assert host.step(time, 0.1) == ERROR, "the stop time belongs to the state"
+        assert host.call("fmi2Reset") == host.setup(start) == host.enter() == host.exit() == OK
+        assert host.step(start, 2.0) == OK
+
+
 @pytest.mark.parametrize(
     ("bad", "value", "answer"),
-    [("y.y", nan, Status.Discard), ("k_d", -1.0, Status.Discard), ("h_max", 0.5, Status.Discard),
-     ("tau.u", 0.0, Status.Discard), (None, 0.0, ERROR), ("lambda", 0.5, OK)],
+    [("y.y", nan, Status.Discard), ("k_d", -1.0, Status.Discard), ("h_max", 0.5, ERROR),
+     ("tau.u", 0.0, ERROR), (None, 0.0, ERROR), ("lambda", 0.5, OK)],
 )  # fmt: skip
 @pytest.mark.parametrize("place", [0, 1, 2])
 def test_of_several_values_all_are_taken_or_none(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from functools import cache
@@ -11,14 +12,17 @@ from pathlib import Path
 import fmpy
 import pytest
 
+from fmus.native.shapes import RUNTIME
 from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import has_call
 from support.kinds import FIXTURES
+from support.raw import TYPES
 from support.settings import NAMES, REPRESENTATIVES
 from support.status_table import (
     CREATION,
     ERROR,
+    STATES,
     WITHOUT_AN_INSTANCE,
     creations,
     names_in_fmi3,
@@ -157,6 +161,37 @@ def test_what_is_said_of_a_plain_fmu(plain: Worker[Place, str], key: tuple[str, 
     else:
         # What is freed twice does not crash each time.
         assert wrong.endswith(expected.removeprefix("fmi2").removesuffix(", then crash"))
+
+
+def test_page_has_the_modes_of_the_runtime():
+    """In a mode that modes.h does not name, whatever a function is called with is an error."""
+    text = (RUNTIME / "modes.h").read_text(encoding="utf-8")
+    masks = dict(re.findall(r"^#define (\w+) ([^/\n]+)", text, re.MULTILINE))
+    modes = dict(zip(("INSTANTIATED", "INITIALISING", "STEPPING", "TERMINATED", "AFTER_ERROR"),
+                     STATES, strict=True))  # fmt: skip
+
+    def named(words: str) -> set[str]:
+        found = re.findall(r"\w+", words)
+        return {modes[word] for word in found if word in modes}.union(
+            *(named(masks[word]) for word in found if word in masks)
+        )
+
+    def mask(function: str) -> str:
+        name = function.removeprefix("fmi2")
+        value = re.fullmatch(f"(Get|Set)(?:{'|'.join(TYPES)}|\\w*Status)", name)
+        name = "FMUstate" if "FMUstate" in name else value[1] if value else name
+        return masks.get(f"MASK_{name}", masks["MASK_NotSupported"])
+
+    answered = {
+        function: {
+            state
+            for row in rows().values()
+            for state, cell in row.cells.items()
+            if row.function == function and not cell.answer.fails
+        }
+        for function, _ in rows()
+    }
+    assert answered == {function: named(mask(function)) for function in answered}
 
 
 def test_every_row_is_tried():

@@ -13,8 +13,7 @@ from typing import Any
 
 from auv_fmu.attitude import rotation_from_quaternion
 from auv_fmu.variable import Refusal
-from fmus.ports.groups import reals_first
-from fmus.python.state import restored
+from fmus.ports.groups import filled, reals_first
 from support import states
 from support.raw import Description, Variable
 from support.settings import behaviour_of, choices_of, parameters_of
@@ -26,8 +25,8 @@ TOLERANCE = 1e-9
 #: Of the Mersenne Twister that makes noise: words of its state, and one more number, its place.
 _TWISTER, _WORD = 624, 2**32
 
-#: random.gauss cannot go as far from zero: it takes the logarithm of a number of 53 bits.
-_MOST_SIGMAS = 9.0
+#: random.gauss cannot go further from zero: it takes the logarithm of a number of 53 bits.
+_MOST_SIGMAS = 8.6
 
 
 def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]]) -> list[str]:
@@ -47,7 +46,7 @@ def faults(said: Any, description: Description, samples: Sequence[dict[str, Any]
     try:
         kept_true = _INVARIANTS.get(description.name, lambda said: ())
         return [*kept_true(said), *_follows(said, description.name)]
-    except (ArithmeticError, ValueError, Refusal) as error:
+    except (ArithmeticError, ValueError) as error:
         return [f"nothing follows from it: {error}"]
 
 
@@ -58,17 +57,11 @@ def _faults(
         yield "another component"
     if said["mode"] not in MODES:
         yield "no mode"
-    if not _is_number(said["start_time"]):
-        yield "the start time is no number"
-    elif not (_is_number(said["stop_time"]) or said["stop_time"] == inf):
-        yield "the stop time is no number"
-    elif not said["start_time"] < said["stop_time"]:
-        yield "the stop time is not after the start time"
-    is_kept = behaviour_of(description.name).is_sampled and said["state"] is not None
-    for key, causality in (("inputs", "input"), ("outputs", "output")):
+    yield from _faults_of_times(said["start_time"], said["stop_time"])
+    keeps = behaviour_of(description.name).is_sampled and said["state"] is not None
+    for key, causality in (("inputs", "input"), *([("outputs", "output")] * keeps)):
         all_ports = [port for port in description.of(causality) if port.name != "fault"]
-        ports = reals_first(all_ports) if is_kept or key == "inputs" else []
-        values = said[key]
+        ports, values = reals_first(all_ports), said[key]
         if not isinstance(values, list) or len(values) != len(ports):
             yield f"other {key}"
         else:
@@ -90,13 +83,24 @@ def _faults(
     for truth in ("fault", "fresh", "held"):
         if not isinstance(said[truth], bool):
             yield f"{truth} is neither true nor false"
+    if not keeps and said["outputs"] not in ([], ()):
+        yield "outputs that are not kept"
     yield from _faults_of_state(said, samples)
+
+
+def _faults_of_times(start: Any, stop: Any) -> Iterator[str]:
+    if not _is_number(start):
+        yield "the start time is no number"
+    elif not (_is_number(stop) or stop == inf):
+        yield "the stop time is no number"
+    elif not start < stop:
+        yield "the stop time is not after the start time"
 
 
 def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) -> Iterator[str]:
     state = said["state"]
     if state is None:
-        if said["generator"] is not None or said["draws"]:
+        if said["generator"] is not None or said["draws"] not in ([], ()):
             yield "noise without a state"
         if said["mode"] == MODES[2]:
             yield "steps without a state"
@@ -166,19 +170,20 @@ def _is_unit(vector: Sequence[float]) -> bool:
 
 
 def _plant(said: dict[str, Any]) -> Iterator[str]:
-    _, quaternion, nu_r, tau, _ = said["state"]
+    _, quaternion, nu_r, acting, _ = said["state"]
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
         return
     parameters = said["parameters"]
-    rotation = rotation_from_quaternion(tuple(quaternion))
+    rotation = rotation_from_quaternion(quaternion)
     if not parameters["roll"] and (nu_r[3] or abs(rotation[1][2]) > TOLERANCE):
         yield "roll where there is none"
-    for k, force in zip("uqr", tau, strict=True):
-        low, high = parameters[f"tau_min.{k}"], parameters[f"tau_max.{k}"]
-        most = TOLERANCE * (high - low)
-        if not low - most <= force <= high + most:
-            yield "applied forces beyond the limits"
+    limits = ((parameters[f"tau_min.{k}"], parameters[f"tau_max.{k}"]) for k in "uqr")
+    if not all(
+        low - TOLERANCE * (high - low) <= value <= high + TOLERANCE * (high - low)
+        for value, (low, high) in zip(acting, limits, strict=True)
+    ):
+        yield "applied forces beyond the limits"
 
 
 def _generator(hidden: Any) -> Iterator[str]:
@@ -197,28 +202,28 @@ def _generator(hidden: Any) -> Iterator[str]:
         yield "a place beyond the generator"
     elif not any(words[:-1]):
         yield "a generator that gives zeros"
-    if kept is not None and not (_is_number(kept) and abs(kept) <= _MOST_SIGMAS):
+    if kept is not None and not _is_number(kept):
         yield "a number kept that is none"
 
 
 def _follows(said: dict[str, Any], name: str) -> Iterator[str]:
-    """What a component says of its state."""
+    """What a behaviour says of a state, and of the noise that goes with it."""
     behaviour = behaviour_of(name)
-    draws = said["draws"]
     if behaviour.draws:
         yield from _generator(said["generator"])
-    if not isinstance(draws, list) or len(draws) != behaviour.draws:
-        yield "other noise"
-    elif not all(_is_number(draw) and abs(draw) <= _MOST_SIGMAS for draw in draws):
-        yield "noise that no generator makes"
-    check_state = behaviour.hooks["check_state"]
-    if check_state is None:
+        if not all(abs(draw) <= _MOST_SIGMAS for draw in said["draws"]):
+            yield "noise that no generator makes"
+    check = behaviour.hooks["check_state"]
+    if check is None:
         return
     given = {
         "parameters": parameters_of(name).of(said["parameters"]),
-        "state": restored(behaviour.state, said["state"]),
+        "state": filled(behaviour.state, _numbers(said["state"])),
     }
-    check_state(*(given[argument] for argument in behaviour.arguments("check_state")))
+    try:
+        check(*(given[argument] for argument in behaviour.arguments("check_state")))
+    except Refusal as refusal:
+        yield str(refusal)
 
 
 #: What is told of a state without asking the behaviour.

@@ -183,7 +183,7 @@ def test_texts_choose_members_and_all_parameters_lie_where_the_equations_have_th
         assert run.look()["doing"] == -7
         run.step()
         assert run.look()["n"] == 0
-        assert run.set("String", mode=b"heat") == Status.Discard
+        assert run.set("String", mode=b"heat") == Status.Error
     answers_agree(runs)
 
 
@@ -232,11 +232,11 @@ def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
         ("Integer", {"k": -6}, Status.Discard, "k = -6: must be at least -5"),
         ("Integer", {"pair[1]": 5, "k": -9}, Status.Discard, "k = -9: must be at least -5"),
         ("Integer", {"want": 1}, Status.Discard, "want = 1: use one of 0, 2, -7"),
-        ("Integer", {"n": 1}, Status.Discard, "n is an output and cannot be set"),
-        ("Boolean", {"on": 1}, Status.Discard, "on is an output and cannot be set"),
-        ("Boolean", {"fault": 1}, Status.Discard, "fault is an output and cannot be set"),
+        ("Integer", {"n": 1}, Status.Error, "n is an output and cannot be set"),
+        ("Boolean", {"on": 1}, Status.Error, "on is an output and cannot be set"),
+        ("Boolean", {"fault": 1}, Status.Error, "fault is an output and cannot be set"),
         ("Real", {"u": 5.0, "v[2]": nan}, Status.Discard, "v[2] = nan: must be finite"),
-        ("Integer", {"step": 4}, Status.Discard,
+        ("Integer", {"step": 4}, Status.Error,
          "step is fixed and cannot change after initialisation"),
         ("Real", {"k": 1.0}, Status.Error, "no Real has the value reference 0"),
         ("Boolean", {"k": 1}, Status.Error, "no Boolean has the value reference 0"),
@@ -481,6 +481,8 @@ def test_run_goes_on_from_the_bytes_of_its_state_as_if_nothing_had_been(variants
             one, other = Run(host), Run(another)
             for call, *arguments in first:
                 getattr(one, call)(*arguments)
+            if any(status == Status.Error for status, *_ in one.answers):
+                continue  # it may be in the state error
             _, state = another.deserialised(host.content())
             if other.note(another.set_state(state)) != Status.OK:
                 continue  # an earlier call has failed
