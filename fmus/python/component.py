@@ -272,7 +272,7 @@ class Component(Callbacks):
             inputs=list(store.inputs),
             outputs=list(store.outputs) if keeps else [],
             fresh=keeps and store.fresh,
-            held=keeps and store.held,
+            held=keeps and store.fresh and store.held,
             state=store.state,
             draws=store.draws if noise else (),
             generator=noise.state if noise else None,

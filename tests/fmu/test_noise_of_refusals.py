@@ -22,8 +22,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.arrays import Vector
-from auv_fmu import Refusal, Variable
+from auv_fmu import Refusal, Variable, Vector
 
 
 class Parameters(NamedTuple):
@@ -46,15 +45,20 @@ class Outputs(NamedTuple):
     y: Annotated[Vector, 3, Variable("1", "Noisy")]
 
 
-def begin() -> tuple[State, Outputs]:
+def start() -> State:
     """At the start."""
-    return State(0.0), Outputs(Vector((0.0, 0.0, 0.0)))
+    return State(0.0)
 
 
-def advance(parameters: Parameters, state: State, h: float) -> tuple[State, Outputs]:
+def update(state: State, h: float) -> State:
     """A step."""
+    return State(state.x + h)
+
+
+def outputs(parameters: Parameters) -> Outputs:
+    """Three times the same."""
     x = parameters.at
-    return State(state.x + h), Outputs(Vector((x, x, x)))
+    return Outputs(Vector((x, x, x)))
 
 
 def seed() -> int:

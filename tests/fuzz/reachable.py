@@ -8,17 +8,12 @@ reach; what it finds fault with is.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
-from itertools import chain, pairwise
-from math import hypot, isclose, isfinite
+from math import hypot, isfinite
 from typing import Any
 
-from auv_fmu import plant
 from auv_fmu.attitude import rotation_from_quaternion
-from auv_fmu.plant import PlantState
-from fmus.discovery import ports_of
-from fmus.ports.groups import reals_first, slices
-from fmus.ports.port import Refusal
+from auv_fmu.variable import Refusal
+from fmus.ports.groups import filled, reals_first
 from support import states
 from support.raw import Description, Variable
 from support.settings import behaviour_of, choices_of, parameters_of
@@ -29,9 +24,6 @@ TOLERANCE = 1e-9
 
 #: Of the Mersenne Twister that makes noise: words of its state, and one more number, its place.
 _TWISTER, _WORD = 624, 2**32
-
-#: Where the groups eta, nu, y, dy and tau_applied of the plant's outputs begin and end.
-_PLANT_OUTPUTS = (0, 6, 12, 15, 18, 21, 27)
 
 #: random.gauss cannot go further from zero: it takes the logarithm of a number of 53 bits.
 _MOST_SIGMAS = 8.6
@@ -67,7 +59,8 @@ def _faults(
         yield "no mode"
     if not _is_number(said["start_time"]):
         yield "the start time is no number"
-    for key, causality in (("inputs", "input"), ("outputs", "output")):
+    keeps = behaviour_of(description.name).is_sampled and said["state"] is not None
+    for key, causality in (("inputs", "input"), *([("outputs", "output")] * keeps)):
         all_ports = [port for port in description.of(causality) if port.name != "fault"]
         ports, values = reals_first(all_ports), said[key]
         if not isinstance(values, list) or len(values) != len(ports):
@@ -88,16 +81,19 @@ def _faults(
             for n, v in values.items()
             if not _fits(description, parameters[n], v)
         )
-    if not isinstance(said["fault"], bool):
-        yield "fault is neither true nor false"
+    for truth in ("fault", "fresh", "held"):
+        if not isinstance(said[truth], bool):
+            yield f"{truth} is neither true nor false"
+    if not keeps and said["outputs"] not in ([], ()):
+        yield "outputs that are not kept"
     yield from _faults_of_state(said, samples)
 
 
 def _faults_of_state(said: dict[str, Any], samples: Sequence[dict[str, Any]]) -> Iterator[str]:
     state = said["state"]
     if state is None:
-        if said["hidden"] is not None:
-            yield "something hidden without a state"
+        if said["generator"] is not None or said["draws"] not in ([], ()):
+            yield "noise without a state"
         if said["mode"] == MODES[2]:
             yield "steps without a state"
         return
@@ -161,38 +157,24 @@ def _numbers(value: Any) -> Iterator[float]:
 # What the equations keep true
 
 
-def _near(values: Sequence[float], others: Sequence[float]) -> bool:
-    """Whether values are equal but for the rounding of another machine."""
-    close = partial(isclose, rel_tol=2 * TOLERANCE, abs_tol=2 * TOLERANCE)
-    return all(map(close, values, others))
-
-
 def _is_unit(vector: Sequence[float]) -> bool:
     return abs(hypot(*vector) - 1.0) <= TOLERANCE
 
 
 def _plant(said: dict[str, Any]) -> Iterator[str]:
-    position, quaternion, nu_r, acting, _ = said["state"]
+    _, quaternion, nu_r, acting, _ = said["state"]
     if not _is_unit(quaternion):
         yield f"a quaternion that is no unit: {quaternion}"
         return
-    parameters, outputs = said["parameters"], said["outputs"]
-    state = PlantState(*map(tuple, said["state"]))
-    rotation = rotation_from_quaternion(state.quaternion)
-    known = parameters_of("AuvPlant").of(parameters)
-    euler, y, dy, nu, _ = plant.outputs(state, rotation, known.ell, known.roll.rolls)
+    parameters = said["parameters"]
+    rotation = rotation_from_quaternion(quaternion)
     if not parameters["roll"] and (nu_r[3] or abs(rotation[1][2]) > TOLERANCE):
         yield "roll where there is none"
-    parts = (outputs[i:j] for i, j in pairwise(_PLANT_OUTPUTS))
-    eta, found_nu, found_y, found_dy, tau, found_nu_r = parts
-    shown = [*eta, *found_nu, *found_dy, *tau, *found_nu_r]
-    if not _near(shown, [*position, *euler, *nu, *dy, *acting, *nu_r]):
-        yield "outputs that are not those of the state"
-    most = _MOST_SIGMAS * parameters["noise.std"] + TOLERANCE * hypot(*y)
-    if any(abs(measured - true) > most for measured, true in zip(found_y, y, strict=True)):
-        yield "noise that no generator makes"
     limits = ((parameters[f"tau_min.{k}"], parameters[f"tau_max.{k}"]) for k in "uqr")
-    if not all(low <= value <= high for value, (low, high) in zip(tau, limits, strict=True)):
+    if not all(
+        low - TOLERANCE * (high - low) <= value <= high + TOLERANCE * (high - low)
+        for value, (low, high) in zip(acting, limits, strict=True)
+    ):
         yield "applied forces beyond the limits"
 
 
@@ -217,26 +199,23 @@ def _generator(hidden: Any) -> Iterator[str]:
 
 
 def _follows(said: dict[str, Any], name: str) -> Iterator[str]:
-    """What a behaviour says of the outputs that belong to a state."""
-    behaviour, declared = behaviour_of(name), ports_of(name)
-    expected = behaviour.hooks["expected"]
-    if behaviour.noisy:
-        yield from _generator(said["hidden"])
-    if expected is None:
+    """What a behaviour says of a state, and of the noise that goes with it."""
+    behaviour = behaviour_of(name)
+    if behaviour.draws:
+        yield from _generator(said["generator"])
+        if not all(abs(draw) <= _MOST_SIGMAS for draw in said["draws"]):
+            yield "noise that no generator makes"
+    check = behaviour.hooks["check_state"]
+    if check is None:
         return
-    places = slices([port for port in declared if port.causality == "output"])
     given = {
         "parameters": parameters_of(name).of(said["parameters"]),
-        "state": behaviour.state(*(tuple(x) if isinstance(x, list) else x for x in said["state"])),
-        "outputs": {group: tuple(said["outputs"][place]) for group, place in places.items()},
+        "state": filled(behaviour.state, _numbers(said["state"])),
     }
     try:
-        groups = expected(*(given[argument] for argument in behaviour.arguments("expected")))
+        check(*(given[argument] for argument in behaviour.arguments("check_state")))
     except Refusal as refusal:
         yield str(refusal)
-    else:
-        if not _near(said["outputs"], [*chain(*groups.values())]):
-            yield "outputs that are not those of the state"
 
 
 #: What is told of a state without asking the behaviour.

@@ -16,7 +16,10 @@ from support.status_table import MODES
 
 CHECKSUM = "checksum"
 
-MAGIC = "FMU state 2"
+MAGIC = "FMU state 3"
+
+#: What outputs are: outdated, those of the last step, up to date.
+_FRESHNESS = ((False, False), (True, True), (True, False))
 
 #: A generator of noise: words of its state and the place of the next, and its kind.
 _WORDS, _VERSION = 625, 3
@@ -33,9 +36,10 @@ class Unwritable(ValueError):
 class _Layout(NamedTuple):
     #: Types of the parts of a state.
     state: Sequence[Any]
-    is_noisy: bool
+    draws: int
     parameters: Sequence[Port]
     inputs: Sequence[Any]
+    #: None are kept of a component that is not sampled.
     outputs: Sequence[Any]
 
 
@@ -53,7 +57,8 @@ def _layout(name: str) -> _Layout:
         for causality in ("input", "output")
     )
     state = [*hints_of(behaviour.state).values()]
-    return _Layout(state, bool(behaviour.noisy), of["parameter"], inputs, outputs)
+    kept = outputs if behaviour.is_sampled else []
+    return _Layout(state, behaviour.draws, of["parameter"], inputs, kept)
 
 
 class _Reader:
@@ -115,15 +120,22 @@ def _read(source: _Reader) -> NativeState | None:
         time=time,
         parameters=parameters,
         inputs=[source.value(kind) for kind in layout.inputs],
-        outputs=[source.value(kind) for kind in layout.outputs],
+        outputs=[],
+        fresh=False,
+        held=False,
         state=None,
-        hidden=None,
+        draws=[],
+        generator=None,
     )
     if source.word():
         said["state"] = [source.value(kind) for kind in layout.state]
-        if layout.is_noisy:
+        if layout.draws:
             words, has_next, following = source.words(_WORDS), source.word(), source.real()
-            said["hidden"] = [_VERSION, words, following if has_next else None]
+            said["generator"] = [_VERSION, words, following if has_next else None]
+            said["draws"] = source.reals(layout.draws)
+        if layout.outputs:
+            said["outputs"] = [source.value(kind) for kind in layout.outputs]
+            said["fresh"], said["held"] = _FRESHNESS[source.word()]
     said["fault"] = bool(source.word())
     said[CHECKSUM] = source.word()
     return said
@@ -178,15 +190,22 @@ def _written(said: NativeState) -> bytes:
         if port.type == "String":
             value = [*port.choices].index(value)
         parts.append(_reals(value) if port.type == "Real" else struct.pack("<i", value))
-    for key, kinds in (("inputs", layout.inputs), ("outputs", layout.outputs)):
-        parts += [_value(kind, value) for kind, value in zip(kinds, said[key], strict=True)]
+    parts += _values(layout.inputs, said["inputs"])
     parts.append(_words(said["state"] is not None))
     if said["state"] is not None:
-        parts += [_value(k, value) for k, value in zip(layout.state, said["state"], strict=True)]
-        if layout.is_noisy:
-            _, words, following = said["hidden"]
+        parts += _values(layout.state, said["state"])
+        if layout.draws:
+            _, words, following = said["generator"]
             parts += [_words(*words, following is not None), _reals(following or 0.0)]
+            parts += _values([float] * layout.draws, said["draws"])
+        if layout.outputs:
+            parts += _values(layout.outputs, said["outputs"])
+            parts.append(_words(_FRESHNESS.index((said["fresh"], said["held"]))))
     return b"".join(parts) + _words(said["fault"], said[CHECKSUM])
+
+
+def _values(kinds: Sequence[Any], values: Sequence[Any]) -> list[bytes]:
+    return [_value(kind, value) for kind, value in zip(kinds, values, strict=True)]
 
 
 def _value(kind: Any, value: Any) -> bytes:

@@ -25,7 +25,7 @@ def test_loop_starts_where_section_4_1_says():
     assert start.vehicles.plant == ((2.0, 6.0, 0.0), level, (0.0,) * 6, origin, origin)
     assert start.scene.plant == (origin, y, origin, (0.0,) * 6, (0.0,) * 6)
     assert start.vehicles.planner == ((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
-    assert start.controller_state == (y, origin, (0.0,) * 4)
+    assert start.controller_state == (y, origin, (0.0,) * 4, 0.0)
     assert start.scene.y == y
     assert start.scene.reference.y_d == (0.35, 0.0, -2.0)
     assert start.signals.e == (2.0, 6.0, 2.0)

@@ -74,9 +74,7 @@ def test_variation_begins_in_its_stationary_distribution():
     assert abs(starts.mean(axis=0)).max() < 5 * 0.1 / sqrt(4000)
 
 
-def test_zero_step_changes_nothing_and_no_deviation_means_none():
-    variation = ocean_current.begin(CURRENT)
-    assert ocean_current.advance(CURRENT, variation, 0.0) is variation
+def test_no_deviation_means_none():
     calm = CURRENT._replace(sigma=0.0)
     assert np.all(series(calm, [0.5, 1.0]) == 0.0)
 

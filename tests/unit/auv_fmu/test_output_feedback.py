@@ -121,7 +121,7 @@ def test_gate_restarts_the_observer_after_a_jump_only():
     # The gate is the largest jump that is credible.
     assert output_feedback.gated(gains, state, (0.0, 1.0, 0.0)) is state
     restarted = output_feedback.gated(gains, state, (0.6, 0.6, 0.6))
-    assert restarted == ((0.6, 0.6, 0.6), (0.0, 0.0, 0.0), state.theta_hat)
+    assert restarted == ((0.6, 0.6, 0.6), (0.0, 0.0, 0.0), state.theta_hat, 0.0)
     assert output_feedback.gated(gains._replace(innovation_gate=0.0), state, (9.0,) * 3) is state
 
 

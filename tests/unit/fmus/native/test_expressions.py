@@ -663,7 +663,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("for k, a in zip(range(-2147483647, 2147483647), v): y += k", "a range of so many"),
         ("for v in v: y += v", "v is a Vector of 3 and gets a float: use another name"),
         ("y = interpolate(y, (0, 1), (10, 20))", "a tuple of 2 with other than floats"),
-        ("y = {1: y}[1]", "a dict that is not a result: write a NamedTuple"),
+        ("y = {1: y}[1]", "a dict is not in the language of equations; use a NamedTuple"),
         ("k = 3000000000", "3000000000 is an int of more than 32 bits: write 3000000000.0"),
         ("y = Vector(0.0 for _ in range(70000)).sum()", "a Vector of 70000 is too large for C"),
         ("k = LARGE", "3000000000 is an int of more than 32 bits"),

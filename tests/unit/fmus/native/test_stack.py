@@ -28,7 +28,7 @@ static double own_last(const Matrix10x100 *M, Vector100 x) {
     return own_first((Vector100){{0.0, 1.0}});
 }
 
-static void model_begin(const model_inputs *inputs, double t) {
+static void model_start(const model_inputs *inputs, double t) {
     const Vector100 x = own_sum(own_sum(*inputs, *inputs), *inputs);
     own_last(&M, x);
 }
@@ -36,8 +36,8 @@ static void model_begin(const model_inputs *inputs, double t) {
 
 
 def test_depth_is_that_of_the_calls_within_each_other():
-    """What begin holds: x and two sums; what a call of own_sum does: arguments, c and d."""
-    assert deepest(TEXT) == (800 * (3 + 2 + 2), "model_begin")
+    """What start holds: x and two sums; what a call of own_sum does: arguments, c and d."""
+    assert deepest(TEXT) == (800 * (3 + 2 + 2), "model_start")
 
 
 def test_structures_and_functions_of_components_are_all_found():

@@ -8,12 +8,17 @@ from typing import NamedTuple
 
 from fmus.native.tables import names_of_choices, tables
 from fmus.ports.groups import ParameterSet
-from fmus.ports.port import inputs, setting
+from fmus.ports.port import Port
 from support.all_types import build
 
 
 class One(NamedTuple):
     odd: int
+
+
+def chosen(name: str, choices: dict[str, int]) -> Port:
+    """A parameter whose value is one of some texts."""
+    return Port(name, "parameter", "fixed", "String", "", start=[*choices][-1], choices=choices)
 
 
 def row_of(name: str) -> list[str]:
@@ -27,8 +32,8 @@ def test_parameters_lie_in_the_structures_of_the_equations():
         "K[2,1]": "model.K.v[1].v[0]",
         "offset[3]": "model.offset.v[2]",
         "limits.default": "model.limits.default_",
-        "mixed.n": "model.mixed.m0",
-        "mixed.x": "model.mixed.m1",
+        "mixed.n": "model.mixed.n",
+        "mixed.x": "model.mixed.x",
         "mode": "model.mode",
     }
     for name, place in places.items():
@@ -49,14 +54,14 @@ def test_inputs_start_with_values_in_ranges():
 
 
 def test_a_start_of_minus_zero_stays_one():
-    port = inputs("u", {"x": "m"}, "Place")[0]
-    of = replace(build.definition(), ports=(replace(port, start=-0.0),))
+    port = Port("u.x", "input", "continuous", "Real", "Place", "m", -0.0)
+    of = replace(build.definition(), ports=(port,))
     assert '"u.x", REAL, INPUT, CONTINUOUS, 0, -0.0, ' in tables(of)
 
 
 def test_choices_are_texts_in_c():
     odd = {'a"b\\': 0, "??/": -(2**31)}
-    of = replace(build.definition(), ports=(setting("odd", "??/", "Any", odd),))
+    of = replace(build.definition(), ports=(chosen("odd", odd),))
     of = replace(of, parameters=ParameterSet(One, odd=of.ports[0]))
     of = replace(of, behaviour=of.behaviour._replace(parameters=One))
     assert r'{{"a\"b\\", 0}, {"\?\?/", -2147483648}};' in tables(of)
@@ -64,16 +69,17 @@ def test_choices_are_texts_in_c():
 
 def test_members_of_enumerations_are_choices_of_texts_and_states():
     text = tables(build.definition())
-    members = '{{"OFF", 0}, {"HEAT", 2}, {"COOL", -7}};'
-    for name in ("choices_of_mode", "choices_of_limits_kind", "members_0"):
-        assert f"static const choice {name}[] = {members}" in text
+    choices = '{{"off", 0}, {"heat", 2}, {"cool", -7}};'
+    for name in ("choices_of_mode", "choices_of_limits_kind"):
+        assert f"static const choice {name}[] = {choices}" in text
+    assert f"static const choice members_0[] = {choices.upper()}" in text
     assert row_of("limits.kind")[-2:] == ["choices_of_limits_kind", "3"]
     assert '{INTEGER, 1, "Mode", members_0, 3}, {REAL, 9, NULL' in text
 
 
 def test_choices_of_two_ports_whose_names_differ_in_a_dot_are_two_tables():
     """A name in C has none."""
-    ports = [setting(name, "a", "Choice", {"a": 0}) for name in ("kind.x", "kind_x", "kind")]
+    ports = [chosen(name, {"a": 0}) for name in ("kind.x", "kind_x", "kind")]
     assert names_of_choices(ports) == {
         "kind.x": "choices_of_kind_x",
         "kind_x": "choices_of_kind_x_",

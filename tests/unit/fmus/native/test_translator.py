@@ -6,6 +6,7 @@ import ast
 import re
 import subprocess
 import sys
+from ctypes import byref, c_double, c_ulong
 from enum import IntEnum
 from importlib import import_module
 from pathlib import Path
@@ -16,14 +17,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import acoustic_link, formation, plant
+from auv_fmu import acoustic_link, formation
 from auv_fmu.arrays import Matrix, Vector
 from auv_fmu.ocean_current import Current
 from auv_fmu.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.sea import Sea
 from auv_fmu.waves import MOST as MOST_WAVES
 from auv_fmu.waves import Spectrum, Waves
-from fmus.discovery import components, ports_of, source_of
+from fmus.discovery import ports_of, source_of
 from fmus.native.functions import function_in_c
 from fmus.native.program import Program
 from fmus.native.shapes import strip_sphinx_marks
@@ -31,16 +32,20 @@ from fmus.native.tables import tables
 from fmus.native.translator import _drawn, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
+from fmus.python.callbacks import LONGEST_MESSAGE, Callbacks
 from support.equations import (
     FLAGS,
     ROOT,
     RUNTIME,
     Equations,
+    Error,
+    bits,
     equations,
+    flat,
     is_series,
-    outcome,
+    structure,
 )
-from support.settings import NAMES, parameters_of
+from support.settings import NAMES, behaviour_of, parameters_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -90,8 +95,8 @@ def test_it_is_c_without_warnings(name, standard, tmp_path):
 @every
 def test_each_function_has_its_docstring_above_it(name):
     text, seen = translated(source_of(name).definition), 0
-    behaviour = Path(str(import_module(components()[name]).__file__))
-    for path in (behaviour, *(ROOT / "src/auv_fmu").glob("*.py")):
+    component = Path(str(import_module(source_of(name).module).__file__))
+    for path in (component, *(ROOT / "src/auv_fmu").glob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
                 continue
@@ -270,72 +275,58 @@ def value(kind: Any, random: Random, wild: float = 0.3) -> Any:
     return kind(**{name: value(k, random, wild) for name, k in hints_of(kind).items()})
 
 
-def drawn(both: Equations, random: Random, wild: float) -> dict[str, Any]:
-    """Arguments of hooks."""
-    of = both.behaviour
-    kinds = {"parameters": of.parameters, "state": of.state, "inputs": of.inputs}
-    values = {name: value(kind, random, wild) for name, kind in kinds.items()}
-    return {**values, "t": number(random), "h": random.random()}
-
-
-def same(both: Equations, hook: str, given: Any) -> bool:
-    """Compare what a hook comes to in both languages; whether that is no refusal."""
-    found = both.of_c(hook, **given)
-    assert found == both.of_python(hook, **given)
-    return not found[0]
-
-
-def moment(both: Equations, given: dict[str, Any]) -> bool:
-    """Compare all that is made of a state; whether it is no refusal, after which all is there."""
-    if both.behaviour.derived:
-        if not same(both, "derive", given):
-            return False
-        given["derived"] = both.call("derive", **given)
-    return same(both, "outputs", given)
+def agree(both: Equations, hook: str, **given: Any) -> Any:
+    """Compare what a hook gives, or what it raises as a slave would say it; None: it raises."""
+    result, why = None, ""
+    try:
+        result = both.python(hook, **given)
+    except Exception as error:
+        why = Callbacks.describe(None, error)[:LONGEST_MESSAGE]  # type: ignore[arg-type]
+    assert both.c(hook, **given) == (why, [] if result is None else bits(flat(result)))
+    return result
 
 
 @every
 @given(random=randoms)
-def test_hooks_do_the_same(name, random):
+def test_hooks(name, random):
+    both, wild = equations(name), random.choice((0.0, 0.02, 0.3))
+    groups = ("parameters", "inputs", "state", "derived")
+    given = {what: value(both.kind(what), random, wild) for what in groups}
+    given |= {"t": number(random), "h": random.random()}
+    for hook in ("check", "start", "credible", "restarted", "derive", "outputs", "update"):
+        if both.said.hooks[hook]:
+            agree(both, hook, **given)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in NAMES if behaviour_of(name).hooks["check_state"]]
+)
+@given(random=randoms)
+def test_states_are_refused_alike(name, random):
+    """Most that are random, and some that a run begins with."""
     both = equations(name)
-    given = drawn(both, random, random.choice((0.0, 0.02, 0.3)))
-    has_start, has_check = (both.behaviour.hooks[hook] for hook in ("start", "check_state"))
-    if has_start:
-        same(both, "start", given)
-    if has_check:
-        quaternion = {"quaternion": (0.6, 0.0, 0.8, 0.0)}
-        has_one = hasattr(given["state"], "quaternion") and random.random() < 0.5
-        state = given["state"]._replace(**quaternion) if has_one else given["state"]
-        same(both, "check_state", {**given, "state": state})
-    if moment(both, given) and has_start:
-        same(both, "update", given)
+    parameters, inputs = (value(both.kind(it), random, 0.0) for it in ("parameters", "inputs"))
+    state = agree(both, "start", parameters=parameters, inputs=inputs, t=random.random())
+    if state is None or random.random() < 0.5:
+        state = value(both.kind("state"), random, random.choice((0.0, 0.02, 0.3)))
+    agree(both, "check_state", parameters=parameters, state=state)
 
 
-@given(random=randoms)
-def test_restarts_of_the_observer(random):
+def test_text_of_a_restart_is_that_of_python():
     both = equations("ObserverController")
-    given = drawn(both, random, 0.0)
-    assert same(both, "credible", given)
-    assert same(both, "restarted", given)
-    assert both.library.message().decode() % 0.02 == both.behaviour.restarted.format(t=0.02)
-
-
-@given(random=randoms)
-def test_limits_that_leave_an_actuator_nothing(random):
-    both = equations("AuvPlant")
-    same(both, "check", drawn(both, random, 0.3))
+    assert both.library.restarted().decode() % 0.02 == both.said.restarted.format(t=0.02)
 
 
 @given(random=randoms, n=st.integers(0, MOST + 2), timed=st.booleans())
 def test_paths_are_refused_alike(random, n, timed):
     """Most of them somewhere on the way; more waypoints than there are, for a place beyond them."""
+    both, default = equations("PathPlanner"), Parameters()
     series = [tuple(random.uniform(-15.0, 15.0) for _ in range(MOST)) for _ in "xyz"]
     t = tuple(sorted(random.uniform(0.0, 2000.0) for _ in range(MOST)))
     flat_z = tuple(0.2 * z for z in series[2])
     T = random.uniform(1.0, 40.0)
     waypoints = Waypoints(n, *series[:2], flat_z, t, timed, random.uniform(0.05, 1.0), T)
-    parameters = Parameters()._replace(waypoints=waypoints)
-    same(equations("PathPlanner"), "check", {"parameters": parameters})
+    agree(both, "check", parameters=default._replace(waypoints=waypoints))
 
 
 @given(
@@ -361,13 +352,13 @@ def test_seas_are_alike(random, spectrum, n, depth):
         Current(speed=random.uniform(0.0, 3.0), seed=random.randrange(-(2**31), 2**31)),
         depth=depth,
     )
-    same(both, "check", {"parameters": parameters})
 
     def inputs() -> Any:
-        x, y = random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3)
-        return both.behaviour.inputs((x, y, random.uniform(-5.0, 40.0)))
+        x, y, z = random.uniform(-1e3, 1e3), random.uniform(-1e3, 1e3), random.uniform(-5.0, 40.0)
+        return both.said.inputs((x, y, z))
 
-    runs(both, parameters, inputs, random.uniform(0.0, 10.0), 3)
+    agree(both, "check", parameters=parameters)
+    runs(both, parameters, inputs, random.uniform(0.0, 10.0), 4)
 
 
 @given(random=randoms, shape=st.sampled_from(formation.Shape), estimated=st.booleans())
@@ -406,31 +397,35 @@ def test_links_are_the_same_over_many_steps(random):
         1.0,
         random.uniform(0.0, 2.0),
     )
-    runs(both, parameters, lambda: value(both.behaviour.inputs, random, 0.0), 0.5)
+    runs(both, parameters, lambda: value(both.said.inputs, random, 0.0), 0.5)
 
 
-def runs(both: Equations, parameters: Any, inputs: Any, h: float, n: int = 40) -> None:
-    """Compare n steps of both, each from where the last one ended, until one is refused."""
-    given = {"parameters": parameters, "inputs": inputs(), "t": 0.0, "h": h}
-    if not same(both, "start", given):
-        return
-    given["state"] = both.call("start", **given)
-    for k in range(n):
-        given |= {"inputs": inputs(), "t": k * h}
-        if not (moment(both, given) and same(both, "update", given)):
+def runs(both: Equations, parameters: Any, inputs_at: Any, h: float, steps: int = 40) -> None:
+    """Compare steps of both, each from where the last one ended, until one is refused."""
+    given = {"parameters": parameters, "inputs": inputs_at(), "t": 0.0, "h": h}
+    given["state"] = agree(both, "start", **given)
+    for k in range(steps):
+        given |= {"inputs": inputs_at(), "t": k * h}
+        if both.said.derived:
+            given["derived"] = agree(both, "derive", **given)
+        if agree(both, "outputs", **given) is None:
             return
-        given["state"] = both.call("update", **given)
+        given["state"] = agree(both, "update", **given)
+        if given["state"] is None:
+            return
 
 
 @given(random=randoms)
 def test_noise_of_the_localisation(random):
-    both = equations("AuvPlant")
-    parameters = drawn(both, random, 0.3)["parameters"]
-    outputs = value(both.behaviour.outputs, random)
-    n = value(tuple[float, float, float], random)
-    measured = outputs._replace(y=both.call("measured", parameters=parameters, y=outputs.y, n=n))
-    found = both.of_c("measured", parameters=parameters, n=n, outputs=outputs)
-    assert found == outcome(measured)
+    both, wild = equations("AuvPlant"), 0.3
+    parameters = value(both.said.parameters, random, wild)
+    outputs = value(both.said.outputs, random, wild)
+    n = value(tuple[float, float, float], random, wild)
+    passed = both.passed("outputs", outputs)
+    given = both.passed("parameters", parameters)
+    both.library.measure(byref(given), (c_double * 3)(*n), byref(passed), byref(Error()))
+    measured = both.python("measured", parameters=parameters, y=outputs.y, n=n)
+    assert bits(flat(passed)) == bits(flat(outputs._replace(y=measured)))
 
 
 def drawn_type(random: Random, depth: int = 0) -> Any:
@@ -474,5 +469,8 @@ def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
 
 @pytest.mark.parametrize("seed", [0, 1, -1, 2**31 - 1, -(2**31)])
 def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
-    parameters = plant.Parameters(noise=plant.Localisation(seed=seed))
-    assert equations("AuvPlant").of_c("seed", parameters=parameters) == outcome(seed % 2**32)
+    both = equations("AuvPlant")
+    parameters = structure(both.said.parameters)()
+    parameters.noise.seed = seed
+    both.library.seed.restype = c_ulong
+    assert both.library.seed(byref(parameters), byref(Error())) == seed % 2**32
