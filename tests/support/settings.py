@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
-from fmus.discovery import components, package_folder, ports_of, source_of
+from fmus.discovery import components, ports_of, source_of
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import ParameterSet
 from support.tiers import slow
@@ -54,7 +54,7 @@ def trials_of(name: str) -> Trials:
     """How a component is tried; one without a trials.toml, and an FMU of others, as any may be."""
     if name not in components():
         return Trials()
-    path = package_folder(components()[name]) / "trials.toml"
+    path = source_of(name).folder / "trials.toml"
     said: dict[str, Any] = tomllib.loads(path.read_text()) if path.is_file() else {}
     settings = {key: Setting(**said.pop(key)) for key in ("overflow", "no_start") if key in said}
     return Trials(**said, **settings)

@@ -1,0 +1,171 @@
+"""Values belong to their time: what a get shows after inputs and after steps, in both kinds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from fmus.compilers import machines_compiler
+from fmus.kinds import KINDS
+from orchestrator.runs.own_components import build_own
+from support.raw import Host, Library, Status, initialised, instance
+
+pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+
+#: An integrator whose outputs show its input and the time, too.
+SCRIPT = '''\
+"""An integrator."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Refusal, Variable
+
+
+class Inputs(NamedTuple):
+    """What it integrates."""
+
+    u: Annotated[float, Variable("1", "Rate")] = 2.0
+
+
+class State(NamedTuple):
+    """The integral."""
+
+    x: float
+
+
+class Outputs(NamedTuple):
+    """What is seen."""
+
+    y: Annotated[float, Variable("1", "Integral and rate")]
+    at: Annotated[float, Variable("s", "Time of this")]
+
+
+def start() -> State:
+    """At the start."""
+    return State(1.0)
+
+
+def update(state: State, inputs: Inputs, h: float) -> State:
+    """A step."""
+    return State(state.x + h * inputs.u)
+
+
+def outputs(state: State, inputs: Inputs, t: float) -> Outputs:
+    """What is seen, if the rate is not zero."""
+    if inputs.u == 0.0:
+        raise Refusal("no rate")
+    return Outputs(state.x + inputs.u, t)
+'''
+
+U, Y, AT = 0, 1, 2
+
+
+def built(folder: Path, kind: str, name: str, text: str) -> Library:
+    script = folder / f"{name}_{kind}.py"
+    script.write_text(text, encoding="utf-8")
+    fmu = build_own(script, folder / name, kind=kind)
+    return Library(Path(fmpy.extract(str(fmu), folder / f"{name}_unpacked")))
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def kind(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def continuous(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return built(tmp_path_factory.mktemp(kind), kind, "followed", SCRIPT)
+
+
+@pytest.fixture(scope="module")
+def sampled(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    return built(tmp_path_factory.mktemp(kind), kind, "held", f"{SCRIPT}\n\nSAMPLED = True\n")
+
+
+def put(host: Host, u: float) -> None:
+    assert host.set("Real", [U], [u]) == Status.OK
+
+
+def seen(host: Host) -> tuple[Status, list[float]]:
+    return host.get("Real", [Y, AT])
+
+
+def test_outputs_follow_inputs_at_once(continuous: Library):
+    with initialised(continuous) as host:
+        assert seen(host) == (Status.OK, [3.0, 0.0])
+        put(host, 3.0)
+        assert seen(host) == (Status.OK, [4.0, 0.0])
+        assert host.step(0.0, 0.5) == Status.OK
+        assert seen(host) == (Status.OK, [5.5, 0.5])
+        put(host, 1.0)
+        assert seen(host) == (Status.OK, [3.5, 0.5])
+
+
+def test_sampled_outputs_are_those_of_the_last_step_until_inputs_come(sampled: Library):
+    with initialised(sampled) as host:
+        put(host, 3.0)
+        assert host.step(0.0, 0.5) == Status.OK
+        assert seen(host) == (Status.OK, [4.0, 0.0])
+        assert host.step(0.5, 0.5) == Status.OK
+        assert seen(host) == (Status.OK, [5.5, 0.5])
+        put(host, 1.0)
+        assert seen(host) == (Status.OK, [5.0, 1.0])
+        assert host.step(1.0, 0.5) == Status.OK
+        assert seen(host) == (Status.OK, [5.0, 1.0])
+
+
+def test_outputs_that_are_refused_leave_the_last_ones_and_are_told_once(continuous: Library):
+    with initialised(continuous) as host:
+        put(host, 0.0)
+        for _ in range(2):
+            assert seen(host) == (Status.Error, [3.0, 0.0])
+        assert host.fault()
+        assert host.step(0.0, 0.5) == Status.OK, "a step does not ask for them"
+        assert seen(host) == (Status.Error, [3.0, 0.0])
+        assert [message.text for message in host.messages] == ["outputs refused: no rate"]
+        put(host, 2.0)
+        assert seen(host) == (Status.OK, [3.0, 0.5])
+
+
+def test_sample_that_is_refused_is_a_refused_step_and_changes_nothing(sampled: Library):
+    with initialised(sampled) as host:
+        put(host, 0.0)
+        assert host.step(0.0, 0.5) == Status.Discard
+        [said] = host.messages
+        assert said.text == "step refused at t = 0 s: no rate"
+        put(host, 2.0)
+        assert seen(host) == (Status.OK, [3.0, 0.0])
+
+
+@pytest.mark.parametrize("serialised", [False, True])
+def test_restored_instance_holds_its_sample(sampled: Library, serialised: bool):
+    """And takes another one in the next step."""
+    with initialised(sampled) as host, initialised(sampled) as other:
+        assert host.step(0.0, 0.5) == Status.OK
+        state = host.get_state()
+        if serialised:
+            _, state = other.deserialised(host.serialised(state))
+            host = other
+        else:
+            assert host.step(0.5, 0.5) == Status.OK
+        assert host.set_state(state) == Status.OK
+        assert seen(host) == (Status.OK, [3.0, 0.0])
+        assert host.step(0.5, 0.5) == Status.OK
+        assert seen(host) == (Status.OK, [4.0, 0.5])
+
+
+def test_time_is_that_of_a_host_that_counts_its_steps(continuous: Library):
+    """And after a jump, that of one that adds them up."""
+    start, h = 0.3, 0.1
+    with instance(continuous) as host:
+        assert host.setup(start) == host.enter() == host.exit() == Status.OK
+        for k in range(1000):
+            assert host.step(start + k * h, h) == Status.OK
+            assert seen(host)[1][1] == start + (k + 1) * h
+        t = start + 1000.5 * h
+        assert host.step(t, h) == Status.OK
+        assert seen(host)[1][1] == t + h
