@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = Path(str(auv_fmu.__file__)).parent
 EQUATIONS = [
     *sorted({*PACKAGE.glob("*.py")} - {PACKAGE / "arrays.py"}),
-    *(ROOT / package.replace(".", "/") / "behaviour.py" for package in components().values()),
+    *(ROOT / f"{module.replace('.', '/')}.py" for module in components().values()),
 ]
 
 
