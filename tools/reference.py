@@ -186,8 +186,8 @@ def write_reference(dist: Path, root: Path) -> list[Path]:
 
     """
     written = []
-    for name, package in components().items():
-        folder = root.joinpath(*package.split("."), REFERENCE)
+    for name, module in components().items():
+        folder = root.joinpath(*module.split(".")[:-1], REFERENCE)
         written += write_component_reference(dist / f"{name}.fmu", folder)
     written.append(root / REFERENCE / "auv_ref.csv")
     written[-1].parent.mkdir(exist_ok=True)

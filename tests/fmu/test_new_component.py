@@ -21,10 +21,10 @@ ROOT = Path(__file__).parents[2]
 NAME, FOLDER = "FirstOrderLag", "first_order_lag"
 
 #: What is in that folder.
-WRITTEN = {"__init__.py", "component.py"}
+WRITTEN = {"__init__.py", "component.py", "page.md"}
 
 #: The component that stays: the fuzzer needs the states of another one.
-OTHER = "fmus.disturbance_generator"
+OTHER = "fmus.disturbance_generator.component"
 
 #: Tests of any component, and what they read.
 TESTS = (
@@ -111,7 +111,7 @@ def test_page_has_the_ports(tree: Path):
         f"from fmus.discovery import source_of; from fmus.documentation import component_page; "
         f"print(component_page(source_of({NAME!r})))",
     )
-    assert page.startswith("# FirstOrderLag\n\nA first-order lag, measured with noise.")
+    assert page.startswith("# FirstOrderLag\n\n```text\nT dx/dt = u - x")
     assert "| `y` | Real | m | Value, measured |" in page
 
 

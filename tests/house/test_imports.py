@@ -138,7 +138,8 @@ def test_the_orchestrator_knows_of_components_only_what_they_declare():
 
 
 def test_what_components_declare_brings_no_pythonfmu_into_the_process():
-    code = f"import sys, fmus.compilers, fmus.kinds, {', '.join(components().values())}; "
+    declared = components().values()
+    code = f"import sys, fmus.compilers, fmus.kinds, fmus.discovery, {', '.join(declared)}; "
     code += "from fmus.discovery import fingerprint; fingerprint('python'); "
     code += "sys.exit('pythonfmu' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,17 +1,11 @@
-"""A first-order lag, measured with noise.
-
-    T dx/dt = u - x,  y = x + noise
-
-`x` follows `u` with the time constant `T`, and is exact while `u` is held. A sensor tells `y`: its
-noise is white, and drawn once in each communication step.
-"""
+"""First-order lag, measured with noise."""
 
 from __future__ import annotations
 
 from math import expm1
 from typing import Annotated, NamedTuple
 
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable, __author__, __license__, __version__
 
 
 class Parameters(NamedTuple):
