@@ -59,16 +59,15 @@ def step_interpreted(run: Run) -> Iterator[None]:
     """Make the steps in Python, and look after each."""
     values, shown, append = run.row.values, run.row.shown, run.blocks.append
     experiment, stages, passing = run.experiment, run.stages, run.passing
-    last = experiment.rows - 1
+    steps = experiment.rows - 1
     is_not_finite = _watch(shown)
     for k, t, h, end in experiment.steps(run.made):
-        step = k - 1, t, h
         if passing is not None:
-            make_stages(passing, values, experiment, step, last)
+            make_stages(passing, values, experiment, steps, k - 1, t, h)
             if is_not_finite():
                 return
             append(t, shown)
-        make_stages(stages, values, experiment, step, last)
+        make_stages(stages, values, experiment, steps, k - 1, t, h)
         if passing is None:
             if is_not_finite():
                 return

@@ -168,15 +168,13 @@ class Ring:
         """Its components that cannot be solved for between steps, and why."""
         if len(self._targets) > _MOST_INPUTS:
             return dict.fromkeys(self.names, f"it has more than {_MOST_INPUTS} inputs")
-        return {
-            part.instance.name: why
-            for part in self._parts
-            if (
-                why := why_not_following(
-                    self._components[part.instance.name], part.instance, part.row
-                )
+        reasons = {
+            part.instance.name: why_not_following(
+                self._components[part.instance.name], part.instance, part.row
             )
+            for part in self._parts
         }
+        return {name: why for name, why in reasons.items() if why}
 
     @property
     def is_closed(self) -> bool:
@@ -333,11 +331,9 @@ def why_not_following(component: Component, instance: Instance, row: Row) -> str
         if follows:
             break
     shown()
-    return (
-        None
-        if follows
-        else (f"no Real output of {component.name} follows a Real input between steps")
-    )
+    if follows:
+        return None
+    return f"no Real output of {component.name} follows a Real input between steps"
 
 
 def _differ(

@@ -71,12 +71,7 @@ class Row:
         self.strings = StringTable()
         self.standing: dict[PortName, Standing] = {}
         self._hidden: dict[PortName, int] = {}
-        self._direct = {
-            PortName(name, output.name)
-            for name, component in system.components.items()
-            for output in component.having("output")
-            if component.has_feedthrough(output.name)
-        }
+        self._components = system.components
         self._sources = {c.target: c.source for c in system.connections}
         self._ports: dict[str, list[tuple[PortName, str, str]]] = {name: [] for name in instances}
         self._inputs: dict[str, list[int]] = {}
@@ -152,16 +147,11 @@ class Row:
         ports = [port for component in components for port in self._ports[component]]
         if passed:
             reached = {
-                port.component
-                for port, causality, _ in ports
-                if causality == "input" and not isfinite(self.values[self.columns[port]])
+                name.component
+                for name, causality, _ in ports
+                if causality == "input" and not isfinite(self.values[self.columns[name]])
             }
-            ports.sort(
-                key=lambda one: (
-                    one[1] == "input" or one[0] in self._direct,
-                    one[0].component in reached,
-                )
-            )
+            ports.sort(key=lambda port: (self._passes(*port[:2]), port[0].component in reached))
         passed_on = None
         for port, causality, fmi_type in ports:
             value = self.values[self.columns[port]]
@@ -179,6 +169,10 @@ class Row:
                 return text
             passed_on = passed_on or text
         return passed_on
+
+    def _passes(self, port: PortName, causality: str) -> bool:
+        """Whether a port is no state."""
+        return causality == "input" or self._components[port.component].has_feedthrough(port.port)
 
     def moving(self, before: np.ndarray) -> list[PortName]:
         """The ports whose values are not what they were, apart from rounding."""

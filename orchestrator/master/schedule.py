@@ -317,8 +317,10 @@ def make_stages(
     stages: Sequence[Stage],
     values: np.ndarray,
     experiment: Experiment,
-    step: tuple[int, float, float],
-    last: int,
+    steps: int,
+    k: int,
+    t: float,
+    h: float,
 ) -> None:
     """Make some stages of a step.
 
@@ -326,11 +328,11 @@ def make_stages(
         stages: to make.
         values: of the row.
         experiment: that the step belongs to.
-        step: how many were made before, its beginning and its length [s].
-        last: how many there are.
+        steps: how many there are.
+        k: how many were made before.
+        t, h: beginning and length of the step [s].
 
     """
-    k, t, h = step
     for gather, members, decimation in stages:
         if decimation is None:
             # What most stages are costs no call.
@@ -339,7 +341,7 @@ def make_stages(
             else:
                 gather(values)
             step_members(members, t, h)
-        elif decimation.is_due(k, last):
+        elif decimation.is_due(k, steps):
             gather(values)
             step_members(members, t, experiment.length(k, decimation.every))
 

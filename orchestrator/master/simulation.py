@@ -211,7 +211,8 @@ def _advance(
     except KeyboardInterrupt:
         failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
     except Ended as end:
-        run.show()
+        with suppress(ComponentFailed):
+            run.show()
         blocks.hand_over()
         raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
     except (InputError, NotKept):

@@ -44,7 +44,7 @@ Port = tuple[str, str]
 
 
 class NoSolution(Exception):
-    """The values of a ring do not come to rest."""
+    """The values of a ring do not come to rest, or the order is not known."""
 
 
 _OPERATORS: dict[str, Callable[..., Any]] = {
@@ -491,9 +491,25 @@ class Evaluation:
                 shown |= self._computed(ring)
             self._show(shown)
 
+    def _is_flat(self, name: str) -> bool:
+        """Whether no output that is a Real follows a small change of any input that is one."""
+        machine, found = self.machines[name], []
+        outputs = [one.name for one in machine.fmu.having("output") if one.type == "Real"]
+        for one in machine.fmu.having("input"):
+            if one.type == "Real":
+                held = machine.values[one.name]
+                before = [machine.output(output) for output in outputs]
+                machine.values[one.name] = held + 1e-7 * max(abs(held), 1.0)
+                found.append(before == [machine.output(output) for output in outputs])
+                machine.values[one.name] = held
+        return all(found)
+
     def _run_in_feedthrough_order(self, shown: dict[Port, Any]) -> None:
         """Steps, each to a time at which every input takes what feeds it then."""
         parts, spans = self.drawn.parts, self._steps()
+        for wire in self.drawn.wires:
+            if self._feedthrough(wire) and self._is_flat(wire.source[0]):
+                raise NoSolution(f"nothing shows that values pass through {wire.source[0]}")
         for k, (t, _) in enumerate(spans):
             for name, part in parts.items():
                 if k % part.every == 0:

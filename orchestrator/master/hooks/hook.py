@@ -65,9 +65,11 @@ class Run:
 
     def pass_on(self) -> None:
         """Let values of now pass, where a row shows them before the step."""
-        step = self.made, self.time, self.experiment.length(self.made, 1)
-        last = self.experiment.rows - 1
-        make_stages(self.passing or (), self.row.values, self.experiment, step, last)
+        experiment, k = self.experiment, self.made
+        make_stages(
+            self.passing or (), self.row.values, experiment, experiment.rows - 1,
+            k, self.time, experiment.length(k, 1),
+        )  # fmt: skip
 
     @contextmanager
     def ahead(self) -> Iterator[None]:
