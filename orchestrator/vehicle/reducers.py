@@ -90,7 +90,7 @@ class LoopRows:
 
     def acting(self, *columns: str) -> np.ndarray:
         """Values that act in each of these steps, or follow from inputs of its beginning."""
-        return self._table.step_values(*columns)[self._begin :]
+        return self._group(columns)[self._table.acting][self._begin :]
 
     @cached_property
     def _applied(self) -> np.ndarray:

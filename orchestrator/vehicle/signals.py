@@ -70,10 +70,9 @@ class Loop:
     y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
     theta_hat = _Group("controller", "theta_hat", quantities.THETA)
     tau = _Group("controller", "tau", ACTUATORS)
-    #: The parameters of (3), of the actuators, and of (2).
+    #: The parameters of (3), and of (2).
     lower_limits = _Group("vehicle", "tau_min", ACTUATORS)
     upper_limits = _Group("vehicle", "tau_max", ACTUATORS)
-    actuator_lags = _Group("vehicle", "actuator.T", ACTUATORS)
     vehicle_parameters = _Group("vehicle", "", (name.replace("_", ".") for name in Vehicle._fields))
 
     @property
@@ -244,7 +243,8 @@ def with_lag(table: Table, loop: Loop) -> np.ndarray:
     """Which actuators have a lag: of a vehicle that takes no tau, all."""
     if isinstance(loop, AllocatedLoop):
         return np.ones(len(ACTUATORS), bool)
-    return np.array([bool(value_of(table, name)) for name in loop.actuator_lags])
+    names = (PortName(loop.vehicle, f"actuator.T.{actuator}") for actuator in ACTUATORS)
+    return np.array([bool(table.parameters.get(name)) for name in names])
 
 
 def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:

@@ -153,10 +153,15 @@ class Table:
         starts: np.ndarray = np.where(skipped, exact - self.header.experiment.step, exact)
         return starts
 
+    @property
+    def acting(self) -> slice:
+        """The rows in which what acts in steps stands: all but one."""
+        first = self.header.experiment.acting_row
+        return slice(first, self._n - 1 + first)
+
     def step_values(self, *columns: str) -> np.ndarray:
         """What acts in steps, or follows from inputs of their beginning: of each row but one."""
-        first = self.header.experiment.acting_row
-        return self.group(*columns)[first : len(self) - 1 + first]
+        return self.group(*columns)[self.acting]
 
     def start_values(self, *columns: str) -> np.ndarray:
         """What these columns held when these steps began."""
