@@ -90,6 +90,7 @@ def fleet(dist: Path) -> System:
 #: in other hosts it is two.
 LATE = {
     "cofmupy": (-1, -1), "gemseo-fmu": (-1, -1), "pathsim-fmi": (-1, 2), "pycosimlibrary": (0, 2),
+    "sofirpy": (0, 2), "syssimx": (0, 0), "syssimx-jacobi": (1, 1),
 }  # fmt: skip
 
 
