@@ -31,7 +31,7 @@ from orchestrator.master.hooks.events import (
     Stop,
 )
 from orchestrator.master.plan import gathered_connections, stages
-from orchestrator.runs.bundle import BUNDLE_ORDER, current_fmus
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
@@ -239,7 +239,7 @@ def _check(prepared: Prepared) -> None:
 
 def _loop(prepared: Prepared, owner: Scenario) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
-    system, order = plan.system, plan.experiment.order or BUNDLE_ORDER
+    system, order = plan.system, plan.experiment.order or FEEDTHROUGH
     controller = _controller(system)
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),

@@ -27,15 +27,11 @@ from orchestrator.machine.children import listen_to_module
 from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.machine.ledger import sha256_of
-from orchestrator.master.experiment import GAUSS_SEIDEL, OrderName
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
 
 #: Where `auv-fmu build` writes each kind unless another folder is named.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
-
-#: The order that runs of these FMUs take where none is stated.
-BUNDLE_ORDER: OrderName = GAUSS_SEIDEL
 
 #: The archive of the closed loop, and what was built beside it, from what; with their papers.
 ARCHIVE, MANIFEST = "auv.ssp", "build.json"

@@ -19,11 +19,11 @@ from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from fmus.kinds import AUTO
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import JACOBI, ORDERS, Experiment
+from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Experiment
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import code_of, digest_of
-from orchestrator.runs.bundle import BUNDLE_ORDER, current_fmus
+from orchestrator.runs.bundle import current_fmus
 from orchestrator.studies.batch.kernel import (
     END,
     RunSteps,
@@ -45,6 +45,9 @@ from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, with_lag
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
+
+#: Orders that the straight line can be run in.
+_ORDERS = (FEEDTHROUGH, JACOBI)
 
 _NO_ROWS = np.empty((0, 0))
 
@@ -206,9 +209,9 @@ def _job(loop: _Loop, point: Point) -> _Job:
     changed = [system.component(name.component).variable(name.port) for name in changes]
     if any(variable.causality != "parameter" for variable in changed):
         system.check()
-    experiment = Experiment(point.stop_time, point.step, point.order or BUNDLE_ORDER)
-    if experiment.order not in ORDERS:
-        raise InputError(f"the batch engine has only the orders {', '.join(ORDERS)}; {_OTHER}")
+    experiment = Experiment(point.stop_time, point.step, point.order or FEEDTHROUGH)
+    if experiment.order not in _ORDERS:
+        raise InputError(f"the batch engine has only the orders {', '.join(_ORDERS)}; {_OTHER}")
     fmus = {name: part.description.modelName for name, part in system.components.items()}
     setting = setting_of(fmus, system.parameters, experiment.step)
     full, stop = experiment.full_steps, experiment.stop_time

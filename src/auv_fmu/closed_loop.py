@@ -22,7 +22,6 @@ from auv_fmu.vectors import Vector3, Vector6
 
 #: Before the first instant.
 _NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
-_UNDISTURBED: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class LongestSteps(NamedTuple):
@@ -93,11 +92,11 @@ class Vehicles(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """What blocks have told others in a step, and what acts one step later in Jacobi order."""
+    """What blocks pass on to others, whom it reaches one step late in Jacobi order."""
 
     tau: Vector3  #: command (tau_u, tau_q, tau_r) [N, N.m]
-    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
-    water: WaterMotion
+    nu_r: Vector6  #: velocity of the vehicle through the water [m/s, rad/s]
+    position: Vector3  #: of the vehicle [m]
     allocated: Any  #: an Allocated
 
 
@@ -133,43 +132,6 @@ def scene(setting: Setting, blocks: Blocks, vehicles: Vehicles, t: float, n: Vec
     )
 
 
-def move(
-    setting: Setting,
-    blocks: Blocks,
-    vehicles: Vehicles,
-    t: float,
-    drive: Vector3,
-    sent: Sent,
-    h: float,
-    parts: Splits,
-) -> Vehicles:
-    """All one step later.
-
-    Args:
-        setting: of the loop.
-        blocks: that stand in it.
-        vehicles: at the beginning of the step.
-        t: then [s].
-        drive: what drives the vehicle: of a plant, (tau_u, tau_q, tau_r) after the limits of (3)
-            [N, N.m]; of a REMUS 100, (delta_r, delta_s, n) [rad, rad, rad/s].
-        sent: what else acts on it: disturbance and water.
-        h: step [s].
-        parts: that the step is split into.
-
-    """
-    state, rotation = vehicles.plant, vehicles.rotation
-    planner, moving, water = vehicles.planner, vehicles.moving, vehicles.water
-    n, n_d = parts.plant, blocks.planner.parts(parts.planner)
-    for _ in range(n):
-        state, rotation = blocks.vehicle.step(
-            setting.plant, state, rotation, drive, sent.tau_w, sent.water, h / n
-        )
-    for i in range(n_d):
-        h_d = h / n_d
-        planner, moving = blocks.planner.step(setting.planner, planner, moving, t + i * h_d, h_d)
-    return Vehicles(state, rotation, planner, moving, blocks.water.later(setting.water, water, h))
-
-
 class Moment(NamedTuple):
     """All that the rest of a run depends on, at one time t_k."""
 
@@ -189,11 +151,11 @@ class Instant(NamedTuple):
     measured: Any  #: what the controller is told: Measurement or PdMeasurement
     controller_state: Any  #: a ControllerState; of the PD controller theta_hat
     signals: Any  #: Signals or PdSignals
-    now: Sent  #: what this instant sends
-    acts: Sent  #: what reaches the others in the step that begins here
+    now: Sent  #: what this instant passes on
     command: Vector3  #: (tau_u, tau_q, tau_r) of it, at the actuators or their allocation [N, N.m]
-    tau: Vector3  #: what drives the vehicle: what the limits of (3) leave of the command [N, N.m]
+    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]; of a REMUS 100 what is allocated
     tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
+    water: WaterMotion  #: that acts
 
 
 # The loop
@@ -211,8 +173,8 @@ def begin(setting: Setting, blocks: Blocks, n: Vector3) -> Moment:
     vehicles = vehicles_at_start(setting, blocks)
     seen = scene(setting, blocks, vehicles, 0.0, n)
     state = blocks.controller.start(setting.controller, blocks.controller.measurement(seen))
-    before = Sent(_NO_COMMAND, _UNDISTURBED, seen.water, blocks.vehicle.idle())
-    return Moment(0.0, vehicles, seen, state, before)
+    still = Sent(_NO_COMMAND, seen.plant.nu_r, vehicles.plant.position, blocks.vehicle.idle())
+    return Moment(0.0, vehicles, seen, state, still)
 
 
 def act(
@@ -226,8 +188,8 @@ def act(
         moment: of the loop.
         h: the step [s].
         parts: that it is split into.
-        delayed: what blocks tell others acts one step late, as in Jacobi order (reading 5): the
-            command, the disturbance, the water, and what is allocated.
+        delayed: what blocks pass on arrives one step late, as in Jacobi order (reading 5): the
+            command, what is allocated, and what the disturbance and the water are told.
 
     """
     t, vehicles, scene, controller_state, before = moment
@@ -236,13 +198,42 @@ def act(
     measured = law.measurement(scene)
     state = law.gated(setting.controller, controller_state, measured)
     signals = law.evaluate(setting.controller, state, measured, h_c)
+    tau_w, water = scene.tau_w, scene.water
     late = delayed and t > 0.0
+    if late:
+        tau_w = disturbance(setting.disturbance, vehicle.disturbed(before.nu_r), t)
+        water = blocks.water.motion(setting.water, vehicles.water, before.position, t)
     told = before.tau if late else signals.tau
     allocated = vehicle.allocate(setting.allocation, told, scene.plant.nu_r)
-    now = Sent(signals.tau, scene.tau_w, scene.water, allocated)
-    acts = before if late else now
-    tau = vehicle.driving(setting.plant, told, acts.allocated)
-    return Instant(t, vehicles, scene, measured, state, signals, now, acts, told, tau, acts.tau_w)
+    now = Sent(signals.tau, scene.plant.nu_r, vehicles.plant.position, allocated)
+    tau = vehicle.driving(setting.plant, told, before.allocated if late else allocated)
+    return Instant(t, vehicles, scene, measured, state, signals, now, told, tau, tau_w, water)
+
+
+def move(setting: Setting, blocks: Blocks, instant: Instant, h: float, parts: Splits) -> Vehicles:
+    """All one step later.
+
+    Args:
+        setting: of the loop.
+        blocks: that stand in it.
+        instant: that the step begins with.
+        h: step [s].
+        parts: that it is split into.
+
+    """
+    t, vehicles = instant.t, instant.vehicles
+    state, rotation = vehicles.plant, vehicles.rotation
+    planner, moving = vehicles.planner, vehicles.moving
+    n, n_d = parts.plant, blocks.planner.parts(parts.planner)
+    for _ in range(n):
+        state, rotation = blocks.vehicle.step(
+            setting.plant, state, rotation, instant.tau, instant.tau_w, instant.water, h / n
+        )
+    for i in range(n_d):
+        h_d = h / n_d
+        planner, moving = blocks.planner.step(setting.planner, planner, moving, t + i * h_d, h_d)
+    water = blocks.water.later(setting.water, vehicles.water, h)
+    return Vehicles(state, rotation, planner, moving, water)
 
 
 def step(
@@ -271,9 +262,7 @@ def step(
     state = law.step(instant.controller_state, instant.signals, h_c)
     for _ in range(parts.controller - 1):
         state = law.step(state, law.evaluate(gains, state, measured, h_c), h_c)
-    vehicles = move(
-        setting, blocks, instant.vehicles, instant.t, instant.tau, instant.acts, h, parts
-    )
+    vehicles = move(setting, blocks, instant, h, parts)
     return Moment(end, vehicles, scene(setting, blocks, vehicles, end, n), state, instant.now)
 
 

@@ -43,6 +43,7 @@ from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import _process_folder
 from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import ORDERS
 from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.observer import Observer
 from orchestrator.master.observers.table import Table
@@ -53,7 +54,6 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.units import Linear, Mapped
 from support import typed
-from support.runs import BUNDLE_ORDERS
 
 from . import files_mutators as mutators
 from .files_oracle import agreement
@@ -110,7 +110,7 @@ def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
             Path(folder, name).write_bytes(content)
         system = closed_loop(Path(folder), read_scenario("fig5"))
         archive = ssp_bytes(replace(system, stop_time=0.1, step=0.02))
-        saved = runs[BUNDLE_ORDERS[0]].save(Path(folder, "saved"))
+        saved = runs[ORDERS[0]].save(Path(folder, "saved"))
         stored = {path.name: path.read_bytes() for path in saved.iterdir()}
         table = Path(folder, "table.csv")
         file = CsvFile(table)
@@ -232,7 +232,7 @@ def _table(runs: Mapping[str, Result], valid: bytes) -> Kind:
     }
 
     def check(content: bytes, said: str) -> str:
-        [order] = [order for order in BUNDLE_ORDERS if f"in {order} order" in said]
+        [order] = [order for order in ORDERS if f"in {order} order" in said]
         found = agreement(content, columns[order], booleans, TOLERANCE)
         if found is None:
             return "certified, and does not agree"
@@ -356,9 +356,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
         _forget()
         _process_folder.cache_clear()
         try:
-            runs = {
-                order: simulate("fig4", stop_time=RECORDED, order=order) for order in BUNDLE_ORDERS
-            }
+            runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
             with patch.object(verify, "simulate_to_end", partial(_replay, runs)):
                 found = kinds(runs)
                 for name, kind in found.items():

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.master.experiment import ORDERS, Experiment, Order
+from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.loop import choose_loop
@@ -16,7 +16,6 @@ from orchestrator.master.observers.files import CsvFile
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import make_plan
 from orchestrator.master.simulation import simulate_plan
-from orchestrator.runs.bundle import BUNDLE_ORDER
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
@@ -52,10 +51,6 @@ def run_table(
     stepping = choose_loop(loop, experiment, isolation)
     simulate_plan(make_plan(system, experiment), [table], isolation, stepping, hooks)
     return table
-
-
-#: Orders in which the FMUs of the bundle can be run.
-BUNDLE_ORDERS = ORDERS[ORDERS.index(BUNDLE_ORDER) :]
 
 
 def whole(system: System, experiment: Experiment, *args: Any, **how: Any) -> Table:

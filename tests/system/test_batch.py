@@ -18,7 +18,7 @@ from auv_fmu.closed_loop import Instant, Setting
 from auv_fmu.closed_loop import closed_loop as straight_line
 from auv_fmu.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, ORDERS, Experiment, Order
+from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies import batch_engine
 from orchestrator.studies.batch_engine import BatchEngine
@@ -29,12 +29,15 @@ from orchestrator.studies.study_file import read_study
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import INDICES
-from support.runs import BUNDLE_ORDERS, prepared, whole
+from support.runs import prepared, whole
 from support.texts import tells
 
 pytest.importorskip("numba", reason="needs the extra `studies`")
 
 KIND = "native"
+
+#: Those of the engine.
+ORDERS = (FEEDTHROUGH, JACOBI)
 
 #: The ready studies that the engine makes.
 STUDIES = [name for name in ready_studies() if read_study(name).engine == "batch"]
@@ -60,9 +63,7 @@ def sampled(name: str) -> list[Point]:
     space = Space(study, {scenario: load_scenario(scenario, KIND) for scenario in study.scenario})
     numbers = Random(name).sample(range(len(space)), SAMPLES)
     return [
-        space[number]._replace(
-            stop_time=STEPS * space[number].step, order=BUNDLE_ORDERS[i % len(BUNDLE_ORDERS)]
-        )
+        space[number]._replace(stop_time=STEPS * space[number].step, order=ORDERS[i % len(ORDERS)])
         for i, number in enumerate(numbers)
     ]
 
@@ -170,14 +171,14 @@ def compare_with_fmus(name: str, values: dict[str, Any], order: str, until: floa
         assert one == other
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("name", OTHERS)
 def test_runs_with_other_blocks_are_those_of_the_fmus(name, order):
     noise = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
     compare_with_fmus(name, noise, order, 30.01)
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 def test_remus_in_a_sea_is_that_of_the_fmus(tmp_path, order):
     path = tmp_path / "both.toml"
     path.write_text(REMUS_IN_A_SEA)
@@ -197,7 +198,7 @@ OTHER_ADDITIONS: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(("name", "values"), OTHER_ADDITIONS)
 def test_additions_with_other_blocks_are_those_of_the_fmus(name, values, order):
     compare_with_fmus(name, values, order, 2.01)
@@ -218,7 +219,7 @@ OTHERS_REFUSED: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(("name", "values"), OTHERS_REFUSED)
 def test_what_fmus_of_other_blocks_refuse_is_refused_at_the_same_step(name, values, order):
     compare_refusals(Point(5, name, values, 3.0, 0.02, order))
@@ -280,7 +281,7 @@ def where(failure: str | None) -> str:
     return found.group() if found else str(failure)
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("values", REFUSED, ids=", ".join)
 def test_what_fmus_refuse_is_refused_at_the_same_step(values, order):
     compare_refusals(Point(5, "fig4", values, 3.0, 0.02, order))
@@ -294,7 +295,7 @@ def compare_refusals(run: Point) -> None:
         assert where(batch.failure) == where(fmus.failure)
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
 def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
     """With noise, and a shorter step at the end."""

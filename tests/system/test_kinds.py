@@ -15,11 +15,10 @@ from hypothesis import strategies as st
 import auv_fmu
 import fmus
 from fmus.ports.port import Port
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.runs.scenario import names, read_scenario
 from support.instances import component
 from support.kinds import Outcome, difference, outcome
-from support.runs import BUNDLE_ORDERS
 from support.tiers import slow
 
 STEP = 0.02
@@ -57,7 +56,7 @@ def both(
     return ours
 
 
-@pytest.mark.parametrize("order", [BUNDLE_ORDERS[0], *slow(*BUNDLE_ORDERS[1:])])
+@pytest.mark.parametrize("order", [ORDERS[0], *slow(*ORDERS[1:])])
 @pytest.mark.parametrize("scenario", [name for name in names() if not read_scenario(name).events])
 def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str, order: str):
     stop_time = read_scenario(scenario).stop_time
@@ -65,7 +64,7 @@ def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str
     both(dist, native, scenario, Experiment(stop_time, STEP, order))
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(
     ("scenario", "values"),
     [

@@ -33,7 +33,7 @@ from orchestrator.system.structure import System
 from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
-from support.runs import BUNDLE_ORDERS, run_table
+from support.runs import run_table
 from support.texts import mentions
 
 #: Step [s].
@@ -309,7 +309,7 @@ class Pushes:
 
 
 @pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
     pushes = Pushes(10, 620, 650)
     table = run_table(load("fig4", NATIVE), Experiment(14.0, 0.02, order), loop, hooks=[pushes])

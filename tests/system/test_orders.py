@@ -13,7 +13,7 @@ import pytest
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment, decimations
+from orchestrator.master.experiment import ORDERS, Experiment, decimations
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.observers.table import Table
 from orchestrator.master.plan import delays, make_plan, stages
@@ -26,7 +26,6 @@ from orchestrator.runs.simulate import simulate as simulated
 from orchestrator.system.graph import delayed_connections
 from orchestrator.system.structure import System
 from support.relay import relay, system_of
-from support.runs import BUNDLE_ORDERS
 from support.runs import whole as run
 from support.texts import mentions
 
@@ -97,7 +96,7 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     assert (table.rows.tobytes() == derived.rows.tobytes()) == same
 
 
-@pytest.mark.parametrize("order", BUNDLE_ORDERS)
+@pytest.mark.parametrize("order", ORDERS)
 def test_equal_steps_of_all_components_are_one_step(order):
     system, experiment = load("fig4", NATIVE), Experiment(4.0, 0.02, order)
     whole = run(system, experiment)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from auv_fmu import allocation, path_planner, plant, remus100
-from auv_fmu.blocks import sea_waves
+from auv_fmu.blocks import sea_motion, sea_waves
 from auv_fmu.closed_loop import PAPER, Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
 from auv_fmu.ocean_current import Current
@@ -46,15 +46,21 @@ def test_sea_without_waves_and_variation_is_steady_water():
     np.testing.assert_allclose(in_sea, steady, rtol=0.0, atol=1e-12)
 
 
-def test_sea_acts_one_step_late_in_jacobi_order():
-    """What it shows is that of the instant; what acts is that of the one before."""
-    setting = QUIET._replace(water=sea_waves(Sea()))
+def test_sea_is_told_of_the_vehicle_one_step_late_in_jacobi_order():
+    """What acts is the sea of the instant, at the place of the instant before."""
+    waves = sea_waves(Sea())
+    setting = QUIET._replace(water=waves)
     for delayed in (False, True):
         run = list(closed_loop(20, setting, delayed))
-        shown = [instant.scene.water for instant in run]
-        assert len(set(shown)) == len(run)
-        expected = [shown[0], *shown[:-1]] if delayed else shown
-        assert [instant.acts.water for instant in run] == expected
+        places = [instant.vehicles.plant.position for instant in run]
+        if delayed:
+            places = [places[0], *places[:-1]]
+        expected = [
+            sea_motion(waves, instant.vehicles.water, place, instant.t)
+            for instant, place in zip(run, places, strict=True)
+        ]
+        assert len(set(expected)) == len(run)
+        assert [instant.water for instant in run] == expected
 
 
 def test_reference_on_a_path_is_that_of_its_time():
