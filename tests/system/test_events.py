@@ -96,9 +96,10 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
             control = law.start(gains, measured)
         control = law.gated(gains, control, measured)
         signals = law.evaluate(gains, control, measured, H)
-        now = signals.tau, seen.plant.nu_r
-        told, nu_r = before if before and delayed else now
-        tau_w = disturbance(setting.disturbance, nu_r, k * H)
+        # In Jacobi order what an event changes at an instant shows in outputs of the next.
+        now = signals.tau, seen.plant.nu_r, setting.disturbance
+        told, nu_r, waves = before if before and delayed else now
+        tau_w = disturbance(waves, nu_r, k * H)
         before = now
         if k == 95:
             # What has begun anew shows what it computes then, as at the start.
