@@ -106,7 +106,7 @@ class _Trial:
                 put = getattr(self._slave, f"set_{port.type.lower()}")
                 put([self._references[port.name]], [_meant(port, one)])
         if causality == "input":
-            # Those that stay as they are belong to another time.
+            # Those that stay as they are belong to a new time.
             self._slave._forget("inputs")
 
     def get(self, port: Port) -> Any:

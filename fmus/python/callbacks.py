@@ -9,7 +9,7 @@ every step after a refusal is discarded, until a reset or a state that is restor
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Any, ClassVar
 
@@ -58,6 +58,7 @@ class Store:
         fault: whether a value or a step was discarded.
         fresh: whether the outputs are up to date: nothing has changed that they depend on.
         held: whether they are those of the beginning of the last step; the next evaluates its own.
+        groups: the inputs as the equations take them.
         state: of the component; None before the initialisation.
         derived: what was derived of it; None: it is to be derived when it is needed.
         start_time, time: where the run has begun, and where it is [s].
@@ -98,6 +99,7 @@ class Store:
         self.fault = False
         self.fresh = True
         self.held = False
+        self.groups: Any = None
         self.state: Any = None
         self.derived: Any = None
         self.start_time = self.time = 0.0
@@ -161,15 +163,19 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
     #: Ports without `fault`, inputs first, then outputs, then parameters.
     ports: ClassVar[tuple[Port, ...]]
 
+    #: What makes groups of the values of all inputs.
+    unpack: Callable[[Sequence[Value]], Any]
+
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self._store = Store(self.ports)
+        self._store.groups = self.unpack(self._store.inputs)
         self._mode = INSTANTIATED
         #: Whether a value has changed that the state at the start time depends on.
         self._stale = False
         self._said: set[str] = set()
-        #: Whether anything is computed of the inputs before the next step.
-        self._heeds_inputs = True
+        #: Whether inputs change the outputs, and what is derived, before the next step.
+        self._outputs_follow = self._derived_follows = True
         self._has_loader = has_loader(self.resources)
         #: What no answer has told, where there is no loader.
         self._untold = ""
@@ -237,12 +243,14 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def get_real(self, vrs: list[int]) -> list[Any]:
         store = self._store
+        if vrs != store.real_outputs:
+            if not store.fresh:
+                self._refresh_outputs(vrs)
+            return self._get(vrs, "Real")
         if not store.fresh:
-            self._refresh_outputs(vrs)
+            self._refresh_to_get()
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
-        if vrs == store.only_outputs:
-            return store.outputs
-        return store.outputs[: len(vrs)] if vrs == store.real_outputs else self._get(vrs, "Real")
+        return store.outputs if store.only_outputs else store.outputs[: len(vrs)]
 
     def get_integer(self, vrs: list[int]) -> list[int]:
         if not self._store.fresh:
@@ -262,12 +270,13 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         store = self._store
         # A sum is finite only if every value is; _set finds out which one was not.
         if vrs == store.only_inputs and self._mode == STEPPING and isfinite(sum(values)):
-            store.inputs = values
-            if self._heeds_inputs:
-                self._forget("inputs")
+            store.inputs, store.groups = values, self.unpack(values)
+            if self._outputs_follow:
+                store.fresh = False
+            if self._derived_follows:
+                store.derived = None
         elif vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
-            store.inputs = [*values, *store.inputs[len(values) :]]
-            self._forget("inputs")
+            self._take_inputs([*values, *store.inputs[len(values) :]])
         else:
             self._set(vrs, values, "Real")
 
@@ -282,9 +291,12 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def _refresh_outputs(self, vrs: list[int]) -> None:
         if not self._store.all_outputs.isdisjoint(vrs):
-            why = self._refresh()
-            if why:
-                self._answer(Fmi2Status.error, why)
+            self._refresh_to_get()
+
+    def _refresh_to_get(self) -> None:
+        why = self._refresh()
+        if why:
+            self._answer(Fmi2Status.error, why)
 
     def _get(self, vrs: list[int], fmi_type: str) -> list[Any]:
         values: list[Value] = []
@@ -335,5 +347,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             store.parameters = parameters
             self._forget("parameters")
         if any(port.causality == "input" for port in ports):
-            store.inputs = inputs
-            self._forget("inputs")
+            self._take_inputs(inputs)
+
+    def _take_inputs(self, values: list[Value]) -> None:
+        self._store.inputs, self._store.groups = values, self.unpack(values)
+        self._forget("inputs")

@@ -10,9 +10,10 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 
 from __future__ import annotations
 
+import sys
 from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from math import inf, isfinite
+from math import isfinite
 from random import Random
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
@@ -41,7 +42,7 @@ from fmus.python.noise import Noise
 from fmus.python.state import Snapshot, checked, from_bytes, to_bytes
 
 #: Longest step of a component that has no internal steps [s].
-_NO_LIMIT = inf
+_NO_LIMIT = sys.float_info.max
 
 
 class Component(Callbacks):
@@ -54,8 +55,7 @@ class Component(Callbacks):
     #: Of which of `inputs`, `parameters`, `t` and `state` outputs are made, and what is derived.
     outputs_of: ClassVar[frozenset[str]]
     derived_of: ClassVar[frozenset[str]]
-    #: What makes groups of the values of all inputs, and gives the norm of a state.
-    unpack: Callable[[Sequence[Value]], Any]
+    #: Gives the norm of a state.
     norm: Callable[[Any], float]
     #: The parameters as they are now.
     parameters: Any
@@ -92,11 +92,12 @@ class Component(Callbacks):
         super().__init__(**kwargs)
         said = self.definition.behaviour
         self._longest_step = 0.0
-        self._heeds_inputs = "inputs" in self.outputs_of | self.derived_of
+        self._outputs_follow = "inputs" in self.outputs_of
+        self._derived_follows = "inputs" in self.derived_of
         self._is_timed = "t" in self.outputs_of | self.derived_of
         self._is_sampled = said.is_sampled
         #: Whether a step evaluates the outputs at its end: no input changes them.
-        self._is_prompt = not said.is_sampled and "inputs" not in self.outputs_of
+        self._is_prompt = not (said.is_sampled or self._outputs_follow)
 
     # Experiment
 
@@ -133,7 +134,7 @@ class Component(Callbacks):
         # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
         noise = Noise(Random(self.seed(self.parameters) % 2**32), count) if count else None
         draws = noise.draw() if noise else ()
-        inputs, t = self.unpack(store.inputs), store.start_time
+        inputs, t = store.groups, store.start_time
         state = self.start(self.parameters, inputs, t)
         self.check_size(state)
         store.derived, store.outputs = self.evaluate(state, None, inputs, t, draws)
@@ -148,7 +149,8 @@ class Component(Callbacks):
         """What the values of all parameters come to, and the longest step with them [s]."""
         parameters = self.definition.parameters.of(values)
         self.check(parameters)
-        return parameters, longest_step(float(values.get(H_MAX, _NO_LIMIT)))
+        h_max = float(values.get(H_MAX, _NO_LIMIT))
+        return parameters, min(longest_step(h_max), _NO_LIMIT)
 
     def _retune(self, parameters: dict[str, Value]) -> None:
         self._adopt(parameters, self._meaning(parameters))
@@ -168,7 +170,7 @@ class Component(Callbacks):
                 self._begin()
             else:
                 store.derived, store.outputs = self.evaluate(
-                    store.state, store.derived, self.unpack(store.inputs), store.time, store.draws
+                    store.state, store.derived, store.groups, store.time, store.draws
                 )
         except BaseException as error:
             why = self.describe(error)
@@ -217,7 +219,7 @@ class Component(Callbacks):
                 if t != store.time:
                     fresh = fresh and "t" not in self.outputs_of
                     derived = None if "t" in self.derived_of else derived
-            inputs = self.unpack(store.inputs)
+            inputs = store.groups
             if self._is_sampled and (store.held or not fresh):
                 derived, outputs = self.evaluate(state, derived, inputs, t, draws)
             state, derived = self.advance(state, derived, inputs, t, h / n, n)
@@ -300,7 +302,8 @@ class Component(Callbacks):
                 noise = Noise.restored(wanted["generator"], said.draws)
             # Nothing of this instance has changed so far, and nothing can fail after this.
             self._adopt(wanted["parameters"], meaning)
-        store.inputs, store.outputs = wanted["inputs"], wanted["outputs"] or store.no_outputs()
+        store.inputs, store.groups = wanted["inputs"], self.unpack(wanted["inputs"])
+        store.outputs = wanted["outputs"] or store.no_outputs()
         store.state, store.derived = state, None
         store.start_time, store.time = wanted["start_time"], wanted["time"]
         store.noise, store.draws, store.fault = noise, wanted["draws"], wanted["fault"]

@@ -6,7 +6,7 @@ module takes each state x to x + h dx/dt.
 
 from __future__ import annotations
 
-from math import ceil, isfinite
+from math import ceil
 
 from auv_fmu.vectors import Vector4
 
@@ -54,9 +54,11 @@ def end_of_step(start: float, t: float, h: float) -> float:
         h: length of the step, more than 0 [s].
 
     """
-    k = (t - start) / h
-    n = float(round(k)) if isfinite(k) else k
-    return start + (n + 1.0) * h if t == start + n * h else t + h
+    try:
+        k = round((t - start) / h)
+    except OverflowError:
+        return t + h
+    return start + (k + 1) * h if t == start + k * h else t + h
 
 
 def advance_4(x: Vector4, dx: Vector4, h: float) -> Vector4:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import pi, radians
 from typing import Annotated, NamedTuple
 
-import auv_fmu
+from auv_fmu import __citation__ as of_the_paper
 from auv_fmu.actuators import limit
 from auv_fmu.quantities import Members
 from auv_fmu.variable import POSITIVE, Variable
@@ -19,7 +19,7 @@ from auv_fmu.vectors import Vector3, Vector6
 #: The source of the model, and the paper whose numbers of equations stand beside it.
 __citation__ = (
     "The model is that of the class remus100 in PythonVehicleSimulator 1.0.1, by T. I. Fossen. "
-    f"{auv_fmu.__citation__}"
+    f"{of_the_paper}"
 )
 
 #: Beyond this speed [m/s] through the water there is no model: it is four times the largest of the

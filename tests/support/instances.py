@@ -19,17 +19,17 @@ from fmus.python.component import Component
 from fmus.python.slave import slave_of
 
 
-def component(name: str) -> type[Component[Any, Any, Any, Any]]:
+def component(name: str) -> type[Component]:
     """The class of a component."""
     return slave_of(name, import_module(source_of(name).module))
 
 
-def messages_of(slave: Component[Any, Any, Any, Any]) -> list[str]:
+def messages_of(slave: Component) -> list[str]:
     """What a slave has logged for the host."""
     return [entry.msg for entry in slave.log_queue if entry.category != ANSWER]
 
 
-def answers_of(slave: Component[Any, Any, Any, Any]) -> list[Fmi2Status]:
+def answers_of(slave: Component) -> list[Fmi2Status]:
     """The statuses that a slave has told the native loader."""
     return [entry.status for entry in slave.log_queue if entry.category == ANSWER]
 

@@ -75,8 +75,7 @@ def straight_rows(setting: Setting, steps: int, delayed: bool) -> np.ndarray:
     """Time and values after every step: what a row of the FMUs' table holds."""
     instants = list(straight_line(steps, setting, delayed))
     acting = [instant.vehicles.plant.tau for instant in instants]
-    flow = plant.flow(setting.plant, instants[0].acts.water.velocity)
-    acting[0] = plant.begin(setting.plant, instants[0].tau, flow)[0].tau
+    acting[0] = plant.actuation(setting.plant, instants[0].vehicles.plant, instants[0].tau)
     pairs = zip([instants[0], *instants[:-1]], instants, acting, strict=True)
     return np.array([_row(*pair) for pair in pairs])
 

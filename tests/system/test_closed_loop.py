@@ -11,10 +11,10 @@ from auv_fmu import motion_planner, plant
 from auv_fmu.blocks import measurement
 from auv_fmu.closed_loop import Instant, Setting, closed_loop
 from auv_fmu.disturbance import Disturbance
-from auv_fmu.observer import EXACT, INTEGRAL
+from auv_fmu.observer import Form
 from auv_fmu.output_feedback import Gains
 from auv_fmu.plant import RollAxis
-from auv_fmu.saturation import ARCTAN
+from auv_fmu.saturation import Saturation
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
@@ -100,9 +100,9 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
     [
         (
             {"controller.saturation": "arctan", "controller.observer": "exact"},
-            Setting(controller=Gains(s=ARCTAN, form=EXACT)),
+            Setting(controller=Gains(s=Saturation.ARCTAN, form=Form.EXACT)),
         ),
-        ({"controller.observer": "integral"}, Setting(controller=Gains(form=INTEGRAL))),
+        ({"controller.observer": "integral"}, Setting(controller=Gains(form=Form.INTEGRAL))),
         (
             {
                 "plant.roll": False,

@@ -10,8 +10,8 @@ import pytest
 import auv_fmu
 from auv_fmu import control_point, euler, formation, plant
 from auv_fmu.observer import EULER
-from auv_fmu.saturation import TANH
-from auv_fmu.waves import JONSWAP
+from auv_fmu.saturation import Saturation
+from auv_fmu.waves import Spectrum
 
 TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {
@@ -40,7 +40,7 @@ SECTION_4_1 = {
     "RollAxis": {"m44": 22.5, "d44": 20.0},
     "Limits": {"tau_min": (-80.0,) * 3, "tau_max": (80.0,) * 3},
     "Disturbance": {"A_f": 0.5, "A_d": 1.0, "omega_d": 0.1},
-    "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": TANH},
+    "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": Saturation.TANH},
     "PdGains": CONTROLLER,
     "plant.Parameters": {
         "ell": 0.35,
@@ -77,7 +77,7 @@ OURS = {
     },
     "path_planner.Parameters": {"speed_max": 2.5, "turn_max": 4.0},
     "Waves": {
-        "spectrum": JONSWAP,
+        "spectrum": Spectrum.JONSWAP,
         "Hs": 1.0,
         "Tp": 7.0,
         "gamma": 3.3,

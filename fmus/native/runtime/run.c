@@ -5,6 +5,7 @@
  * no input changes them, so that it is the step that is refused. A sampled component computes those
  * of the beginning of a step, and keeps them.
  */
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -35,7 +36,7 @@ static int adopt(instance *it, const parameter_values *values, message *why) {
     model_check(&values->model, &error);
     if (error.raised) return compose(why, "%s", error.why.text);
     it->meant = *values;
-    it->longest_step = values->h_max * (1.0 + ROUNDING);
+    it->longest_step = fmin(values->h_max * (1.0 + ROUNDING), DBL_MAX);
     it->underived = 1;
     return 1;
 }

@@ -74,15 +74,13 @@ REASONS = {
     "state refused: 'bogus' is not a mode": from_json(mode="bogus"),
     "state refused: it has a state before the initialisation": from_json(mode="instantiated"),
     "state refused: its fault is neither true nor false": from_json(fault=0),
+    "state refused: its outputs are neither fresh nor not": from_json(fresh=0),
     "state refused: it has missing or unknown parameters": from_json(parameters={}),
     "state refused: its values do not match the ports": from_json(inputs=[1.0]),
     "state refused: its values do not match the ports ": from_json(outputs=7),
-    "state refused: it has steps, or outputs, without a state": from_json(state=None),
-    "state refused: it has steps, or outputs, without a state ": (
-        from_json(state=None, mode="terminated", outputs=[1.0] * 6)
-    ),
+    "state refused: it has steps without a state": from_json(state=None),
     "state refused: [0.0] instead of 0 values": from_json(state=[0.0]),
-    "state refused: this component keeps nothing outside its state": from_json(hidden=[1]),
+    "state refused: [1.0] instead of 0 values": from_json(draws=[1.0]),
     "state refused: '0' is not of type float": from_json(start_time="0"),
 }
 

@@ -12,7 +12,7 @@ from fmus.ports.port import H_MAX
 from support.instances import ClassInstance, answers_of, component, messages_of
 from support.settings import NAMES, WITH_INPUTS
 
-WITH_STEP_LIMIT = [name for name in NAMES if H_MAX in ports_of(name)]
+WITH_STEP_LIMIT = [name for name in NAMES if H_MAX in {port.name for port in ports_of(name)}]
 
 
 @pytest.fixture(params=NAMES)
@@ -491,8 +491,8 @@ def test_zero_step_changes_nothing(driver):
     driver.excite(2)
     assert driver.step(0.0)
     after = driver.slave._get_fmu_state()
-    before.pop("inputs"), after.pop("inputs")
-    assert after == before
+    follow = {"inputs", "fresh", "held"}
+    assert {key for key in before if after[key] != before[key]} <= follow
 
 
 @pytest.mark.parametrize("name", WITH_STEP_LIMIT)
@@ -505,7 +505,7 @@ def test_long_step_is_as_many_short_ones_with_held_inputs(name):
     assert long.step(0.1)
     for _ in range(5):
         assert short.step(0.1 / 5)
-    assert long.slave._state == short.slave._state
+    assert long.slave._store.state == short.slave._store.state
 
 
 @pytest.mark.parametrize("name", WITH_STEP_LIMIT)

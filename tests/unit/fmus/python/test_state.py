@@ -6,16 +6,16 @@ import json
 from collections.abc import Callable
 from enum import IntEnum
 from math import inf, isfinite, nan, sqrt
-from typing import Annotated, Any, NamedTuple, Union
+from typing import Annotated, Any, NamedTuple
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from fmus.ports.port import Refusal
-from fmus.python.state import Snapshot, measuring, nearly_equal, restored
+from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.variable import Refusal
+from fmus.python.state import Snapshot, measuring, restored
 from support.instances import ClassInstance
 from support.settings import NAMES, WITH_INPUTS
 
@@ -47,9 +47,10 @@ def with_generator(place: int, value: Any) -> Callable[[Snapshot], Any]:
     """The noise generator's version, numbers and kept second number of the pair."""
 
     def change(saved: Snapshot) -> Any:
-        hidden = [saved["hidden"][0], [*saved["hidden"][1]], saved["hidden"][2]]
-        hidden[place] = value(hidden[place]) if callable(value) else value
-        return hidden
+        first, numbers, following = saved["generator"]
+        parts = [first, [*numbers], following]
+        parts[place] = value(parts[place]) if callable(value) else value
+        return parts
 
     return change
 
@@ -75,13 +76,7 @@ SPOILED = {
     "input of another type": ("inputs", with_input(None)),
     "inputs missing": ("inputs", lambda saved: [1.0]),
     "inputs no list": ("inputs", lambda saved: 7),
-    "outputs missing": ("outputs", lambda saved: []),
-    "output not finite": ("outputs", lambda saved: [inf, *saved["outputs"][1:]]),
-    "posture of another state": ("outputs", lambda saved: [1.0, *saved["outputs"][1:]]),
-    "measured elsewhere": ("outputs", lambda saved: [
-        *saved["outputs"][:14], saved["outputs"][14] + 0.01, *saved["outputs"][15:],
-    ]),
-    "moment beyond its limit": ("outputs", lambda saved: [*saved["outputs"][:-1], 1e6]),
+    "outputs that follow from the state": ("outputs", lambda saved: [0.0]),
     "mode bogus": ("mode", lambda saved: "bogus"),
     "mode of another type": ("mode", lambda saved: ["stepping"]),
     "state before the initialisation": ("mode", lambda saved: "instantiated"),
@@ -98,18 +93,25 @@ SPOILED = {
     "long quaternion": ("state", lambda saved: [
         saved["state"][0], [1.0, 0.0, 1.0, 0.0], *saved["state"][2:],
     ]),
-    "force beyond its limit": ("state", lambda saved: [*saved["state"][:-1], [1e6, 0.0, 0.0]]),
-    "force of another state": ("state", lambda saved: [*saved["state"][:-1], [1.0, 0.0, 0.0]]),
-    "generator of another version": ("hidden", with_generator(0, 2)),
-    "generator of no version": ("hidden", with_generator(0, "three")),
-    "generator too short": ("hidden", with_generator(1, lambda numbers: numbers[:-2])),
-    "generator with a negative number": ("hidden", with_generator(1, lambda n: [-1, *n[1:]])),
-    "generator with a large number": ("hidden", with_generator(1, lambda n: [2**32, *n[1:]])),
-    "generator with a fraction": ("hidden", with_generator(1, lambda n: [0.5, *n[1:]])),
-    "generator with text to come": ("hidden", with_generator(2, "0.5")),
-    "generator with no number to come": ("hidden", with_generator(2, nan)),
-    "no generator": ("hidden", lambda saved: None),
-    "generator of no parts": ("hidden", lambda saved: [1]),
+    "force beyond its limit": ("state", lambda saved: [
+        *saved["state"][:-2], [1e6, 0.0, 0.0], saved["state"][-1],
+    ]),
+    "generator of another version": ("generator", with_generator(0, 2)),
+    "generator of no version": ("generator", with_generator(0, "three")),
+    "generator too short": ("generator", with_generator(1, lambda numbers: numbers[:-2])),
+    "generator with a negative number": ("generator", with_generator(1, lambda n: [-1, *n[1:]])),
+    "generator with a large number": ("generator", with_generator(1, lambda n: [2**32, *n[1:]])),
+    "generator with a fraction": ("generator", with_generator(1, lambda n: [0.5, *n[1:]])),
+    "generator with text to come": ("generator", with_generator(2, "0.5")),
+    "generator with no number to come": ("generator", with_generator(2, nan)),
+    "no generator": ("generator", lambda saved: None),
+    "generator of no parts": ("generator", lambda saved: [1]),
+    "noise missing": ("draws", lambda saved: []),
+    "noise that cannot be drawn": ("draws", lambda saved: [9.5, *saved["draws"][1:]]),
+    "noise not finite": ("draws", lambda saved: [nan, *saved["draws"][1:]]),
+    "generator with a number to come that cannot be": ("generator", with_generator(2, -9.5)),
+    "time not a number": ("time", lambda saved: nan),
+    "outputs that are perhaps fresh": ("fresh", lambda saved: 1),
     "start time not finite": ("start_time", lambda saved: inf),
     "start time of another type": ("start_time", lambda saved: "0"),
     "fault of another type": ("fault", lambda saved: 0),
@@ -186,7 +188,7 @@ def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
 
 def test_state_that_is_not_fit_for_bytes_says_so():
     driver = ClassInstance("AuvPlant")
-    content = driver.slave._fmu_state_to_bytes({"hidden": object()})
+    content = driver.slave._fmu_state_to_bytes({"generator": object()})
     driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(content))
     assert "JSON" in driver.messages()[0]
 
@@ -220,13 +222,6 @@ def test_fault_is_that_of_the_state_that_is_restored(driver):
         assert driver.get("fault") is fault
 
 
-def test_outputs_before_the_initialisation_are_refused(driver):
-    fresh = dict(driver.component(instance_name="fresh")._get_fmu_state())
-    ones = [type(value)(1) for value in fresh["outputs"]]
-    driver.slave._set_fmu_state({**fresh, "outputs": ones})
-    assert driver.messages() == ["state refused: it has steps, or outputs, without a state"]
-
-
 def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver):
     """Whatever else is said of it: it is computed again."""
     slave = driver.component(instance_name="initialising")
@@ -238,14 +233,6 @@ def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver
     driver.slave._set_fmu_state({**driver.slave._get_fmu_state(), "mode": "initialising",
                                  "inputs": true["inputs"]})  # fmt: skip
     assert driver.slave._get_fmu_state() == true
-
-
-def test_reference_of_another_state_is_refused():
-    driver = ClassInstance("MotionPlanner")
-    driver.step()
-    saved = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state({**saved, "outputs": [1.0, *saved["outputs"][1:]]})
-    assert "do not match its state" in driver.messages()[0]
 
 
 def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
@@ -348,13 +335,6 @@ def test_saved_state_does_not_change_with_the_run(driver):
     assert json.dumps(saved) == text
 
 
-@pytest.mark.parametrize("size", [0.0, 1.0, -1e9])
-def test_outputs_of_another_machine_may_differ_in_their_last_digits_alone(size):
-    unit = max(abs(size), 1.0)
-    assert nearly_equal([0.5, size], [0.5, size + 1e-10 * unit])
-    assert not nearly_equal([size, 0.5], [size + 1e-6 * unit, 0.5])
-
-
 class Pair(NamedTuple):
     x: float
     y: tuple[float, float]
@@ -363,21 +343,16 @@ class Pair(NamedTuple):
 class Whole(NamedTuple):
     n: int
     pair: Pair
-    maybe: float | None
-    either: Union[Pair, str]  # noqa: UP007  as components for Python 3.9 write it
-    many: tuple[float, ...]
+    many: tuple[float, float]
     on: bool
-    text: str
     alone: float
 
 
-WHOLE = Whole(9, Pair(1.0, (-2.0, 4.0)), 8.0, "b", (16.0, 32.0), True, "a", -64.0)
+WHOLE = Whole(9, Pair(1.0, (-2.0, 4.0)), (8.0, 16.0), True, -32.0)
 
 
 def test_size_is_the_euclidean_norm_of_all_floats():
-    assert measuring(Whole)(WHOLE) == pytest.approx(sqrt(sum(4.0**k for k in range(7))))
-    other = WHOLE._replace(maybe=None, either=Pair(0.0, (0.0, 8.0)))
-    assert measuring(Whole)(other) == pytest.approx(sqrt(sum(4.0**k for k in range(7))))
+    assert measuring(Whole)(WHOLE) == pytest.approx(sqrt(sum(4.0**k for k in range(6))))
 
 
 def test_whole_numbers_in_the_place_of_floats_have_a_size():
@@ -390,8 +365,6 @@ def test_whole_numbers_in_the_place_of_floats_have_a_size():
     [
         lambda bad: {"pair": Pair(bad, (0.0, 0.0))},
         lambda bad: {"pair": Pair(0.0, (0.0, bad))},
-        lambda bad: {"maybe": bad},
-        lambda bad: {"either": Pair(0.0, (bad, 0.0))},
         lambda bad: {"many": (0.0, bad)},
         lambda bad: {"alone": bad},
     ],
@@ -401,13 +374,10 @@ def test_what_is_not_finite_makes_the_size_not_finite(spoil, bad):
     assert not isfinite(measuring(Whole)(spoiled))
 
 
-@pytest.mark.parametrize("whole", [WHOLE, WHOLE._replace(maybe=None, either=Pair(0.5, (1.0, 2.0)))])
-def test_json_gives_a_state_back(whole):
-    again = restored(Whole, json.loads(json.dumps(whole)))
-    assert again == whole
-    assert type(again) is Whole
-    assert type(again.pair) is Pair
-    assert type(again.either) is type(whole.either)
+def test_json_gives_a_state_back():
+    again = restored(Whole, json.loads(json.dumps(WHOLE)))
+    assert again == WHOLE
+    assert (type(again), type(again.pair)) == (Whole, Pair)
 
 
 @pytest.mark.parametrize(
@@ -422,8 +392,6 @@ def test_json_gives_a_state_back(whole):
         (float, "x" * 99, f"'{'x' * 39} is not of type float"),
         (int, 1.0, "1.0 is not of type int"),
         (bool, 1, "1 is not of type bool"),
-        (str, None, "None is not of type str"),
-        (int | None, 1.5, "1.5 is not of type int, 1.5 is not of type NoneType"),
     ],
 )
 def test_what_is_of_another_shape_is_refused(kind, value, why):
@@ -435,11 +403,6 @@ def test_what_is_of_another_shape_is_refused(kind, value, why):
 def test_whole_numbers_may_stand_for_floats():
     """JSON of another writer may lack the point."""
     assert restored(Pair, [1, [2, 3]]) == (1, (2, 3))
-
-
-@pytest.mark.parametrize("kind", [frozenset, tuple])
-def test_what_is_of_no_known_type_is_left_as_it_is(kind):
-    assert restored(kind, [1, [2, [3]]]) == (1, (2, (3,)))
 
 
 class Colour(IntEnum):

@@ -8,7 +8,7 @@ from auv_fmu import allocation, remus100
 from auv_fmu.closed_loop import PAPER
 from auv_fmu.sea import Sea, regular_waves
 from auv_fmu.tail import Tail
-from auv_fmu.waves import NONE, Waves
+from auv_fmu.waves import Spectrum, Waves
 from orchestrator.machine.errors import InputError
 from orchestrator.studies.batch.support import setting_of
 from orchestrator.system.names import port_name
@@ -65,7 +65,7 @@ def test_values_of_other_blocks_come_to_their_places():
     assert setting.allocation == allocation.Parameters(tail=Tail(delta_max=0.3))
     assert setting.planner.waypoints.y[:3] == (6.0, 7.0, 10.0)
     assert setting.planner.waypoints.timed
-    sea = Sea(Waves(spectrum=NONE), depth=20.0)
+    sea = Sea(Waves(spectrum=Spectrum.NONE), depth=20.0)
     assert setting.water.sea == sea
     assert setting.water.waves == regular_waves(sea)
 
