@@ -18,6 +18,7 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
+from auv_fmu.quantities import group_name
 from fmus.discovery import components, package_folder, ports_of, source_of
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description import fmi2_description
@@ -27,7 +28,6 @@ from fmus.ports.description_fmi3 import (
     terminals_and_icons,
 )
 from fmus.ports.port import TIME
-from auv_fmu.quantities import group_name
 from support.raw import Library, Status, instance
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
