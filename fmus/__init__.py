@@ -3,7 +3,7 @@
 ====================== ======================================================================
 module                 what it states
 ====================== ======================================================================
-:mod:`.ports`          what a port is, the groups that ports come in, a behaviour's hooks
+:mod:`.ports`          what a port is, the groups that ports come in, a component's hooks
 :mod:`.kinds`          kinds of FMU, versions of FMI, platforms that there can be libraries for
 :mod:`.discovery`      which components there are, what FMUs are made from, their archives
 :mod:`.documentation`  the page of each component
@@ -16,5 +16,5 @@ module                 what it states
 :mod:`.trial`          its run as plain Python
 ====================== ======================================================================
 
-Every other folder is a component: its ports, its behaviour and its page.
+Every other folder is a component: its module and its page.
 """

@@ -20,7 +20,6 @@ import json
 import re
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib import import_module
 from math import cbrt, radians, sqrt, tan
 from pathlib import Path
 from typing import Any
@@ -123,10 +122,7 @@ def scenarios() -> dict[str, str]:
 
 def bundle() -> str:
     """The table of docs/reference/components/README.md."""
-    rows = (
-        (f"[`{name}`]({name}.md)", import_module(f"{package}.ports").DESCRIPTION)
-        for name, package in components().items()
-    )
+    rows = ((f"[`{name}`]({name}.md)", source_of(name).definition.summary) for name in components())
     return _table("FMU", "what it is", rows=rows)
 
 

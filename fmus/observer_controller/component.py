@@ -15,7 +15,7 @@ from auv_fmu import (
 )
 from auv_fmu.adaptation import Estimate
 from auv_fmu.euler import STEP
-from auv_fmu.observer import Form
+from auv_fmu.observer import EXACT
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
 from auv_fmu.quantities import POSITION, TAU, VELOCITY
 from auv_fmu.vectors import Vector3
@@ -82,7 +82,7 @@ def update(
     parameters: Gains, state: ControllerState, derived: Signals, inputs: Measurement, h: float
 ) -> ControllerState:
     """State after a step."""
-    if parameters.form == Form.EXACT and h != state.h:
+    if parameters.form == EXACT and h != state.h:
         derived = output_feedback.evaluate(parameters, state, inputs, h)
     return output_feedback.step(state, derived, h)
 

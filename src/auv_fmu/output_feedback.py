@@ -23,7 +23,7 @@ from auv_fmu.adaptation import (
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import ELL, Distance, WithoutRoll, actuator_command
 from auv_fmu.euler import advance_4
-from auv_fmu.observer import Form
+from auv_fmu.observer import EXACT, INTEGRAL, Form
 from auv_fmu.quantities import ACCELERATION, EULER, POSITION, VELOCITY, per_axis
 from auv_fmu.saturation import Saturation, saturation, slope
 from auv_fmu.variable import POSITIVE, Variable
@@ -197,13 +197,13 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
     K2, lambda_, k_d, s = gains.K2, gains.lambda_, gains.k_d, gains.s
     y, (phi, theta, psi), y_d, dy_d, ddy_d = measurement
     y_hat, dy_hat_o, theta_hat, _ = state
-    if gains.form == Form.EXACT and h:
+    if gains.form == EXACT and h:
         k_d = observer.exact_gain(k_d, h)
     e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
     e_z = difference(y_hat, y_d)  # e - z
     s_z, s_ez = saturation(s, z), saturation(s, e_z)
     dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
-    if gains.form == Form.INTEGRAL:
+    if gains.form == INTEGRAL:
         dy_hat_o = total(dy_r, dy_hat_o)  # (24) as printed: dy_r + k_d Lambda int s(z)
     dy_hat = plus_two_scaled(dy_hat_o, lambda_, s_z, k_d, z)  # (23)
     dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)

@@ -19,6 +19,9 @@ class Saturation(IntEnum):
     ARCTAN = 2  #: (2 / pi) atan(xi), whose slope is another: Theorem 2 weighs K_1 with it
 
 
+#: Each by a name of its own, which Python finds faster than in the class.
+TANH, ALGEBRAIC, ARCTAN = Saturation
+
 #: Scales the arc tangent to the bound M = 1; its slope at 0.
 _SCALE = 2.0 / pi
 
@@ -31,9 +34,9 @@ _LARGE = 1e9
 
 def saturation(s: Saturation, xi: Vector3) -> Vector3:
     """s(xi), for the saturation function s: M = 1 for each of them."""
-    if s == Saturation.TANH:
+    if s == TANH:
         return tanh(xi[0]), tanh(xi[1]), tanh(xi[2])
-    if s == Saturation.ALGEBRAIC:
+    if s == ALGEBRAIC:
         return xi[0] / root(xi[0]), xi[1] / root(xi[1]), xi[2] / root(xi[2])
     return _SCALE * atan(xi[0]), _SCALE * atan(xi[1]), _SCALE * atan(xi[2])
 
@@ -47,9 +50,9 @@ def slope(s: Saturation, xi: Vector3, s_xi: Vector3) -> Vector3:
         s_xi: s(xi).
 
     """
-    if s == Saturation.TANH:
+    if s == TANH:
         return 1.0 - s_xi[0] * s_xi[0], 1.0 - s_xi[1] * s_xi[1], 1.0 - s_xi[2] * s_xi[2]
-    if s == Saturation.ALGEBRAIC:
+    if s == ALGEBRAIC:
         r_1, r_2, r_3 = root(xi[0]), root(xi[1]), root(xi[2])
         return 1.0 / (r_1 * r_1 * r_1), 1.0 / (r_2 * r_2 * r_2), 1.0 / (r_3 * r_3 * r_3)
     return (
@@ -66,9 +69,9 @@ def root(xi: float) -> float:
 
 def integral(s: Saturation, xi: float) -> float:
     """Integral of s_i from 0 to xi, items (i) and (ii) of Lemma 1."""
-    if s == Saturation.TANH:
+    if s == TANH:
         return log_cosh(xi)
-    if s == Saturation.ALGEBRAIC:
+    if s == ALGEBRAIC:
         return root(xi) - 1.0
     return _SCALE * (xi * atan(xi) - log(root(xi)))
 
