@@ -73,7 +73,7 @@ def test_page_names_the_functions_and_what_stands_outside():
         ("    return sum([a * x for a in (1.0, 2.0)])", "sum of an expression with a for"),
         ("    return any(a > x for a in (1.0, 2.0))", "any of an expression with a for"),
         ("    return [x][0]", "a list"),
-        ("    return {1: x, x: 2.0}[1]", "a dict whose keys are not constants"),
+        ("    return {1: x, x: 2.0}[1]", "a dict"),
         ("    return (y := x)", ":="),
         ("    return f\"{x}\"", "an f-string"),
         ("    return x if x is x else 1.0", "a comparison other than of size"),
