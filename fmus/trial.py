@@ -134,7 +134,7 @@ def _meant(port: Port, value: Any) -> Any:
     """A value of the type that a port takes."""
     if port.type == "Real" and not isinstance(value, str):
         return float(value)
-    return value.name if isinstance(value, IntEnum) and port.type == "String" else value
+    return value.name.lower() if isinstance(value, IntEnum) and port.type == "String" else value
 
 
 def _flat(value: Any) -> list[Any]:

@@ -62,26 +62,8 @@ class Span(NamedTuple):
 SPAN = Span(4.0, 0.02)
 STOP_TIME, STEP = SPAN
 
-#: The reference runs of examples: those that 10 s do not suit.
-EXAMPLE_SPAN = Span(10.0, 0.1)
-_SPANS = {
-    "battery": Span(6000.0, 60.0),
-    "bouncing_ball": Span(3.0, 0.03),
-    "cart_pendulum": Span(5.0, 0.05),
-    "dc_motor": Span(2.0, 0.02),
-    "extended_kalman_filter": Span(50.0, 0.5),
-    "lag_with_delay": Span(20.0, 0.2),
-    "lqr": Span(5.0, 0.05),
-    "luenberger_observer": Span(2.0, 0.02),
-    "notch_filter": Span(5.0, 0.05),
-    "quarter_car": Span(2.0, 0.02),
-    "state_machine": Span(50.0, 0.5),
-    "state_space": Span(2.0, 0.02),
-    "thermostat": Span(6000.0, 60.0),
-    "van_der_pol": Span(20.0, 0.2),
-    "water_tank": Span(500.0, 5.0),
-    "waypoint_guidance": Span(100.0, 1.0),
-}
+#: Rows of the reference results of an example, at most: they span its default experiment.
+ROWS = 100
 
 #: Of the results that an FMU carries, one row in so many; and how close a tool comes: the libraries
 #: of mathematics of two machines may differ in the last place.
@@ -204,8 +186,8 @@ def write_reference(dist: Path, root: Path) -> list[Path]:
 
     """
     written = []
-    for name, package in components().items():
-        folder = root.joinpath(*package.split("."), REFERENCE)
+    for name, module in components().items():
+        folder = root.joinpath(*module.split(".")[:-1], REFERENCE)
         written += write_component_reference(dist / f"{name}.fmu", folder)
     written.append(root / REFERENCE / "auv_ref.csv")
     written[-1].parent.mkdir(exist_ok=True)
@@ -228,13 +210,16 @@ def write_examples(root: Path) -> list[Path]:
             # This kind can be built everywhere.
             fmu = build_own(folder, Path(temporary), kind=PYTHON)
             target = root / EXAMPLES.name / folder.name / REFERENCE
-            written += write_component_reference(fmu, target, example_span(folder.name))
+            written += write_component_reference(fmu, target, example_span(fmu))
     return written
 
 
-def example_span(name: str) -> Span:
-    """The reference run of an example, by the name of its folder."""
-    return _SPANS.get(name, EXAMPLE_SPAN)
+def example_span(fmu: Path) -> Span:
+    """The reference run of an example: its default experiment, with longer steps if need be."""
+    stated = read_component(fmu.stem, fmu).experiment
+    stop_time, step = stated("stopTime"), stated("stepSize")
+    assert stop_time is not None and step is not None
+    return Span(stop_time, max(step, stop_time / ROWS))
 
 
 def write_component_reference(fmu: Path, folder: Path, span: Span = SPAN) -> list[Path]:

@@ -20,11 +20,12 @@ from __future__ import annotations
 from math import exp
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Vector, interpolate
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable, Vector, interpolate
 
 CHARGES = Vector((0.0, 0.05, 0.1, 0.2, 0.4, 0.6, 0.8, 1.0))
 SOURCE = Vector((2.9, 3.3, 3.45, 3.55, 3.65, 3.8, 3.98, 4.2))  #: [V]
+
+STEP_SIZE, STOP_TIME = 10.0, 9000.0
 
 
 class Parameters(NamedTuple):
@@ -48,8 +49,8 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What it contains."""
 
-    charge: Annotated[float, Variable("1", "Charge")]
-    v: Annotated[Vector, 2, Variable("V", "Voltage of a pair")]
+    charge: float  #: as a fraction of the capacity
+    v: Annotated[Vector, 2]  #: voltages of the pairs [V]
 
 
 class Outputs(NamedTuple):
@@ -61,31 +62,29 @@ class Outputs(NamedTuple):
     empty: Annotated[bool, Variable("1", "It cannot deliver", feedthrough=())]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return _seen(parameters, State(parameters.charge0, Vector((0.0, 0.0))), inputs)
+def start(parameters: Parameters) -> State:
+    """State at the start: nothing has flowed."""
+    return State(parameters.charge0, Vector((0.0, 0.0)))
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds with a held current."""
-    i = _current(state, inputs)
-    charge = min(max(state.charge - i * h / (3600 * parameters.capacity), 0.0), 1.0)
-    v = Vector(
-        R * i + (v - R * i) * exp(-h / (R * C))
-        for v, R, C in zip(state.v, parameters.R, parameters.C)
-    )
-    return _seen(parameters, State(charge, v), inputs)
-
-
-def _current(state: State, inputs: Inputs) -> float:
+def derive(state: State, inputs: Inputs) -> float:
     """The current that it can deliver or take [A]."""
     blocked = (state.charge <= 0 and inputs.demand > 0) or (state.charge >= 1 and inputs.demand < 0)
     return 0.0 if blocked else inputs.demand
 
 
-def _seen(parameters: Parameters, state: State, inputs: Inputs) -> tuple[State, Outputs]:
-    i = _current(state, inputs)
-    voltage = interpolate(state.charge, CHARGES, SOURCE) - parameters.R0 * i - state.v.sum()
-    return state, Outputs(voltage, i, state.charge, state.charge <= 0)
+def update(parameters: Parameters, state: State, derived: float, h: float) -> State:
+    """State after a step of h seconds with a held current."""
+    charge = min(max(state.charge - derived * h / (3600 * parameters.capacity), 0.0), 1.0)
+    v = Vector(
+        R * derived + (v - R * derived) * exp(-h / (R * C))
+        for v, R, C in zip(state.v, parameters.R, parameters.C)
+    )
+    return State(charge, v)
+
+
+def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:
+    """What is seen of it."""
+    source = interpolate(state.charge, CHARGES, SOURCE)
+    voltage = source - parameters.R0 * derived - state.v.sum()
+    return Outputs(voltage, derived, state.charge, state.charge <= 0)

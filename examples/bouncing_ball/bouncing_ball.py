@@ -8,11 +8,11 @@ A ball that would leave the ground slower than `v_min` stays there. So a bounce 
 of an internal step, and a smaller `h_max` gives a more exact one.
 
 This is the model BouncingBall of the Reference FMUs of the Modelica Association, with the same
-names and values. With `h_max` = 0.001 s it gives their published result bit for bit.
+names, values and steps. It gives their published result bit for bit.
 
-Look at `h` and `v`, with `h_max` = 0.001 s: each bounce reaches about `e` * `e` of the height of
-the one before, and after 2.6 s the ball rests. With the default `h_max` it never does: gravity adds
-0.2 m/s in a step, so it always rebounds faster than `v_min`. Try another `e` during the run.
+Look at `h` and `v`: each bounce reaches about `e` * `e` of the height of the one before, and after
+2.6 s the ball rests. With `h_max` = 0.02 s it never does: gravity adds 0.2 m/s in a step, so it
+always rebounds faster than `v_min`. Try another `e` during the run.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from auv_fmu import Variable
 
 #: The smallest normal number: just above the ground [m].
 GROUND = 2.2250738585072014e-308
+
+H_MAX, STEP_SIZE, STOP_TIME = 0.001, 0.01, 3.0
 
 
 class Parameters(NamedTuple):
@@ -42,9 +44,9 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Its motion."""
 
-    h: Annotated[float, Variable("m", "Height of the ball")]
-    v: Annotated[float, Variable("m/s", "Velocity of the ball")]
-    rests: Annotated[bool, Variable("1", "The ball has come to rest")]
+    h: float  #: height [m]
+    v: float  #: velocity, upwards [m/s]
+    rests: bool
 
 
 class Outputs(NamedTuple):
@@ -54,23 +56,15 @@ class Outputs(NamedTuple):
     v: Annotated[float, Variable("m/s", "Velocity of the ball, upwards")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    h, v = parameters.h0, parameters.v0
-    return State(h, v, False), Outputs(h, v)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.h0, parameters.v0, False)
 
 
-def advance(parameters: Parameters, state: State, h: float, n: int) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds."""
-    for _ in range(n):
-        if state.rests:
-            break
-        state = _fallen(parameters, state, h)
-    return state, Outputs(state.h, state.v)
-
-
-def _fallen(parameters: Parameters, state: State, h: float) -> State:
-    """The state after one step, and a bounce if it ends in one."""
+def update(parameters: Parameters, state: State, h: float) -> State:
+    """State after a step of h seconds, and a bounce if it ends in one."""
+    if state.rests:
+        return state
     height = state.h + h * state.v
     velocity = state.v + h * parameters.g
     if height > 0 or velocity >= 0:
@@ -79,3 +73,8 @@ def _fallen(parameters: Parameters, state: State, h: float) -> State:
     if rebound < parameters.v_min:
         return State(GROUND, 0.0, True)
     return State(GROUND, rebound, False)
+
+
+def outputs(state: State) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.h, state.v)

@@ -18,8 +18,9 @@ from __future__ import annotations
 from math import cos, sin
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, solve
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Matrix, Variable, Vector, solve
+
+H_MAX, STOP_TIME = 0.02, 5.0
 
 
 class Parameters(NamedTuple):
@@ -42,8 +43,8 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Its motion."""
 
-    q: Annotated[Vector, 2, Variable("1", "Position and angle")]
-    dq: Annotated[Vector, 2, Variable("1", "Their rates")]
+    q: Annotated[Vector, 2]  #: position [m] and angle [rad]
+    dq: Annotated[Vector, 2]  #: their rates
 
 
 class Outputs(NamedTuple):
@@ -56,15 +57,13 @@ class Outputs(NamedTuple):
     energy: Annotated[float, Variable("J", "Energy, which is 0 for a level pendulum at rest")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start: it rests."""
-    return _seen(parameters, Vector((0.0, parameters.angle0)), Vector((0.0, 0.0)))
+def start(parameters: Parameters) -> State:
+    """State at the start: it rests."""
+    return State(Vector((0.0, parameters.angle0)), Vector((0.0, 0.0)))
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with a held force."""
     M, m, l = parameters.M, parameters.m, parameters.l
 
     def acceleration(q: Annotated[Vector, 2], dq: Annotated[Vector, 2]) -> Annotated[Vector, 2]:
@@ -73,21 +72,24 @@ def advance(
         force = inputs.u - parameters.c * dq[0] + m * l * s * dq[1] * dq[1]
         return solve(mass, Vector((force, m * parameters.g * l * s)))
 
-    q, dq = state.q, state.dq
-    for _ in range(n):
-        v1, a1 = dq, acceleration(q, dq)
-        v2, a2 = dq + h / 2 * a1, acceleration(q + h / 2 * v1, dq + h / 2 * a1)
-        v3, a3 = dq + h / 2 * a2, acceleration(q + h / 2 * v2, dq + h / 2 * a2)
-        v4, a4 = dq + h * a3, acceleration(q + h * v3, dq + h * a3)
-        q += h / 6 * (v1 + 2 * v2 + 2 * v3 + v4)
-        dq += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
-    return _seen(parameters, q, dq)
+    q, v1 = state.q, state.dq
+    a1 = acceleration(q, v1)
+    v2 = v1 + h / 2 * a1
+    a2 = acceleration(q + h / 2 * v1, v2)
+    v3 = v1 + h / 2 * a2
+    a3 = acceleration(q + h / 2 * v2, v3)
+    v4 = v1 + h * a3
+    a4 = acceleration(q + h * v3, v4)
+    return State(
+        q + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4),
+        v1 + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4),
+    )
 
 
-def _seen(
-    parameters: Parameters, q: Annotated[Vector, 2], dq: Annotated[Vector, 2]
-) -> tuple[State, Outputs]:
-    m, l, v, turn = parameters.m, parameters.l, dq[0], parameters.l * dq[1]
+def outputs(parameters: Parameters, state: State) -> Outputs:
+    """What is seen of it."""
+    q, dq, m, l = state.q, state.dq, parameters.m, parameters.l
+    v, turn = dq[0], l * dq[1]
     bob = v * v + 2 * v * turn * cos(q[1]) + turn * turn
     energy = (parameters.M * v * v + m * bob) / 2 + m * parameters.g * l * cos(q[1])
-    return State(q, dq), Outputs(q[0], q[1], v, dq[1], energy)
+    return Outputs(q[0], q[1], v, dq[1], energy)

@@ -8,8 +8,8 @@ seconds from the first and what is slower from the second: its two transfer func
 T s / (T s + 1) and 1 / (T s + 1), add up to one. See W. T. Higgins, A comparison of complementary
 and Kalman filtering, 1975.
 
-The equation is solved exactly for held inputs. The difference of both angles is taken around the
-circle, so that the filter may turn over.
+It is a continuous filter, solved exactly for held inputs. The difference of both angles is taken
+around the circle, so that the filter may turn over.
 
 With the default values the sensor lies still, and its gyroscope has a bias of 0.02 rad/s. `angle`
 ends at T times the bias; `gyro_angle`, the integral, drifts away. Look at both.
@@ -21,6 +21,8 @@ from math import atan2, cos, exp, sin
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable
+
+STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
@@ -41,8 +43,8 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What it has found."""
 
-    angle: Annotated[float, Variable("rad", "Angle")]
-    gyro_angle: Annotated[float, Variable("rad", "Angle from the gyroscope only")]
+    angle: float  #: [rad]
+    gyro_angle: float  #: [rad]
 
 
 class Outputs(NamedTuple):
@@ -52,22 +54,24 @@ class Outputs(NamedTuple):
     gyro_angle: Annotated[float, Variable("rad", "Angle from the gyroscope only")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return State(parameters.angle0, parameters.angle0), Outputs(
-        parameters.angle0, parameters.angle0
-    )
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.angle0, parameters.angle0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with held inputs."""
     leaning = atan2(-inputs.a_x, inputs.a_z)
     difference = leaning - state.angle
     short_way = atan2(sin(difference), cos(difference))
     # Where the filter would come to rest relative to its angle now.
     target = short_way + parameters.T * inputs.gyro
-    angle = state.angle + target * (1.0 - exp(-h / parameters.T))
-    gyro_angle = state.gyro_angle + h * inputs.gyro
-    return State(angle, gyro_angle), Outputs(angle, gyro_angle)
+    return State(
+        state.angle + target * (1.0 - exp(-h / parameters.T)),
+        state.gyro_angle + h * inputs.gyro,
+    )
+
+
+def outputs(state: State) -> Outputs:
+    """What it tells."""
+    return Outputs(state.angle, state.gyro_angle)

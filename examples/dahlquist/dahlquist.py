@@ -6,10 +6,11 @@ G. Dahlquist used it in 1963 to define when a method is stable. The explicit Eul
 it here, multiplies `x` by 1 - k h in each step of h seconds. So `x` decays only if k h is below 2,
 and without a change of sign only if k h is at most 1.
 
-This is the model Dahlquist of the Reference FMUs of the Modelica Association, with the same names
-and values. With `h_max` = 0.1 s it gives their published result bit for bit.
+This is the model Dahlquist of the Reference FMUs of the Modelica Association, with the same names,
+values and steps. It gives their published result bit for bit.
 
-Compare `x` with `exact`, then make the internal steps longer: `h_max` = 1.5 s, and 2.5 s.
+Compare `x` with `exact`, which depends on the time only. Then make the steps longer, with `h_max`
+as long: 1.5 s, and 2.5 s.
 """
 
 from __future__ import annotations
@@ -18,6 +19,8 @@ from math import exp
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable
+
+H_MAX, STEP_SIZE, STOP_TIME = 0.1, 0.1, 10.0
 
 
 class Parameters(NamedTuple):
@@ -30,26 +33,26 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Its value."""
 
-    x: Annotated[float, Variable("1", "Value")]
+    x: float
 
 
 class Outputs(NamedTuple):
     """What is seen of it."""
 
-    x: Annotated[float, Variable("1", "Value by the explicit Euler rule")]
+    x: Annotated[float, Variable("1", "Value by the explicit Euler rule", feedthrough=())]
     exact: Annotated[float, Variable("1", "Value of the solution")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return State(parameters.x0), Outputs(parameters.x0, parameters.x0)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.x0)
 
 
-def advance(
-    parameters: Parameters, state: State, t: float, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds."""
-    x = state.x
-    for _ in range(n):
-        x += h * (-parameters.k * x)
-    return State(x), Outputs(x, parameters.x0 * exp(-parameters.k * (t + n * h)))
+def update(parameters: Parameters, state: State, h: float) -> State:
+    """State after a step of h seconds."""
+    return State(state.x + h * (-parameters.k * state.x))
+
+
+def outputs(parameters: Parameters, state: State, t: float) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.x, parameters.x0 * exp(-parameters.k * t))

@@ -19,8 +19,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Vector
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable, Vector
+
+H_MAX, STOP_TIME = 0.02, 2.0
 
 
 class Parameters(NamedTuple):
@@ -43,7 +44,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Current, speed and angle."""
 
-    x: Annotated[Vector, 3, Variable("1", "Current, speed and angle")]
+    x: Annotated[Vector, 3]  #: [A], [rad/s], [rad]
 
 
 class Outputs(NamedTuple):
@@ -54,23 +55,24 @@ class Outputs(NamedTuple):
     angle: Annotated[float, Variable("rad", "Angle of the shaft")]
 
 
-def begin() -> tuple[State, Outputs]:
-    """State and outputs at the start: it stands still."""
-    return State(Vector((0.0, 0.0, 0.0))), Outputs(0.0, 0.0, 0.0)
+def start() -> State:
+    """State at the start: it stands still."""
+    return State(Vector((0.0, 0.0, 0.0)))
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with held inputs."""
     x = state.x
-    for _ in range(n):
-        k1 = _rate(parameters, inputs, x)
-        k2 = _rate(parameters, inputs, x + h / 2 * k1)
-        k3 = _rate(parameters, inputs, x + h / 2 * k2)
-        k4 = _rate(parameters, inputs, x + h * k3)
-        x += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return State(x), Outputs(x[0], x[1], x[2])
+    k1 = _rate(parameters, inputs, x)
+    k2 = _rate(parameters, inputs, x + h / 2 * k1)
+    k3 = _rate(parameters, inputs, x + h / 2 * k2)
+    k4 = _rate(parameters, inputs, x + h * k3)
+    return State(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+
+
+def outputs(state: State) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.x[0], state.x[1], state.x[2])
 
 
 def _rate(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]) -> Annotated[Vector, 3]:

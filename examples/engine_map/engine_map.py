@@ -7,7 +7,7 @@ interpolated in both directions: `interpolate` in each row at the speed, then be
 the throttle. Outside the map the torque of its edge holds. A closed throttle brakes. This is how
 engines are modelled from measurements on a test bench; see L. Guzzella and C. H. Onder,
 Introduction to Modeling and Control of Internal Combustion Engine Systems. The numbers of this map
-are invented.
+are invented. Speed and outputs both need the torque, which `derive` finds once.
 
 A load above the torque slows the engine down to a standstill, which it does not leave before the
 torque is above the load.
@@ -20,8 +20,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, interpolate
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Matrix, Variable, Vector, interpolate
 
 SPEEDS = Vector((0.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0))  #: [rad/s]
 THROTTLES = Vector((0.0, 0.25, 0.5, 1.0))
@@ -33,6 +32,8 @@ TORQUES = Matrix(  #: [N.m]
         (80.0, 120.0, 142.0, 150.0, 144.0, 120.0, 60.0),
     )
 )
+
+H_MAX, STOP_TIME = 0.02, 10.0
 
 
 class Parameters(NamedTuple):
@@ -52,7 +53,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What is kept from step to step."""
 
-    speed: Annotated[float, Variable("rad/s", "Speed of the shaft")]
+    speed: float  #: [rad/s]
 
 
 class Outputs(NamedTuple):
@@ -64,28 +65,22 @@ class Outputs(NamedTuple):
     stalled: Annotated[bool, Variable("1", "It stands still", feedthrough=())]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return _seen(parameters.speed0, inputs)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.speed0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
-    speed = state.speed
-    for _ in range(n):
-        torque = _torque(inputs.throttle, speed) - inputs.load
-        speed = max(speed + h * torque / parameters.J, 0.0)
-    return _seen(speed, inputs)
-
-
-def _torque(throttle: float, speed: float) -> float:
+def derive(state: State, inputs: Inputs) -> float:
     """The torque of the engine [N.m]."""
-    rows = Vector(interpolate(speed, SPEEDS, TORQUES[k]) for k in range(len(THROTTLES)))
-    return interpolate(throttle, THROTTLES, rows)
+    rows = Vector(interpolate(state.speed, SPEEDS, TORQUES[k]) for k in range(len(THROTTLES)))
+    return interpolate(inputs.throttle, THROTTLES, rows)
 
 
-def _seen(speed: float, inputs: Inputs) -> tuple[State, Outputs]:
-    torque = _torque(inputs.throttle, speed)
-    return State(speed), Outputs(speed, torque, speed * torque, speed == 0)
+def update(parameters: Parameters, state: State, derived: float, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with held inputs."""
+    return State(max(state.speed + h * (derived - inputs.load) / parameters.J, 0.0))
+
+
+def outputs(state: State, derived: float) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.speed, derived, state.speed * derived, state.speed == 0)

@@ -1,8 +1,8 @@
 """An extended Kalman filter that tracks a target by radar, from its range and bearing.
 
-    x_ = F x,  P_ = F P F' + Q                          prediction
     S = H P_ H' + R,  e = z - g(x_)                     innovation, H = dg/dx at x_
     x = x_ + P_ H' S^-1 e,  P = P_ - P_ H' S^-1 H P_    correction
+    x_ = F x,  P_ = F P F' + Q                          prediction
 
 The radar is at the origin. The state is the target's position and velocity in the plane, and what
 is measured is g(x) = (sqrt(px^2 + py^2), atan2(py, px)). A filter for such a curved g takes its
@@ -10,9 +10,10 @@ slope at the best estimate there is; see Bar-Shalom, Li and Kirubarajan, Estimat
 Applications to Tracking and Navigation. The inverse of S is never computed: `solve` gives each row
 of the gain.
 
-The filter starts from a guess, and from how good that is. A target at the origin has no bearing:
-the step is refused. With the default values a target rests 1 km away, and the estimate goes there
-from 280 m off. Look at `position` and `range_error`.
+The filter is sampled: its outputs belong to the measurement of their time. It starts from a guess,
+and from how good that is. A target at the origin has no bearing, and is refused. With the default
+values a target rests 1 km away, and the estimate goes there from 280 m off. Look at `position` and
+`range_error`.
 """
 
 from __future__ import annotations
@@ -20,11 +21,13 @@ from __future__ import annotations
 from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, solve
-from auv_fmu import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Matrix, Refusal, Variable, Vector, solve
 
 _XY = ("x", "y")
 GUESS = Vector((700.0, 700.0))  #: [m]
+
+SAMPLED = True
+STEP_SIZE, STOP_TIME = 0.5, 50.0
 
 
 class Parameters(NamedTuple):
@@ -46,10 +49,10 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What it knows."""
+    """What it predicts for the next measurement."""
 
-    x: Annotated[Vector, 4, Variable("1", "Position and velocity")]
-    P: Annotated[Matrix, 4, 4, Variable("1", "Covariance of their errors")]
+    x: Annotated[Vector, 4]  #: position [m] and velocity [m/s]
+    P: Annotated[Matrix, 4, 4]  #: covariance of their errors
 
 
 class Outputs(NamedTuple):
@@ -60,23 +63,18 @@ class Outputs(NamedTuple):
     range_error: Annotated[float, Variable("m", "Measured less expected range")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start: the target is believed to rest."""
+def start(parameters: Parameters) -> State:
+    """State at the start: the target is believed to rest."""
     a, b = parameters.std_position0, parameters.std_velocity0
     x = Vector((parameters.position0[0], parameters.position0[1], 0.0, 0.0))
     std = Matrix(((a, 0.0, 0.0, 0.0), (0.0, a, 0.0, 0.0), (0.0, 0.0, b, 0.0), (0.0, 0.0, 0.0, b)))
-    return _seen(x, std @ std, 0.0)
+    return State(x, std @ std)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a measurement, which is taken every h seconds."""
-    F = Matrix(((1.0, 0.0, h, 0.0), (0.0, 1.0, 0.0, h), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
-    a, b = h * h * h / 3, h * h / 2
-    Q = Matrix(((a, 0.0, b, 0.0), (0.0, a, 0.0, b), (b, 0.0, h, 0.0), (0.0, b, 0.0, h)))
-    x, P = F @ state.x, F @ state.P @ F.T + Q * parameters.q
-    px, py, r = x[0], x[1], sqrt(x[0] * x[0] + x[1] * x[1])
+def derive(parameters: Parameters, state: State, inputs: Inputs) -> State:
+    """The prediction, corrected by the measurement."""
+    x, P, px, py = state.x, state.P, state.x[0], state.x[1]
+    r = sqrt(px * px + py * py)
     if r < 1e-3:
         raise Refusal(f"the target is {r:g} m from the radar: too near for a bearing")
     H = Matrix(((px / r, py / r, 0.0, 0.0), (-py / (r * r), px / (r * r), 0.0, 0.0)))
@@ -89,10 +87,18 @@ def advance(
         gain = solve(S, PH[i])
         x = x.replaced(i, x[i] + gain @ e)
         P = P.replaced(i, P[i] - PH @ gain)
-    return _seen(x, P, e[0])
+    return State(x, P)
 
 
-def _seen(
-    x: Annotated[Vector, 4], P: Annotated[Matrix, 4, 4], error: float
-) -> tuple[State, Outputs]:
-    return State(x, P), Outputs(Vector((x[0], x[1])), Vector((x[2], x[3])), error)
+def update(parameters: Parameters, derived: State, h: float) -> State:
+    """The prediction for h seconds later."""
+    F = Matrix(((1.0, 0.0, h, 0.0), (0.0, 1.0, 0.0, h), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0)))
+    a, b = h * h * h / 3, h * h / 2
+    Q = Matrix(((a, 0.0, b, 0.0), (0.0, a, 0.0, b), (b, 0.0, h, 0.0), (0.0, b, 0.0, h)))
+    return State(F @ derived.x, F @ derived.P @ F.T + Q * parameters.q)
+
+
+def outputs(state: State, derived: State, inputs: Inputs) -> Outputs:
+    """What it tells."""
+    x, expected = derived.x, sqrt(state.x[0] * state.x[0] + state.x[1] * state.x[1])
+    return Outputs(x[:2], x[2:], inputs.range - expected)

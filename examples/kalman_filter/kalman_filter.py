@@ -1,8 +1,8 @@
 """A Kalman filter that estimates position and velocity from noisy positions.
 
-    x_ = F x,  P_ = F P F' + Q                              prediction
     K  = P_ H' (H P_ H' + r^2)^-1                           gain
     x  = x_ + K (z - H x_),  P = L P_ L' + K r^2 K'         correction, L = I - K H
+    x_ = F x,  P_ = F P F' + Q                              prediction
 
 The state x is position and velocity. Between two measurements, h seconds apart, the acceleration is
 taken for white noise of the density `q`, and `r` is the standard deviation of a measurement. This
@@ -13,8 +13,9 @@ A larger `q` makes the filter faster, and its estimate less smooth. Once the sta
 forgotten, only the ratio of `q` to the square of `r` determines the gain. The correction of P has
 the form of Joseph, which keeps P positive whatever is rounded.
 
-With the default values the target rests at 1 m, and the estimate goes there from 0. Look at `p`
-and at `std_p`, which tells how good the filter believes it to be.
+The filter is sampled: its outputs belong to the measurement of their time. With the default values
+the target rests at 1 m, and the estimate goes there from 0. Look at `p` and at `std_p`, which tells
+how good the filter believes it to be.
 """
 
 from __future__ import annotations
@@ -22,11 +23,13 @@ from __future__ import annotations
 from math import sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Matrix, Variable, Vector
 
 IDENTITY = Matrix(((1.0, 0.0), (0.0, 1.0)))
 H = Matrix(((1.0, 0.0),))  #: Only the position is measured.
+
+SAMPLED = True
+STEP_SIZE, STOP_TIME = 0.1, 10.0
 
 
 class Parameters(NamedTuple):
@@ -51,10 +54,10 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What it knows."""
+    """What it predicts for the next measurement."""
 
-    x: Annotated[Vector, 2, Variable("1", "Position and velocity")]
-    P: Annotated[Matrix, 2, 2, Variable("1", "Covariance of their errors")]
+    x: Annotated[Vector, 2]  #: position [m] and velocity [m/s]
+    P: Annotated[Matrix, 2, 2]  #: covariance of their errors
 
 
 class Outputs(NamedTuple):
@@ -66,24 +69,28 @@ class Outputs(NamedTuple):
     std_v: Annotated[float, Variable("m/s", "Standard deviation of v")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
+def start(parameters: Parameters) -> State:
+    """State at the start."""
     std = Matrix(((parameters.std_p0, 0.0), (0.0, parameters.std_v0)))
-    return _seen(Vector((parameters.p0, parameters.v0)), std @ std)
+    return State(Vector((parameters.p0, parameters.v0)), std @ std)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a measurement, which is taken every h seconds."""
+def derive(parameters: Parameters, state: State, inputs: Inputs) -> State:
+    """The prediction, corrected by the measurement."""
+    x, P, r = state.x, state.P, parameters.r
+    K = P @ H.T / ((H @ P @ H.T)[0, 0] + r * r)
+    L = IDENTITY - K @ H
+    return State(x + K @ (Vector((inputs.z,)) - H @ x), L @ P @ L.T + K @ K.T * (r * r))
+
+
+def update(parameters: Parameters, derived: State, h: float) -> State:
+    """The prediction for h seconds later."""
     F = Matrix(((1.0, h), (0.0, 1.0)))
     Q = Matrix(((h * h * h / 3, h * h / 2), (h * h / 2, h))) * parameters.q
-    x, P = F @ state.x, F @ state.P @ F.T + Q
-    K = P @ H.T / ((H @ P @ H.T)[0, 0] + parameters.r * parameters.r)
-    x += K @ (Vector((inputs.z,)) - H @ x)
-    L = IDENTITY - K @ H
-    return _seen(x, L @ P @ L.T + K @ K.T * (parameters.r * parameters.r))
+    return State(F @ derived.x, F @ derived.P @ F.T + Q)
 
 
-def _seen(x: Annotated[Vector, 2], P: Annotated[Matrix, 2, 2]) -> tuple[State, Outputs]:
-    return State(x, P), Outputs(x[0], x[1], sqrt(P[0, 0]), sqrt(P[1, 1]))
+def outputs(derived: State) -> Outputs:
+    """What it tells."""
+    x, P = derived.x, derived.P
+    return Outputs(x[0], x[1], sqrt(P[0, 0]), sqrt(P[1, 1]))

@@ -7,8 +7,8 @@ the present input, and what it held leaves the line. So the delay is exact withi
 within a step if that is longer. Nothing is moved: only the position of the oldest cell goes around.
 The lag is solved exactly for the value that leaves the line.
 
-`measured` adds the noise: a component asks for standard normal numbers by the argument `n`, and
-`seed` says where they start. The same seed gives the same noise in each run.
+`measured` adds the noise to `y`, from the standard normal number `n`, one in each communication
+step. `seed` says where these numbers start. The same seed gives the same noise in each run.
 
 Lag with dead time is the standard model of slow processes; see Åström and Hägglund, Advanced PID
 Control. With the default values a step from 20 to 80 degC arrives after 2 s, and `y` has passed
@@ -20,10 +20,11 @@ from __future__ import annotations
 from math import exp
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Vector
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Variable, Vector
 
 CELLS = 50
+
+STOP_TIME = 20.0
 
 
 class Parameters(NamedTuple):
@@ -45,10 +46,10 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What is on its way."""
 
-    line: Annotated[Vector, CELLS, Variable("degC", "Temperatures in the pipe")]
-    oldest: Annotated[int, Variable("1", "Place of the oldest of them")]
-    age: Annotated[float, Variable("s", "Time since a cell was filled")]
-    x: Annotated[float, Variable("degC", "Temperature of the sensor")]
+    line: Annotated[Vector, CELLS]  #: temperatures in the pipe [degC]
+    oldest: int  #: place of the oldest of them
+    age: float  #: time since a cell was filled [s]
+    x: float  #: temperature of the sensor [degC]
 
 
 class Outputs(NamedTuple):
@@ -58,16 +59,14 @@ class Outputs(NamedTuple):
     y: Annotated[float, Variable("degC", "Measured temperature")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
+def start(parameters: Parameters) -> State:
+    """State at the start."""
     start = parameters.start
-    return State(Vector(start for _ in range(CELLS)), 0, 0.0, start), Outputs(start, start)
+    return State(Vector(start for _ in range(CELLS)), 0, 0.0, start)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with a held input."""
     line, oldest, age = state.line, state.oldest, state.age + h
     leaving = line[oldest]
     period = parameters.delay / CELLS
@@ -79,7 +78,12 @@ def advance(
         line = line.replaced(oldest, inputs.u)
         oldest = (oldest + 1) % CELLS
     x = leaving + (state.x - leaving) * exp(-h / parameters.T)
-    return State(line, oldest, min(age, period), x), Outputs(x, x)
+    return State(line, oldest, min(age, period), x)
+
+
+def outputs(state: State) -> Outputs:
+    """What it tells, without noise."""
+    return Outputs(state.x, state.x)
 
 
 def seed(parameters: Parameters) -> int:
@@ -87,6 +91,6 @@ def seed(parameters: Parameters) -> int:
     return parameters.seed
 
 
-def measured(parameters: Parameters, y: float, n: tuple[float]) -> float:
+def measured(parameters: Parameters, y: float, n: float) -> float:
     """The measured temperature with noise."""
-    return y + parameters.std * n[0]
+    return y + parameters.std * n

@@ -10,8 +10,9 @@ over all samples. The gain follows from the discrete algebraic Riccati equation
 
     K = (r + B'P B)^-1 B'P A,  P = Q + A'P (A - B K)
 
-which is iterated from P = Q, at the start. See Åström and Wittenmark, Computer-Controlled Systems.
-Step this component every `T` seconds, the period that the gain is made for.
+which is iterated from P = Q, once: `derive` takes nothing but the parameters. See Åström and
+Wittenmark, Computer-Controlled Systems. The regulator is sampled, and has no memory. Step it every
+`T` seconds, the period that the gain is made for.
 
 A larger `r` makes the control slower and cheaper. Look at `K_p`, `K_v` and `rounds`, and
 connect `u` to a cart whose position and velocity come back as `p` and `v`.
@@ -22,11 +23,13 @@ from __future__ import annotations
 from math import inf
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Matrix, Refusal, Variable, Vector
 
 #: Most rounds of the iteration, and the relative change of the gain that ends it.
 ROUNDS, ACCURACY = 10_000, 1e-12
+
+SAMPLED = True
+STEP_SIZE, STOP_TIME = 0.05, 5.0
 
 
 class Parameters(NamedTuple):
@@ -46,24 +49,24 @@ class Inputs(NamedTuple):
     v: Annotated[float, Variable("m/s", "Velocity of the cart")] = 0.0
 
 
-class State(NamedTuple):
-    """What is computed once."""
+class Regulator(NamedTuple):
+    """What follows from the parameters."""
 
-    K: Annotated[Matrix, 1, 2, Variable("1", "Gain")]
-    rounds: Annotated[int, Variable("1", "Rounds of the iteration")]
+    K: Annotated[Vector, 2]
+    rounds: int
 
 
 class Outputs(NamedTuple):
     """What it does."""
 
     u: Annotated[float, Variable("N", "Force on the cart")]
-    K_p: Annotated[float, Variable("N/m", "Gain of the position", feedthrough=())]
-    K_v: Annotated[float, Variable("N.s/m", "Gain of the velocity", feedthrough=())]
-    rounds: Annotated[int, Variable("1", "Rounds of the iteration", feedthrough=())]
+    K_p: Annotated[float, Variable("N/m", "Gain of the position")]
+    K_v: Annotated[float, Variable("N.s/m", "Gain of the velocity")]
+    rounds: Annotated[int, Variable("1", "Rounds of the iteration")]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
+def derive(parameters: Parameters) -> Regulator:
+    """The gain, once for all samples."""
     m, T = parameters.m, parameters.T
     A = Matrix(((1.0, T), (0.0, 1.0)))
     B = Matrix(((T * T / (2 * m),), (T / m,)))
@@ -81,14 +84,10 @@ def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
         rounds += 1
     if rounds == ROUNDS:
         raise Refusal(f"the gain has not converged after {ROUNDS} rounds")
-    return _seen(State(K, rounds), inputs)
+    return Regulator(K[0], rounds)
 
 
-def advance(state: State, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs after a sample."""
-    return _seen(state, inputs)
-
-
-def _seen(state: State, inputs: Inputs) -> tuple[State, Outputs]:
-    K = state.K[0]
-    return state, Outputs(-(K @ Vector((inputs.p, inputs.v))), K[0], K[1], state.rounds)
+def outputs(derived: Regulator, inputs: Inputs) -> Outputs:
+    """What it does."""
+    K = derived.K
+    return Outputs(-(K @ Vector((inputs.p, inputs.v))), K[0], K[1], derived.rounds)

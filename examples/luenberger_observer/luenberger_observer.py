@@ -11,7 +11,7 @@ the damping `zeta`:
     L = (2 zeta omega - d/m,  omega^2 - k/m - d/m L[1])
 
 A higher `omega` forgets the wrong start sooner, and lets more of the measurement's noise through.
-The equations are stepped by the Runge-Kutta method of fourth order.
+It is continuous, as the plant is, and stepped by the Runge-Kutta method of fourth order.
 
 With the default values the mass rests at 0.1 m, held by a force of 2 N. The estimate starts from 0.
 Look at how `p` and `v` reach the true values.
@@ -21,8 +21,9 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Matrix, Variable, Vector
+
+H_MAX, STOP_TIME = 0.02, 2.0
 
 
 class Parameters(NamedTuple):
@@ -45,7 +46,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What it believes."""
 
-    x: Annotated[Vector, 2, Variable("1", "Estimated position and velocity")]
+    x: Annotated[Vector, 2]  #: estimated position [m] and velocity [m/s]
 
 
 class Outputs(NamedTuple):
@@ -55,15 +56,13 @@ class Outputs(NamedTuple):
     v: Annotated[float, Variable("m/s", "Estimated velocity")]
 
 
-def begin() -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return State(Vector((0.0, 0.0))), Outputs(0.0, 0.0)
+def start() -> State:
+    """State at the start."""
+    return State(Vector((0.0, 0.0)))
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with held inputs."""
     damping, stiffness = parameters.d / parameters.m, parameters.k / parameters.m
     A = Matrix(((0.0, 1.0), (-stiffness, -damping)))
     B = Vector((0.0, 1.0 / parameters.m))
@@ -74,10 +73,13 @@ def advance(
         return A @ x + B * inputs.u + L * (inputs.y - x[0])
 
     x = state.x
-    for _ in range(n):
-        k1 = rate(x)
-        k2 = rate(x + h / 2 * k1)
-        k3 = rate(x + h / 2 * k2)
-        k4 = rate(x + h * k3)
-        x += h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
-    return State(x), Outputs(x[0], x[1])
+    k1 = rate(x)
+    k2 = rate(x + h / 2 * k1)
+    k3 = rate(x + h / 2 * k2)
+    k4 = rate(x + h * k3)
+    return State(x + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4))
+
+
+def outputs(state: State) -> Outputs:
+    """What it tells."""
+    return Outputs(state.x[0], state.x[1])

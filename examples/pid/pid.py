@@ -7,7 +7,8 @@
 
 This is the form of Åström and Wittenmark, Computer-Controlled Systems. `b` weights the set point,
 which reduces the overshoot. The derivative acts on the measured value only, through a filter of the
-time constant Td / N.
+time constant Td / N, and is stepped by the backward rule. It is a sampled controller: `u` belongs
+to the set point and the measured value of its time, and is held until the next.
 
 While the actuator is at a limit, u - v is not zero, and leads the integral back within about `Tt`
 seconds. Without it the integral would wind up, and the controller would react late after the set
@@ -22,6 +23,9 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Refusal, Variable
+
+SAMPLED = True
+STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
@@ -47,9 +51,10 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Its memory."""
 
-    integral: Annotated[float, Variable("1", "Integral part")]
-    derivative: Annotated[float, Variable("1", "Derivative part")]
-    y: Annotated[float, Variable("1", "Last measured value")]
+    integral: float
+    derivative: float  #: of the last sample
+    y: float  #: measured value of the last sample
+    share: float  #: of the derivative that is left after the time since then
 
 
 class Outputs(NamedTuple):
@@ -66,22 +71,33 @@ def check(parameters: Parameters) -> None:
         raise Refusal(f"u_min = {parameters.u_min:g} must be below u_max = {parameters.u_max:g}")
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    v = parameters.K * (parameters.b * inputs.r - inputs.y)
-    u = min(max(v, parameters.u_min), parameters.u_max)
-    return State(0.0, 0.0, inputs.y), Outputs(u, 0.0, 0.0)
+def start(inputs: Inputs) -> State:
+    """State at the start: as if the measured value had always been what it is."""
+    return State(0.0, 0.0, inputs.y, 0.0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a sample, which is taken every h seconds."""
-    K, Td, N = parameters.K, parameters.Td, parameters.N
-    change = inputs.y - state.y
-    derivative = (Td * state.derivative - K * Td * N * change) / (Td + N * h)
+def derive(parameters: Parameters, state: State, inputs: Inputs) -> tuple[float, float, float]:
+    """The derivative part, and the output before and after its limits."""
+    K, N = parameters.K, parameters.N
+    derivative = state.share * (state.derivative - K * N * (inputs.y - state.y))
     v = K * (parameters.b * inputs.r - inputs.y) + state.integral + derivative
-    u = min(max(v, parameters.u_min), parameters.u_max)
-    rate = K / parameters.Ti * (inputs.r - inputs.y) + (u - v) / parameters.Tt
-    integral = state.integral + h * rate
-    return State(integral, derivative, inputs.y), Outputs(u, integral, derivative)
+    return derivative, v, min(max(v, parameters.u_min), parameters.u_max)
+
+
+def update(
+    parameters: Parameters,
+    state: State,
+    derived: tuple[float, float, float],
+    inputs: Inputs,
+    h: float,
+) -> State:
+    """State for the next sample, h seconds later."""
+    derivative, v, u = derived
+    rate = parameters.K / parameters.Ti * (inputs.r - inputs.y) + (u - v) / parameters.Tt
+    share = parameters.Td / (parameters.Td + parameters.N * h)
+    return State(state.integral + h * rate, derivative, inputs.y, share)
+
+
+def outputs(state: State, derived: tuple[float, float, float]) -> Outputs:
+    """What it tells the actuator."""
+    return Outputs(derived[2], state.integral, derived[0])

@@ -22,12 +22,13 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, solve
-from auv_fmu import POSITIVE, Variable
+from auv_fmu import POSITIVE, Matrix, Variable, Vector, solve
 
 IDENTITY = Matrix(
     ((1.0, 0.0, 0.0, 0.0), (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0), (0.0, 0.0, 0.0, 1.0))
 )
+
+H_MAX, STOP_TIME = 0.02, 2.0
 
 
 class Parameters(NamedTuple):
@@ -49,7 +50,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Heights and velocities."""
 
-    x: Annotated[Vector, 4, Variable("1", "Body, its velocity, wheel, its velocity")]
+    x: Annotated[Vector, 4]  #: body [m], its velocity [m/s], wheel, its velocity
 
 
 class Outputs(NamedTuple):
@@ -61,31 +62,35 @@ class Outputs(NamedTuple):
     tyre_force: Annotated[float, Variable("N", "Force of the tyre, beyond the weight")]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start: it rests at height 0."""
-    return _seen(parameters, inputs, Vector((0.0, 0.0, 0.0, 0.0)))
+def start() -> State:
+    """State at the start: it rests at height 0."""
+    return State(Vector((0.0, 0.0, 0.0, 0.0)))
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
-    A = _dynamics(parameters)
-    push = Vector((0.0, 0.0, 0.0, h * parameters.k_tyre / parameters.m_wheel * inputs.road))
-    x = state.x
-    for _ in range(n):
-        x = solve(IDENTITY - h / 2 * A, x + h / 2 * (A @ x) + push)
-    return _seen(parameters, inputs, x)
-
-
-def _dynamics(parameters: Parameters) -> Annotated[Matrix, 4, 4]:
+def derive(parameters: Parameters) -> Annotated[Matrix, 4, 4]:
+    """The matrix A."""
     k, d = parameters.k, parameters.d
     body = Vector((-k, -d, k, d)) / parameters.m_body
     wheel = Vector((k, d, -k - parameters.k_tyre, -d)) / parameters.m_wheel
     return Matrix(((0.0, 1.0, 0.0, 0.0), body, (0.0, 0.0, 0.0, 1.0), wheel))
 
 
-def _seen(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 4]) -> tuple[State, Outputs]:
-    acceleration = _dynamics(parameters)[1] @ x
-    force = parameters.k_tyre * (inputs.road - x[2])
-    return State(x), Outputs(x[0], x[2], acceleration, force)
+def update(
+    parameters: Parameters,
+    state: State,
+    derived: Annotated[Matrix, 4, 4],
+    inputs: Inputs,
+    h: float,
+) -> State:
+    """State after a step of h seconds with held inputs."""
+    x, A = state.x, derived
+    push = Vector((0.0, 0.0, 0.0, h * parameters.k_tyre / parameters.m_wheel * inputs.road))
+    return State(solve(IDENTITY - h / 2 * A, x + h / 2 * (A @ x) + push))
+
+
+def outputs(
+    parameters: Parameters, state: State, derived: Annotated[Matrix, 4, 4], inputs: Inputs
+) -> Outputs:
+    """What is seen of it."""
+    x = state.x
+    return Outputs(x[0], x[2], derived[1] @ x, parameters.k_tyre * (inputs.road - x[2]))

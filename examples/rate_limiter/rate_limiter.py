@@ -20,6 +20,8 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable
 
+STOP_TIME = 10.0
+
 
 class Parameters(NamedTuple):
     """Its limits, and its gap."""
@@ -39,8 +41,8 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Where it is."""
 
-    x: Annotated[float, Variable("1", "Position of the motor")]
-    y: Annotated[float, Variable("1", "Position of the output")]
+    x: float  #: position of the motor
+    y: float  #: position of the output
 
 
 class Outputs(NamedTuple):
@@ -50,15 +52,18 @@ class Outputs(NamedTuple):
     y: Annotated[float, Variable("1", "Position of the output")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start, in the middle of the gap."""
-    return State(parameters.x0, parameters.x0), Outputs(parameters.x0, parameters.x0)
+def start(parameters: Parameters) -> State:
+    """State at the start, in the middle of the gap."""
+    return State(parameters.x0, parameters.x0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with a held input."""
     x = state.x + min(max(inputs.u - state.x, -parameters.falling * h), parameters.rising * h)
     y = min(max(state.y, x - parameters.width / 2), x + parameters.width / 2)
-    return State(x, y), Outputs(x, y)
+    return State(x, y)
+
+
+def outputs(state: State) -> Outputs:
+    """Where it is seen."""
+    return Outputs(state.x, state.y)

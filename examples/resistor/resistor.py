@@ -3,9 +3,8 @@
     i = (v_positive - v_negative) / R
 
 A current is positive where it flows into a pin. The resistor has no memory: there is no class
-`State`, and the currents depend on the voltages directly. Because `begin` takes the inputs, the
-description of the FMU says so. Its outputs change only in a step, so in a ring of resistors one
-value arrives a step late.
+`State`, and the currents follow the voltages at once. The description of the FMU says so, because
+`outputs` takes the inputs. So a host can solve a ring of resistors.
 
 This is the component Resistor of PythonFMU's example `demoslave.py`, with the same names and
 values. Only their local variables are outputs here.
@@ -18,6 +17,8 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable
+
+STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
@@ -42,13 +43,8 @@ class Outputs(NamedTuple):
     i: Annotated[float, Variable("A", "Current through the resistor")]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> Outputs:
-    """Outputs at the start."""
+def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
+    """What follows from the inputs."""
     delta_v = inputs.positive_pin_v - inputs.negative_pin_v
     i = delta_v / parameters.R
     return Outputs(positive_pin_i=i, negative_pin_i=-i, delta_v=delta_v, i=i)
-
-
-def advance(parameters: Parameters, inputs: Inputs) -> Outputs:
-    """Outputs after a step, which are those of the inputs that were held over it."""
-    return begin(parameters, inputs)

@@ -19,8 +19,7 @@ from __future__ import annotations
 from math import sin, tanh
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import Variable
+from auv_fmu import Matrix, Variable, Vector
 
 W1 = Vector((-0.653, 2.608, -2.315, 0.747, -0.101))
 W2 = Matrix(
@@ -33,6 +32,8 @@ W2 = Matrix(
     )
 )
 W3 = Vector((4.044, 1.976, 3.903, -3.042, -0.248))
+
+STOP_TIME = 10.0
 
 
 class Inputs(NamedTuple):
@@ -48,15 +49,10 @@ class Outputs(NamedTuple):
     sin_output_ref: Annotated[float, Variable("1", "Sine of the angle")]
 
 
-def begin(inputs: Inputs) -> Outputs:
-    """Outputs at the start."""
+def outputs(inputs: Inputs) -> Outputs:
+    """What it answers."""
     x = inputs.sin_input
     return Outputs(W3 @ _activated(W2 @ _activated(W1 * x)), sin(x))
-
-
-def advance(inputs: Inputs) -> Outputs:
-    """Outputs after a step."""
-    return begin(inputs)
 
 
 def _activated(layer: Annotated[Vector, 5]) -> Annotated[Vector, 5]:

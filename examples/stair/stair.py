@@ -1,7 +1,7 @@
 """A counter that rises by one every second, up to ten.
 
 It shows how a component reacts to points in time. A step may be shorter or longer than a second, so
-`advance` counts all the seconds that have passed at its end. A step that ends within rounding of a
+`update` counts all the seconds that have passed at its end. A step that ends within rounding of a
 full second counts it.
 
 This is the model Stair of the Reference FMUs of the Modelica Association. Theirs ends the run when
@@ -19,6 +19,8 @@ from auv_fmu import Variable
 #: By how much a sum of steps may miss a full second [s].
 ROUNDING = 1e-5
 
+STEP_SIZE, STOP_TIME = 0.2, 10.0
+
 
 class Parameters(NamedTuple):
     """Where it starts and ends."""
@@ -30,8 +32,8 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """What has been counted."""
 
-    counter: Annotated[int, Variable("1", "Value of the counter")]
-    next_event: Annotated[float, Variable("s", "When it rises next")]
+    counter: int
+    next_event: float  #: when it rises next [s]
 
 
 class Outputs(NamedTuple):
@@ -40,15 +42,20 @@ class Outputs(NamedTuple):
     counter: Annotated[int, Variable("1", "Value of the counter")]
 
 
-def begin(parameters: Parameters, t: float) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return State(parameters.start, t + 1.0), Outputs(parameters.start)
+def start(parameters: Parameters, t: float) -> State:
+    """State at the start."""
+    return State(parameters.start, t + 1.0)
 
 
-def advance(parameters: Parameters, state: State, t: float, h: float) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds."""
+def update(parameters: Parameters, state: State, t: float, h: float) -> State:
+    """State after a step of h seconds."""
     counter, next_event = state.counter, state.next_event
     while t + h >= next_event - ROUNDING and counter < parameters.limit:
         counter += 1
         next_event += 1.0
-    return State(counter, next_event), Outputs(counter)
+    return State(counter, next_event)
+
+
+def outputs(state: State) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.counter)

@@ -6,9 +6,9 @@ The light is green for the cars until a pedestrian presses the button, and for `
 least. It then runs through the other modes, each for the time that its parameter says. A button
 that is pressed at any time except red is remembered. Pedestrians may walk while the cars have red.
 
-A mode is a member of an `IntEnum`. As a parameter it is a text, such as RED; as an output it is its
-number. A mode changes at the end of a communication step, so a step should be short compared with
-the times. The time by which it ends late counts towards the next mode, so no error adds up.
+A mode is a member of an `IntEnum`. As a parameter it is a text, such as `red`; as an output it is
+its number. A mode changes at the end of a communication step, so a step should be short compared
+with the times. The time by which it ends late counts towards the next mode: no error adds up.
 
 With the default values the button is held, and the light repeats itself every 22 s. Look at `mode`,
 `walk` and `cycles`.
@@ -23,6 +23,8 @@ from auv_fmu import POSITIVE, Variable
 
 #: By how much a sum of steps may miss the end of a mode [s].
 ROUNDING = 1e-9
+
+STEP_SIZE, STOP_TIME = 0.1, 50.0
 
 
 class Mode(IntEnum):
@@ -53,10 +55,10 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What it remembers."""
 
-    mode: Annotated[Mode, Variable("1", "Mode")]
-    elapsed: Annotated[float, Variable("s", "Time in this mode")]
-    requested: Annotated[bool, Variable("1", "A pedestrian waits")]
-    cycles: Annotated[int, Variable("1", "Full cycles")]
+    mode: Mode
+    elapsed: float  #: time in this mode [s]
+    requested: bool  #: a pedestrian waits
+    cycles: int
 
 
 class Outputs(NamedTuple):
@@ -67,15 +69,13 @@ class Outputs(NamedTuple):
     cycles: Annotated[int, Variable("1", "Full cycles")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return _seen(State(parameters.first, 0.0, False, 0))
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.first, 0.0, False, 0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds, in which one mode may end."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds, in which one mode may end."""
     mode, elapsed = state.mode, state.elapsed + h
     requested = state.requested or (inputs.button and mode != Mode.RED)
     after = state._replace(elapsed=elapsed, requested=requested)
@@ -91,8 +91,9 @@ def advance(
     elif mode == Mode.RED_AMBER and elapsed >= parameters.red_amber - ROUNDING:
         over = elapsed - parameters.red_amber
         after = after._replace(mode=Mode.GREEN, elapsed=over, cycles=state.cycles + 1)
-    return _seen(after)
+    return after
 
 
-def _seen(state: State) -> tuple[State, Outputs]:
-    return state, Outputs(state.mode, state.mode == Mode.RED, state.cycles)
+def outputs(state: State) -> Outputs:
+    """What is seen."""
+    return Outputs(state.mode, state.mode == Mode.RED, state.cycles)

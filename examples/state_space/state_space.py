@@ -9,7 +9,7 @@ column. The matrices are tunable, so the system may change during a run. It is s
 explicit Euler rule.
 
 This is the model StateSpace of the Reference FMUs of the Modelica Association, with the same names
-and values, except that its sizes are fixed. With `h_max` = 0.001 s it gives their published result.
+and values, except that its sizes are fixed. It gives their published result.
 
 With the default values all matrices are the identity: each state grows like exp(t). Look at `y`;
 then set A to (0, 1, 0), (-1, 0, 0), (0, 0, -1) for an oscillator and a decay.
@@ -19,10 +19,11 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import Variable
+from auv_fmu import Matrix, Variable, Vector
 
 IDENTITY = Matrix(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+H_MAX, STEP_SIZE, STOP_TIME = 0.001, 0.1, 10.0
 
 
 class Parameters(NamedTuple):
@@ -44,7 +45,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What it remembers."""
 
-    x: Annotated[Vector, 3, Variable("1", "State")]
+    x: Annotated[Vector, 3]
 
 
 class Outputs(NamedTuple):
@@ -53,20 +54,17 @@ class Outputs(NamedTuple):
     y: Annotated[Vector, 3, Variable("1", "Outputs")]
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return _seen(parameters, inputs, parameters.x0)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.x0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with held inputs."""
     x = state.x
-    for _ in range(n):
-        x += h * (parameters.A @ x + parameters.B @ inputs.u)
-    return _seen(parameters, inputs, x)
+    return State(x + h * (parameters.A @ x + parameters.B @ inputs.u))
 
 
-def _seen(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]) -> tuple[State, Outputs]:
-    return State(x), Outputs(parameters.C @ x + parameters.D @ inputs.u)
+def outputs(parameters: Parameters, state: State, inputs: Inputs) -> Outputs:
+    """What is seen of it."""
+    return Outputs(parameters.C @ state.x + parameters.D @ inputs.u)

@@ -2,9 +2,9 @@
 
     realOut(t) = a realIn (1 - exp(-t / tau))
 
-Nothing is integrated: the output follows from the input, the parameters and the time at the end of
-the step. So `advance` takes `t` and `h`, and there is no class `State`. After `tau` seconds the
-output has 63 % of its final value, and after 3 `tau` it has 95 %.
+Nothing is integrated: the output follows from the input, the parameters and the time. So `outputs`
+takes `t`, and there is no class `State`. After `tau` seconds the output has 63 % of its final
+value, and after 3 `tau` it has 95 %.
 
 This is the component of PythonFMU's example `sympyslave.py`, with the same names and values. That
 one evaluates the formula with SymPy, which the host must have; this one needs only `math`.
@@ -18,6 +18,8 @@ from math import exp
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable
+
+STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
@@ -39,11 +41,6 @@ class Outputs(NamedTuple):
     realOut: Annotated[float, Variable("1", "Response to the step")]
 
 
-def begin(parameters: Parameters, inputs: Inputs, t: float) -> Outputs:
-    """Outputs at the start."""
+def outputs(parameters: Parameters, inputs: Inputs, t: float) -> Outputs:
+    """What follows from the inputs and the time."""
     return Outputs(inputs.realIn * parameters.a * (1.0 - exp(-t / parameters.tau)))
-
-
-def advance(parameters: Parameters, inputs: Inputs, t: float, h: float) -> Outputs:
-    """Outputs after a step of h seconds."""
-    return begin(parameters, inputs, t + h)

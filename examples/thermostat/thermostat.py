@@ -13,7 +13,7 @@ solution: the room cools through the band in
     capacity / loss * log((upper - outdoor) / (lower - outdoor))
 
 With the default values it heats up from 15 degC in 34 minutes, and then repeats itself every 18
-minutes. Use steps of about 10 s for some hours. Look at `temperature`, `heating` and `switched`.
+minutes. Its default experiment takes three hours. Look at `temperature`, `heating` and `switched`.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from math import exp
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable
+
+STEP_SIZE, STOP_TIME = 10.0, 10800.0
 
 
 class Mode(IntEnum):
@@ -53,9 +55,9 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Room and heater."""
 
-    temperature: Annotated[float, Variable("degC", "Temperature of the room")]
-    mode: Annotated[Mode, Variable("1", "Mode of the heater")]
-    switched: Annotated[int, Variable("1", "How often it has switched")]
+    temperature: float  #: of the room [degC]
+    mode: Mode
+    switched: int  #: how often
 
 
 class Outputs(NamedTuple):
@@ -66,15 +68,13 @@ class Outputs(NamedTuple):
     switched: Annotated[int, Variable("1", "How often the heater has switched")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    return _seen(State(parameters.temperature0, parameters.mode0, 0))
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.temperature0, parameters.mode0, 0)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float
-) -> tuple[State, Outputs]:
-    """State and outputs after a step of h seconds with held inputs."""
+def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with held inputs."""
     power = parameters.heater if state.mode == Mode.HEATING else 0.0
     settled = inputs.outdoor + power / parameters.loss
     remaining = exp(-h * parameters.loss / parameters.capacity)
@@ -84,9 +84,9 @@ def advance(
         mode = Mode.HEATING
     elif temperature > parameters.setting + parameters.band / 2:
         mode = Mode.OFF
-    return _seen(State(temperature, mode, state.switched + int(mode != state.mode)))
+    return State(temperature, mode, state.switched + int(mode != state.mode))
 
 
-def _seen(state: State) -> tuple[State, Outputs]:
-    heating = state.mode == Mode.HEATING
-    return state, Outputs(state.temperature, heating, state.switched)
+def outputs(state: State) -> Outputs:
+    """What is seen of them."""
+    return Outputs(state.temperature, state.mode == Mode.HEATING, state.switched)

@@ -7,9 +7,9 @@ B. van der Pol described it in 1926, as an electrical circuit with a vacuum tube
 is, except for the origin, it ends in the same limit cycle. For small `mu` this is nearly a sine of
 amplitude 2. For large `mu` it alternates between slow drifts and sudden jumps.
 
-This is the model VanDerPol of the Reference FMUs of the Modelica Association, with the same names
-and values. It is stepped by the explicit Euler rule, as theirs is. With steps of 0.01 s it gives
-their published result bit for bit.
+This is the model VanDerPol of the Reference FMUs of the Modelica Association, with the same names,
+values and steps. It is stepped by the explicit Euler rule, as theirs is, and gives their published
+result bit for bit.
 
 Plot `x1` over `x0` to see the cycle, and try `mu` = 5.
 """
@@ -19,6 +19,8 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable
+
+H_MAX, STEP_SIZE, STOP_TIME = 0.01, 0.01, 20.0
 
 
 class Parameters(NamedTuple):
@@ -32,8 +34,8 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Its motion."""
 
-    x0: Annotated[float, Variable("1", "Deflection")]
-    x1: Annotated[float, Variable("1/s", "Rate of the deflection")]
+    x0: float  #: deflection
+    x1: float  #: its rate [1/s]
 
 
 class Outputs(NamedTuple):
@@ -43,17 +45,18 @@ class Outputs(NamedTuple):
     x1: Annotated[float, Variable("1/s", "Rate of the deflection")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    x0, x1 = parameters.x0_start, parameters.x1_start
-    return State(x0, x1), Outputs(x0, x1)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(parameters.x0_start, parameters.x1_start)
 
 
-def advance(parameters: Parameters, state: State, h: float, n: int) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds."""
+def update(parameters: Parameters, state: State, h: float) -> State:
+    """State after a step of h seconds."""
     x0, x1 = state.x0, state.x1
-    for _ in range(n):
-        acceleration = parameters.mu * ((1 - x0 * x0) * x1) - x0
-        x0 += h * x1
-        x1 += h * acceleration
-    return State(x0, x1), Outputs(x0, x1)
+    acceleration = parameters.mu * ((1 - x0 * x0) * x1) - x0
+    return State(x0 + h * x1, x1 + h * acceleration)
+
+
+def outputs(state: State) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.x0, state.x1)

@@ -22,6 +22,8 @@ from auv_fmu import POSITIVE, Variable
 
 GRAVITY = 9.81  #: [m/s2]
 
+H_MAX, STEP_SIZE, STOP_TIME = 0.02, 1.0, 1000.0
+
 
 class Parameters(NamedTuple):
     """The tank."""
@@ -41,7 +43,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """What it contains."""
 
-    level: Annotated[float, Variable("m", "Level above the hole")]
+    level: float  #: above the hole [m]
 
 
 class Outputs(NamedTuple):
@@ -49,28 +51,25 @@ class Outputs(NamedTuple):
 
     level: Annotated[float, Variable("m", "Level above the hole")]
     outflow: Annotated[float, Variable("m3/s", "Flow through the hole")]
-    overflows: Annotated[bool, Variable("1", "Water spills over the rim")]
+    overflows: Annotated[bool, Variable("1", "The level is at the rim")]
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start."""
-    level = min(parameters.level0, parameters.rim)
-    return State(level), Outputs(level, _outflow(parameters, level), False)
+def start(parameters: Parameters) -> State:
+    """State at the start."""
+    return State(min(parameters.level0, parameters.rim))
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
-    level, overflows = state.level, False
-    for _ in range(n):
-        rate = (inputs.inflow - _outflow(parameters, level)) / parameters.area
-        level = max(level + h * rate, 0.0)
-        overflows = level > parameters.rim
-        level = min(level, parameters.rim)
-    return State(level), Outputs(level, _outflow(parameters, level), overflows)
-
-
-def _outflow(parameters: Parameters, level: float) -> float:
+def derive(parameters: Parameters, state: State) -> float:
     """The flow through the hole [m3/s], by Torricelli's law."""
-    return parameters.hole * sqrt(2 * GRAVITY * level)
+    return parameters.hole * sqrt(2 * GRAVITY * state.level)
+
+
+def update(parameters: Parameters, state: State, derived: float, inputs: Inputs, h: float) -> State:
+    """State after a step of h seconds with a held inflow."""
+    level = state.level + h * (inputs.inflow - derived) / parameters.area
+    return State(min(max(level, 0.0), parameters.rim))
+
+
+def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:
+    """What is seen of it."""
+    return Outputs(state.level, derived, state.level >= parameters.rim)

@@ -18,12 +18,13 @@ from __future__ import annotations
 from math import atan2, cos, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import POSITIVE, Refusal, Variable
+from auv_fmu import POSITIVE, Matrix, Refusal, Variable, Vector
 
 COUNT = 5
 XY = ("x", "y")
 SQUARE = Matrix(((0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0), (0.0, 0.0)))
+
+H_MAX, STEP_SIZE, STOP_TIME = 0.02, 0.1, 100.0
 
 
 class Parameters(NamedTuple):
@@ -45,9 +46,9 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Where it is."""
 
-    position: Annotated[Vector, 2, Variable("m", "Position")]
-    heading: Annotated[float, Variable("rad", "Heading, anticlockwise from x")]
-    waypoint: Annotated[int, Variable("1", "Row of the waypoint that it drives to, from 0")]
+    position: Annotated[Vector, 2]  #: [m]
+    heading: float  #: anticlockwise from x [rad]
+    waypoint: int  #: row of the waypoint that it drives to, from 0
 
 
 class Outputs(NamedTuple):
@@ -68,30 +69,39 @@ def check(parameters: Parameters) -> None:
             raise Refusal(f"waypoints {k + 1} and {k + 2} are the same")
 
 
-def begin(parameters: Parameters) -> tuple[State, Outputs]:
-    """State and outputs at the start: at the first waypoint, heading along x."""
-    start = parameters.path[0]
-    return State(start, 0.0, 1), Outputs(start, 0.0, 0.0, 2, False)
+def start(parameters: Parameters) -> State:
+    """State at the start: at the first waypoint, heading along x."""
+    return State(parameters.path[0], 0.0, 1)
 
 
-def advance(
-    parameters: Parameters, state: State, inputs: Inputs, h: float, n: int
-) -> tuple[State, Outputs]:
-    """State and outputs after n steps of h seconds with held inputs."""
-    position, heading, waypoint, offset = state.position, state.heading, state.waypoint, 0.0
-    for _ in range(n):
-        if waypoint == COUNT:
-            break
-        leg = parameters.path[waypoint] - parameters.path[waypoint - 1]
-        length, course = sqrt(leg @ leg), atan2(leg[1], leg[0])
-        away = position - parameters.path[waypoint - 1]
-        offset = (leg[0] * away[1] - leg[1] * away[0]) / length
-        turn = course + atan2(-offset, parameters.lookahead) - heading
-        rate = parameters.gain * atan2(sin(turn), cos(turn))
-        heading += h * min(max(rate, -parameters.max_rate), parameters.max_rate)
-        position += h * inputs.speed * Vector((cos(heading), sin(heading)))
-        if leg @ away / length >= length - parameters.radius:
-            waypoint += 1
-    heading = atan2(sin(heading), cos(heading))
-    seen = Outputs(position, heading, offset, min(waypoint + 1, COUNT), waypoint == COUNT)
-    return State(position, heading, waypoint), seen
+def derive(parameters: Parameters, state: State) -> tuple[float, float, float]:
+    """The course of its leg [rad], its offset from it, and how much of it is left [m]."""
+    k = min(state.waypoint, COUNT - 1)
+    leg, away = parameters.path[k] - parameters.path[k - 1], state.position - parameters.path[k - 1]
+    length, offset = sqrt(leg @ leg), leg[0] * away[1] - leg[1] * away[0]
+    return atan2(leg[1], leg[0]), offset / length, length - leg @ away / length
+
+
+def update(
+    parameters: Parameters,
+    state: State,
+    derived: tuple[float, float, float],
+    inputs: Inputs,
+    h: float,
+) -> State:
+    """State after a step of h seconds with a held speed."""
+    if state.waypoint == COUNT:
+        return state
+    course, offset, left = derived
+    turn = course + atan2(-offset, parameters.lookahead) - state.heading
+    rate = parameters.gain * atan2(sin(turn), cos(turn))
+    heading = state.heading + h * min(max(rate, -parameters.max_rate), parameters.max_rate)
+    x, y = cos(heading), sin(heading)
+    waypoint = state.waypoint + int(left <= parameters.radius)
+    return State(state.position + h * inputs.speed * Vector((x, y)), atan2(y, x), waypoint)
+
+
+def outputs(state: State, derived: tuple[float, float, float]) -> Outputs:
+    """What is seen of it."""
+    number, arrived = min(state.waypoint + 1, COUNT), state.waypoint == COUNT
+    return Outputs(state.position, state.heading, derived[1], number, arrived)

@@ -12,6 +12,7 @@ from pathlib import Path
 from types import FunctionType
 from typing import Any
 
+from auv_fmu.variable import Refusal
 from fmus.native.calls import Calls
 from fmus.native.expressions import AND, OR, WHOLE, Code
 from fmus.native.language import foreign, is_text, word_of
@@ -40,7 +41,6 @@ from fmus.native.variables import (
     stored_names,
 )
 from fmus.ports.behaviour import NUMBER_FORMAT
-from fmus.ports.port import Refusal
 
 
 @cache

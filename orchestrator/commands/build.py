@@ -55,8 +55,8 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         type=Path,
         metavar="SCRIPT.py|DIR",
-        help="your own component: a script with the functions begin and advance, the folder of "
-        "such a script, or a script with a PythonFMU class (only for --kind "
+        help="your own component: a script with the function outputs, the folder of such a "
+        "script, or a script with a PythonFMU class (only for --kind "
         f"{PYTHON}); its FMU is written next to it; default: build the bundle",
     )
     folders = f"{DEFAULT_FOLDERS[PYTHON]} or {DEFAULT_FOLDERS[NATIVE]}"
@@ -121,8 +121,8 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         "--base",
         choices=CONTROLLER_BASES,
         default=CONTROLLER_BASES[0],
-        help="base class of the controller: plain (PythonFMU only) or hardened (the base of the "
-        "bundle's components: checks values, saves states, survives exceptions); default: "
+        help="what the controller is: plain (a class of PythonFMU) or hardened (a component in the "
+        "form of the bundle's: checks values, saves states, survives exceptions); default: "
         f"{CONTROLLER_BASES[0]}",
     )
     controller.set_defaults(action=_controller)

@@ -84,8 +84,7 @@ def _is_own(path: Path) -> bool:
     others = (OSP_STRUCTURE, "modelDescription.xml")
     if any((path / name).is_file() for name in others) or any(path.glob("*.ssd")):
         return False
-    names = (f"{path.resolve().name}.py", "behaviour.py")
-    return path.suffix == ".py" or any((path / name).is_file() for name in names)
+    return path.suffix == ".py" or (path / f"{path.resolve().name}.py").is_file()
 
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:

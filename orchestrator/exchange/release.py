@@ -6,13 +6,12 @@ The same sources and the same compiler give the same bytes.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from importlib import import_module
 from pathlib import Path
 from string import Template
 from tempfile import TemporaryDirectory
 
 from auv_fmu import __version__
-from fmus.discovery import REFERENCE, components, licences, package_folder, write_archive
+from fmus.discovery import REFERENCE, components, licences, package_folder, source_of, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, platforms
 from orchestrator.machine.disk import process_folder
 from orchestrator.runs.bundle import ARCHIVE, ZIG, build_bundle, settings_of, write_papers
@@ -74,10 +73,7 @@ def _contents(folder: Path, fmi: str, hear: Callable[[str], None]) -> Iterator[t
 
 def _page(fmi: str) -> bytes:
     """What there is, and which file is for which tool."""
-    described = {
-        name: import_module(f"{package}.ports").DESCRIPTION
-        for name, package in components().items()
-    }
+    described = {name: source_of(name).definition.summary for name in components()}
     fmus = "\n".join(f"| `{name}.fmu` | {text} |" for name, text in described.items())
     names = ", ".join(platform.name for platform in platforms(fmi, "all"))
     page = Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
@@ -97,8 +93,8 @@ def _references() -> Iterator[tuple[str, bytes]]:
     """Reference results of each FMU, and of the system."""
     folder = next(folder for folder in _REFERENCES if folder.is_dir())
     paths = [*folder.glob("auv_*")]
-    for name, package in components().items():
+    for name in components():
         # Beside them is what the FMU carries itself.
-        paths += (package_folder(package) / REFERENCE).glob(f"{name}_*")
+        paths += (source_of(name).folder / REFERENCE).glob(f"{name}_*")
     for path in paths:
         yield f"{REFERENCE}/{path.name}", path.read_bytes()

@@ -449,8 +449,7 @@ def component_text(name: str, network: Network, source: str) -> str:
         '"""',
         "from __future__ import annotations",
         "\n".join([*imports, "from typing import Annotated, NamedTuple"]),
-        "from auv_fmu.linear_algebra import Matrix, Vector\n"
-        "from auv_fmu import Variable",
+        "from auv_fmu import Matrix, Variable, Vector",
         *(text for i, layer in enumerate(network.layers, 1) for text in _constants(i, layer)),
     ]
     body = [
@@ -504,13 +503,8 @@ class Outputs(NamedTuple):
     {outputs}: Annotated[Vector, {m}, Variable("", "Output of the network")]
 
 
-def begin(inputs: Inputs) -> Outputs:
-    """Outputs at the start."""
-    return Outputs(_network(inputs.{inputs}))
-
-
-def advance(inputs: Inputs) -> Outputs:
-    """Outputs of a step: computed at its beginning, held through it."""
+def outputs(inputs: Inputs) -> Outputs:
+    """What it answers to its inputs."""
     return Outputs(_network(inputs.{inputs}))'''
 
 _FUNCTIONS = {

@@ -26,8 +26,8 @@ from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
-#: What a controller for the closed loop can stand on: plain PythonFMU, or the base that the
-#: bundle's components have.
+#: What a controller for the closed loop can be: a class of PythonFMU, or a component in the form
+#: that the bundle's have.
 CONTROLLER_BASES = ("plain", "hardened")
 
 #: What a component can be like at first.

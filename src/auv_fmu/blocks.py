@@ -139,10 +139,12 @@ LAWS: dict[type, Law] = {
 class PlannerBlock(NamedTuple):
     """A planner in the loop; what follows from its state goes along with it.
 
-    All take its parameters first. A step is one of h seconds from a time on.
+    All but `parts` take its parameters first. A step is one of h seconds from a time on; `parts`
+    says how many a communication step is split into, of those that it may be.
     """
 
     begin: Callable[[Any], tuple[Any, Any]]
+    parts: Callable[[int], int]
     step: Callable[[Any, Any, Any, float, float], tuple[Any, Any]]
     reference: Callable[[Any, Any, Any], Reference]
 
@@ -151,6 +153,11 @@ def helix_begin(parameters: motion_planner.Parameters) -> tuple[PlannerState, Mo
     """The reference vehicle at the start, and its motion."""
     state = motion_planner.initial_state(parameters.eta0, parameters.nu0)
     return state, motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
+
+
+def helix_parts(n: int) -> int:
+    """The reference vehicle moves in all of them."""
+    return n
 
 
 def helix_step(
@@ -173,6 +180,11 @@ def path_begin(parameters: path_planner.Parameters) -> tuple[PathState, Nothing]
     return path_planner.initial_state(parameters.waypoints, 0.0), ()
 
 
+def path_parts(n: int) -> int:
+    """The reference on a path is known at any time."""
+    return 1
+
+
 def path_step(
     parameters: path_planner.Parameters, state: PathState, derived: Nothing, t: float, h: float
 ) -> tuple[PathState, Nothing]:
@@ -189,8 +201,8 @@ def path_reference(
 
 #: The planner that goes with a set of parameters.
 PLANNERS: dict[type, PlannerBlock] = {
-    motion_planner.Parameters: PlannerBlock(helix_begin, helix_step, helix_reference),
-    path_planner.Parameters: PlannerBlock(path_begin, path_step, path_reference),
+    motion_planner.Parameters: PlannerBlock(helix_begin, helix_parts, helix_step, helix_reference),
+    path_planner.Parameters: PlannerBlock(path_begin, path_parts, path_step, path_reference),
 }
 
 

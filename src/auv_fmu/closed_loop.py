@@ -26,10 +26,7 @@ _UNDISTURBED: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class LongestSteps(NamedTuple):
-    """Largest internal step of each component [s]; a longer step is split evenly.
-
-    A path planner splits none: it knows the reference at any time.
-    """
+    """Largest internal step of each component [s]; a longer step is split evenly."""
 
     plant: float = STEP
     controller: float = STEP
@@ -78,11 +75,10 @@ class Splits(NamedTuple):
 def splits(setting: Setting, h: float) -> Splits:
     """How a step of h seconds is split."""
     longest = setting.h_max
-    is_path = isinstance(setting.planner, path_planner.Parameters)
     return Splits(
         internal_steps(h, longest_step(longest.plant)),
         internal_steps(h, longest_step(longest.controller)),
-        1 if is_path else internal_steps(h, longest_step(longest.planner)),
+        internal_steps(h, longest_step(longest.planner)),
     )
 
 
@@ -161,13 +157,15 @@ def move(
         parts: that the step is split into.
 
     """
-    state, rotation, planner, moving, water = vehicles
-    h_a, h_d = h / parts.plant, h / parts.planner
-    for _ in range(parts.plant):
+    state, rotation = vehicles.plant, vehicles.rotation
+    planner, moving, water = vehicles.planner, vehicles.moving, vehicles.water
+    n, n_d = parts.plant, blocks.planner.parts(parts.planner)
+    for _ in range(n):
         state, rotation = blocks.vehicle.step(
-            setting.plant, state, rotation, drive, sent.tau_w, sent.water, h_a
+            setting.plant, state, rotation, drive, sent.tau_w, sent.water, h / n
         )
-    for i in range(parts.planner):
+    for i in range(n_d):
+        h_d = h / n_d
         planner, moving = blocks.planner.step(setting.planner, planner, moving, t + i * h_d, h_d)
     return Vehicles(state, rotation, planner, moving, blocks.water.later(setting.water, water, h))
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import re
 import shlex
 import shutil
 import sys
 from contextlib import redirect_stdout
+from dataclasses import fields
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -14,8 +16,11 @@ import fmpy
 import numpy as np
 import pytest
 
+from auv_fmu import Variable
+from fmus import check
 from fmus.compilers import machines_compiler
 from fmus.kinds import TARGETS
+from fmus.ports.behaviour import HOOKS, Hooks
 from orchestrator.commands.main import main
 from orchestrator.exchange import c_host
 from orchestrator.master.experiment import Experiment
@@ -25,6 +30,7 @@ from support.markdown import DOCS, blocks
 from support.patches import patch
 
 PAGE = DOCS / "tutorials" / "your-own-component.md"
+FORM = DOCS / "explanation" / "component.md"
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
@@ -56,6 +62,21 @@ def network(path: Path) -> None:
         known,
     )
     onnx.save(make.make_model(graph, ir_version=8), str(path))
+
+
+def test_example_of_the_form_is_a_component(tmp_path: Path):
+    text, *_ = (text for _, text in blocks(FORM, "python"))
+    (tmp_path / "heater.py").write_text(text, encoding="utf-8")
+    assert check.mistakes(tmp_path / "heater.py", tmp_path) == []
+
+
+def test_page_of_the_form_names_all_of_it():
+    page = FORM.read_text(encoding="utf-8")
+    for name, taken in HOOKS.items():
+        assert f"`{name}({', '.join(taken)}" in page
+    constants = {name for name in Hooks.__annotations__ if name.isupper()}
+    for name in (*constants, *(field.name for field in fields(Variable))):
+        assert re.search(rf"`{name}\b", page), name
 
 
 # Once in a process: the page makes a module that is then known, and refuses a second of its name.

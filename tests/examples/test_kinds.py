@@ -73,21 +73,27 @@ def test_descriptions_are_valid(fmu, name: str):
 
 @each
 def test_both_kinds_give_the_same_bits_in_the_default_experiment(fmu, name: str):
-    native, python = (rows(fmu(name, kind), output_interval=0.02) for kind in (NATIVE, PYTHON))
-    assert native["time"][-1] == 100.0 and len(native) == 5001
+    module = load(name)
+    step = getattr(module, "STEP_SIZE", 0.02)
+    native, python = (rows(fmu(name, kind), output_interval=step) for kind in (NATIVE, PYTHON))
+    assert native["time"][-1] == module.STOP_TIME
+    assert len(native) == 1 + round(module.STOP_TIME / step)
     assert native.tobytes() == python.tobytes()
 
 
 @each
 def test_both_kinds_give_the_bits_of_plain_python(fmu, name: str):
     # A binary fraction: fmpy takes a step as the difference of two times, which is then the same.
-    step, stop_time = 2.0**-6, 20.0
-    plain = run(load(name), stop_time=stop_time, step=step)
+    step, stop_time, module = 2.0**-6, 20.0, load(name)
+    plain = run(module, stop_time=stop_time, step=step)
     for kind in KINDS:
         found = rows(fmu(name, kind), stop_time=stop_time, output_interval=step)
-        for port in ("time", *outputs(fmu(name, kind))):
-            # Not by ==, to which both zeros are equal.
+        for port in outputs(fmu(name, kind)):
             column = np.array(plain[port], found[port].dtype)
+            if getattr(module, "SAMPLED", False):
+                # fmpy reads what is held after a step: the sample of its beginning.
+                column = np.append(column[:1], column[:-1])
+            # Not by ==, to which both zeros are equal.
             assert column.tobytes() == found[port].tobytes(), (kind, port)
 
 
@@ -96,8 +102,7 @@ def test_both_kinds_give_the_bits_of_plain_python(fmu, name: str):
 def test_fmi3_is_valid_and_gives_the_same_bits(fmu, name: str):
     path = fmu(name, NATIVE, "3")
     assert validate_fmu(str(path)) == []
-    older, newer = (rows(one, output_interval=0.02) for one in (fmu(name, NATIVE), path))
-    assert len(newer) == 5001
+    older, newer = (rows(one) for one in (fmu(name, NATIVE), path))
     for port in outputs(fmu(name, NATIVE)):
         assert newer[port].tobytes() == older[port].tobytes(), port
 
@@ -112,7 +117,9 @@ def test_fmu_agrees_with_the_results_that_it_carries(fmu, capsys, name: str, kin
 @each
 def test_committed_reference_is_what_the_tool_writes(fmu, tmp_path: Path, name: str):
     """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""
-    written = write_component_reference(fmu(name, NATIVE), tmp_path, example_span(name))
+    written = write_component_reference(
+        fmu(name, NATIVE), tmp_path, example_span(fmu(name, NATIVE))
+    )
     committed = EXAMPLES / name / REFERENCE
     assert {path.name for path in written} == {path.name for path in committed.iterdir()}
     for path in written:

@@ -79,8 +79,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
-from auv_fmu import Refusal, Variable
+from auv_fmu import Matrix, Refusal, Variable, Vector
 
 
 class Mode(IntEnum):
@@ -98,6 +97,13 @@ class Pair(NamedTuple):
     n: Annotated[int, Variable()] = 4
     on: Annotated[bool, Variable()] = True
 '''
+
+#: What a hook returns, and the types of what it may take.
+RETURNS = {"start": "State", "update": "State", "derive": "Derived", "outputs": "Outputs"}
+TAKEN = {
+    "parameters": "Parameters", "inputs": "Inputs", "state": "State", "derived": "Derived",
+    "t": FLOAT,
+}  # fmt: skip
 
 #: Names that something has, and their types.
 Names = dict[str, str]
@@ -118,36 +124,29 @@ class Component:
         }
         groups["Parameters"] = {"gain": FLOAT, **groups["Parameters"]}
         derives, restarts = draw.random() < 0.7, draw.random() < 0.5
+        if not derives:
+            del groups["Derived"]
         parts = [HEAD, *(self._class(name, fields) for name, fields in groups.items())]
-        known = {
-            argument: _names(argument, groups[name])
-            for argument, name in (
-                ("parameters", "Parameters"), ("inputs", "Inputs"), ("state", "State"),
-                ("after", "State"), ("derived", "Derived"), ("again", "Derived"),
-            )
-        }  # fmt: skip
-        more = "Derived, " if derives else ""
-        result = f"-> tuple[State, {more}Outputs]:"
-
-        def ending(names: Names) -> list[str]:
-            lines = [f"after = {self._made('State', groups['State'], names)}"]
-            names = names | known["after"]
-            if derives:
-                lines += ["again = derive(parameters, after)"]
-                names = names | known["again"]
-            outputs = self._made("Outputs", groups["Outputs"], names)
-            return [*lines, f"return after, {'again, ' if derives else ''}{outputs}"]
-
-        before = known["parameters"] | known["inputs"] | {"t": FLOAT}
-        arguments = "parameters: Parameters, inputs: Inputs, t: float"
-        parts += [_function(f"begin({arguments}) {result}", ending(before))]
-        arguments += ", h: float, n: int, state: State" + (", derived: Derived" * derives)
-        before |= known["state"] | {"h": FLOAT, "n": INT} | (known["derived"] if derives else {})
-        parts += [_function(f"advance({arguments}) {result}", ending(before))]
+        known = {name.lower(): _names(name.lower(), fields) for name, fields in groups.items()}
+        known |= {"t": {"t": FLOAT}, "h": {"h": FLOAT}}
+        arguments = {
+            "start": self._some("parameters", "inputs", "t"),
+            "update": ["h", *known.keys() & {*TAKEN}],
+            "outputs": self._some(*(known.keys() & {*TAKEN})),
+        }
         if derives:
-            made = self._made("Derived", groups["Derived"], known["parameters"] | known["state"])
-            head = "derive(parameters: Parameters, state: State) -> Derived:"
-            parts += [_function(head, [f"return {made}"])]
+            arguments["derive"] = self._some("parameters", "state", "inputs", "t")
+        if draw.random() < 0.3:
+            parts += ["SAMPLED = True\n"]
+            arguments["outputs"] = [*{*arguments["outputs"], "inputs"}]
+        if draw.random() < 0.3:
+            parts += ["H_MAX = 0.03\n"]
+        for hook, taken in arguments.items():
+            made = RETURNS[hook]
+            names = {name: hint for one in sorted(taken) for name, hint in known[one].items()}
+            said = ", ".join(f"{one}: {TAKEN.get(one, FLOAT)}" for one in sorted(taken))
+            result = self._made(made, groups[made], names)
+            parts += [_function(f"{hook}({said}) -> {made}:", [f"return {result}"])]
         if restarts:
             parts += self._restart(groups["State"], known["state"], known["inputs"])
         if draw.random() < 0.7:
@@ -155,6 +154,10 @@ class Component:
         lines = ["if parameters.gain > 50.0:", "    raise Refusal('gain is large')"]
         parts += [_function("check(parameters: Parameters) -> None:", lines)]
         return "\n\n".join(parts)
+
+    def _some(self, *arguments: str) -> list[str]:
+        """Some of the arguments that a hook may take."""
+        return [one for one in sorted(arguments) if self._random.random() < 0.7]
 
     def _class(self, name: str, fields: Names) -> str:
         lines = [f"    {self._field(name, field, hint)}" for field, hint in fields.items()]
@@ -300,14 +303,18 @@ def _trace(library: Library, plan: Sequence[int]) -> list[Any]:
             straight: list[Any] = []
             _step(host, Random(seed + 1), straight.append)
             found += [*straight, *again[0]]
-            if repr(again[0]) != repr(again[1]) or repr(again[0][:1]) != repr(straight):
+            if repr(again[0]) != repr(again[1]) or repr(again[0][: len(straight)]) != repr(
+                straight
+            ):
                 found.append(("not restored", library.description.kind))
     return found
 
 
 def _step(host: Host, draw: Random, note: Callable[[Any], None]) -> None:
-    """Set inputs, and perhaps parameters, and take a step."""
+    """Set inputs, and perhaps parameters, look at what follows them, and take a step."""
     _set(host, draw, ("input", "parameter") if draw.random() < 0.5 else ("input",))
+    if draw.random() < 0.5:
+        note(sorted(host.values().items()))
     note((host.step(draw.random(), draw.choice((0.02, 0.1))), sorted(host.values().items())))
 
 
@@ -322,7 +329,7 @@ def _value(variable: Variable, draw: Random) -> Any:
         "Real": draw.choice((-0.0, 0.5, 60.0, draw.uniform(-3.0, 3.0))),
         "Integer": draw.choice((0, 7, -(2**31), draw.randint(-100, 100))),
         "Boolean": draw.randint(0, 1),
-        "String": draw.choice((b"LOW", b"HIGH", b"MIDDLE")),
+        "String": draw.choice((b"low", b"high", b"middle")),
     }[variable.type]
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import auv_fmu
-from fmus.discovery import components
+from fmus.discovery import ports_of
 
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "reference" / "equations.md").read_text(encoding="utf-8")
@@ -82,6 +82,5 @@ def test_symbol_is_the_name_port_and_unit_that_the_table_says(row):
     assert set(quoted(code)) <= variables()
     for name in quoted(port):
         component, variable = name.split(".", 1)
-        module = import_module(f"{components()[component]}.ports")
-        [declared] = [p for p in module.PORTS if p.name == variable]
+        [declared] = [port for port in ports_of(component) if port.name == variable]
         assert (declared.unit or "") == unit

@@ -22,4 +22,4 @@ def source(name: str) -> Source:
 
 def load(name: str) -> ModuleType:
     """The module of an example."""
-    return import_module(*source(name).modules)
+    return import_module(source(name).module)

@@ -327,8 +327,8 @@ def test_no_module_in_a_folder_with_a_system_or_an_fmu_is_run(workplace, capsys,
     folder = Path("theirs")
     folder.mkdir()
     (folder / marker).write_text("<it/>")
-    for name in ("__init__", "ports", "behaviour", "theirs"):
-        (folder / f"{name}.py").write_text("open('ran', 'w')\ndef begin(): ...\n")
+    for name in ("__init__", "theirs"):
+        (folder / f"{name}.py").write_text("open('ran', 'w')\ndef outputs(): ...\n")
     assert main(["check", "theirs"]) == 2
     assert lines(capsys) != []
     assert not Path("ran").exists()

@@ -13,26 +13,26 @@ EXAMPLES = Path(__file__).parents[2] / "examples"
 #: The examples by their groups, and what of the language each shows.
 GROUPS = {
     "controllers": {
-        "lqr": "matrices, `while`, local function",
-        "pid": "tunable parameters, `check`, limits",
-        "waypoint_guidance": "matrix as parameter, `check`, internal steps",
+        "lqr": "sampled, no state, `derive` of parameters",
+        "pid": "sampled, tunable parameters, `check`",
+        "waypoint_guidance": "matrix as parameter, `derive`, internal steps",
     },
     "estimators": {
         "complementary_filter": "`atan2`, several inputs, exact step",
-        "extended_kalman_filter": "`solve`, refusal, `replaced`",
-        "kalman_filter": "matrix products, matrix as state, transpose",
+        "extended_kalman_filter": "sampled, `solve`, refusal, `replaced`",
+        "kalman_filter": "sampled, matrices as state, `derive`",
         "luenberger_observer": "vectors, Runge-Kutta, internal steps",
-        "notch_filter": "filter memory, refusal, use of `h`",
+        "notch_filter": "sampled, filter memory, sampling period",
     },
     "plants": {
-        "battery": "`interpolate`, `zip`, `feedthrough=()`",
+        "battery": "`interpolate`, `derive`, `feedthrough=()`",
         "cart_pendulum": "`solve`, Runge-Kutta, internal steps",
         "dc_motor": "vectors, Runge-Kutta, internal steps",
-        "engine_map": "`interpolate`, constant matrix, `feedthrough`",
+        "engine_map": "`interpolate`, `derive`, `feedthrough`",
         "lag_with_delay": "delay line, noise, `seed`",
-        "quarter_car": "`solve`, matrices, implicit rule",
+        "quarter_car": "`solve`, `derive` of parameters, implicit rule",
         "rate_limiter": "`min` and `max`, tunable parameters, hysteresis",
-        "water_tank": "internal steps, limits, Boolean output",
+        "water_tank": "`derive`, internal steps, Boolean output",
     },
     "logic": {
         "state_machine": "`IntEnum`, `_replace`, Boolean input",
@@ -44,7 +44,7 @@ GROUPS = {
         "step_response": "no state, use of `t`, formula",
     },
     "reference_fmus": {
-        "bouncing_ball": "events, `break`, internal steps",
+        "bouncing_ball": "events, Boolean state, internal steps",
         "dahlquist": "internal steps, stability, exact solution",
         "stair": "Integer output, `while`, use of `t`",
         "state_space": "matrices as parameters, vector ports, internal steps",

@@ -96,7 +96,6 @@ typedef struct {
     double time;
     state_values state;
     double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* that the noise is made of */
-    output_values outputs;
     freshness outputs_are;
 } moment;
 
@@ -109,6 +108,8 @@ typedef struct {
     int begun;         /* whether there is a state */
     moment moments[2]; /* one is now; the other takes the next, which may be refused */
     int now;
+    output_values outputs[2]; /* one is shown; the other takes what is computed */
+    int shown;
     generator noise;
     int fault;
 } run;

@@ -82,8 +82,9 @@ static void derive(instance *it, const model_state *state, double time, Error *e
     it->underived = error->raised;
 }
 
-/* Computes the outputs of a moment. */
-static int evaluate(instance *it, const moment *of, output_values *outputs, message *why) {
+/* Computes the outputs of a moment, which are not shown yet. */
+static int evaluate(instance *it, const moment *of, message *why) {
+    output_values *outputs = &it->run.outputs[!it->run.shown];
     const model_parameters *parameters = &it->meant.model;
     const model_inputs *inputs = &it->run.inputs.groups;
     const model_state *state = &of->state.groups;
@@ -124,9 +125,10 @@ static int start(instance *it, message *why) {
     }
     next->time = run->start_time;
     model_start(&it->meant.model, &run->inputs.groups, next->time, &next->state.groups, &error);
-    if (!is_sound(&next->state, &error, why) || !evaluate(it, next, &next->outputs, why)) return 0;
+    if (!is_sound(&next->state, &error, why) || !evaluate(it, next, why)) return 0;
     next->outputs_are = FRESH;
     run->now = !run->now;
+    run->shown = !run->shown;
     run->begun = 1;
     return 1;
 }
@@ -134,21 +136,20 @@ static int start(instance *it, message *why) {
 static int refresh(instance *it, message *why) {
     run *run = &it->run;
     moment *now = &run->moments[run->now];
-    output_values *outputs = &run->moments[!run->now].outputs;
     message said;
     if (!it->stale) {
-        if (!evaluate(it, now, outputs, &said)) {
+        if (!evaluate(it, now, &said)) {
             run->fault = 1;
             return compose(why, "outputs refused: %s", said.text);
         }
-        now->outputs = *outputs;
         now->outputs_are = FRESH;
+        run->shown = !run->shown;
         return 1;
     }
     it->stale = !start(it, &said);
     if (!it->stale) return 1;
     run->begun = 0;
-    memset(&now->outputs, 0, sizeof now->outputs);
+    memset(&run->outputs[run->shown], 0, sizeof run->outputs[run->shown]);
     return compose(why, "initialisation refused: %s", said.text);
 }
 
@@ -216,7 +217,7 @@ static int advance(instance *it, double time, double step, message *why) {
     generator before;
     message said;
     Error error;
-    int n = 1;
+    int n = 1, shown = run->shown;
     if (!(step > 0.0 && step <= it->longest_step && isfinite(time))) {
         n = internal_steps(time, step, it->longest_step, why);
         if (n <= 0) return n == 0;
@@ -227,9 +228,9 @@ static int advance(instance *it, double time, double step, message *why) {
         if (MODEL_OUTPUTS_TAKE_TIME) next->outputs_are = OUTDATED;
         if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
-    if (MODEL_SAMPLED && next->outputs_are != FRESH &&
-        !evaluate(it, next, &next->outputs, why)) {
-        return 0;
+    if (MODEL_SAMPLED && next->outputs_are != FRESH) {
+        if (!evaluate(it, next, why)) return 0;
+        shown = !shown;
     }
     error.raised = 0;
     if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
@@ -252,13 +253,15 @@ static int advance(instance *it, double time, double step, message *why) {
         draw(&run->noise, next->draws);
     }
     if (!MODEL_SAMPLED && !MODEL_OUTPUTS_TAKE_INPUTS) {
-        if (!evaluate(it, next, &next->outputs, why)) {
+        if (!evaluate(it, next, why)) {
             if (MODEL_DRAWS > 0) copy_for(&run->noise, &before, MODEL_DRAWS);
             return 0;
         }
         next->outputs_are = FRESH;
+        shown = !shown;
     }
     run->now = !run->now;
+    run->shown = shown;
     return 1;
 }
 

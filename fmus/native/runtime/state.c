@@ -62,7 +62,7 @@ static void put_run(writer *to, const run *it) {
         put_state(to, now->state.values);
         if (MODEL_DRAWS > 0) put_noise(to, &it->noise, now->draws);
         if (MODEL_SAMPLED) {
-            put_values(to, now->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
+            put_values(to, it->outputs[it->shown].values, REAL_OUTPUTS, MODEL_OUTPUTS);
             put_word(to, now->outputs_are);
         }
     }
@@ -153,12 +153,13 @@ static int take_noise(reader *from, generator *noise, double draws[], message *w
 }
 
 /* The outputs that a sampled component keeps. */
-static int take_sample(reader *from, moment *it, message *why) {
-    take_values(from, it->outputs.values, REAL_OUTPUTS, MODEL_OUTPUTS);
+static int take_sample(reader *from, run *it, message *why) {
+    double *values = it->outputs[it->shown].values;
+    take_values(from, values, REAL_OUTPUTS, MODEL_OUTPUTS);
     uint32_t number = take_word(from);
     if (number > FRESH) return compose(why, "its outputs are neither fresh nor not");
-    it->outputs_are = (freshness)number;
-    return good_values(it->outputs.values, MODEL_OUTPUTS, output_references, why);
+    it->moments[it->now].outputs_are = (freshness)number;
+    return good_values(values, MODEL_OUTPUTS, output_references, why);
 }
 
 /* A saved run, checked part by part. */
@@ -198,7 +199,7 @@ static int take_run(reader *from, run *it, message *why) {
         now->outputs_are = OUTDATED;
         if (!take_state(from, now->state.values, why)) return 0;
         if (MODEL_DRAWS > 0 && !take_noise(from, &it->noise, now->draws, why)) return 0;
-        if (MODEL_SAMPLED && !take_sample(from, now, why)) return 0;
+        if (MODEL_SAMPLED && !take_sample(from, it, why)) return 0;
     }
     it->fault = take_truth(from);
     if (it->fault < 0) return compose(why, "its fault is neither true nor false");

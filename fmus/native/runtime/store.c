@@ -127,7 +127,7 @@ static double number_of(call *this, uint32_t reference, fmi_type type) {
     if (port->causality == PARAMETER) return parameter(&run->parameters, port);
     if (port->causality == INPUT) return run->inputs.values[port->place];
     if (is_fault(port)) return run->fault;
-    return run->moments[run->now].outputs.values[port->place];
+    return run->outputs[run->shown].values[port->place];
 }
 
 /* Whether references name all inputs, or outputs, in their order. */
@@ -154,7 +154,7 @@ static void get_reals(call *this, const uint32_t references[], size_t n, double 
     instance *it = this->instance;
     prepare_to_get(this, references, n);
     if (n == REAL_OUTPUTS && are_all(references, output_references, n)) {
-        memcpy(values, it->run.moments[it->run.now].outputs.values, n * sizeof *values);
+        memcpy(values, it->run.outputs[it->run.shown].values, n * sizeof *values);
         return;
     }
     for (size_t i = 0; i < n; i++) values[i] = number_of(this, references[i], REAL);

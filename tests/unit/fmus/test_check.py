@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import py_compile
-import shutil
 import subprocess
 import sys
 from importlib.util import cache_from_source
@@ -15,8 +14,6 @@ from fmus import check
 from fmus.compilers import machines_compiler
 from fmus.native import packaging
 from support.own import write
-
-FOLDER = Path(__file__).parents[2] / "fmu" / "first_order_lag"
 
 
 def mistakes(*arguments: object) -> tuple[int, list[str]]:
@@ -34,7 +31,7 @@ def test_of_a_good_component_nothing_is_said(tmp_path):
 def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, monkeypatch):
     write(
         tmp_path,
-        ("x = state.x -", "y = [1.0, 2.0]\n    x = state.x ** 0.5 -"),
+        ("return State(state.x -", "y = [1.0, 2.0]\n    return State(state.x ** 0.5 -"),
         ('Variable("m", "Value")', 'Variable("m", "Value", tunable=True)'),
         ("from math import expm1", "from beside import expm1, half"),
     )
@@ -47,25 +44,25 @@ def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, monkeypatch):
     assert [line.partition(" is ")[0] for line in lines] == [
         "beside.py:5: the name sum",
         "own_lag.py:39: Outputs.x",
-        "own_lag.py:57: a list",
-        "own_lag.py:58: ** with other than a whole constant",
+        "own_lag.py:55: a list",
+        "own_lag.py:56: ** with other than a whole constant",
     ]
 
 
 def test_what_only_the_translation_finds_is_told(tmp_path, monkeypatch):
-    write(tmp_path, ("return State(x), Outputs(x)", "return State(x), Outputs(1)"))
+    write(tmp_path, ("return Outputs(state.x)", "return Outputs(1)"))
     monkeypatch.chdir(tmp_path)
     status, [line] = mistakes("own_lag.py")
     assert status == 0
-    assert line.startswith("own_lag.py:58: ")
+    assert line.startswith("own_lag.py:60: ")
 
 
 def test_numbers_too_many_for_the_stack_are_told(tmp_path, monkeypatch):
     many = "Vector(k * x for k in range(65_536))"
     write(
         tmp_path,
-        ("\nfrom typing", "\nfrom auv_fmu.linear_algebra import Vector\nfrom typing"),
-        ("return State(x), ", f"x = ({many} + {many}).sum()\n    return State(x), "),
+        ("import POSITIVE, Refusal, Variable", "import POSITIVE, Refusal, Variable, Vector"),
+        ("return Outputs(state.x)", f"x = state.x\n    return Outputs(({many} + {many}).sum())"),
     )
     monkeypatch.chdir(tmp_path)
     lines = mistakes("own_lag.py")[1]
@@ -73,7 +70,7 @@ def test_numbers_too_many_for_the_stack_are_told(tmp_path, monkeypatch):
 
 
 def test_an_expression_that_is_too_long_is_told(tmp_path, monkeypatch):
-    write(tmp_path, ("return State(x), ", f"x = {'x + ' * 3000}x\n    return State(x), "))
+    write(tmp_path, ("return Outputs(state.x)", f"return Outputs({'state.x + ' * 3000}state.x)"))
     monkeypatch.chdir(tmp_path)
     assert "own_lag.py: an expression is too long: take it apart" in mistakes("own_lag.py")[1]
 
@@ -82,12 +79,12 @@ def test_a_module_that_cannot_be_imported_is_told_beside_the_rest(tmp_path, monk
     write(
         tmp_path,
         ("from math import expm1", "import nothing_there\nfrom math import expm1"),
-        ("x = state.x -", "x = state.x ** 0.5 -"),
+        ("State(state.x -", "State(state.x ** 0.5 -"),
     )
     monkeypatch.chdir(tmp_path)
     assert [line.split(";")[0] for line in mistakes("own_lag.py")[1]] == [
         "own_lag.py:8: ModuleNotFoundError: No module named 'nothing_there'",
-        "own_lag.py:58: ** with other than a whole constant is not in the language of equations",
+        "own_lag.py:56: ** with other than a whole constant is not in the language of equations",
     ]
 
 
@@ -97,8 +94,8 @@ def test_what_is_no_component_is_refused(tmp_path):
     assert mistakes(path) == (
         2,
         [
-            f"{path}: not a component, which has functions begin() and advance() (see "
-            "`auv-fmu new`); if it has a class of PythonFMU, build it and check its FMU: "
+            f"{path}: not a component, which has a function outputs() (see `auv-fmu new`);"
+            " if it has a class of PythonFMU, build it and check its FMU: "
             f"auv-fmu build {path}"
         ],
     )
@@ -113,22 +110,10 @@ def test_what_the_compiler_says_of_the_translation_is_told(tmp_path, monkeypatch
     assert line.startswith("own_c.py: ") and "ports.h:1" in line
 
 
-def test_a_folder_without_a_page_is_told(tmp_path, monkeypatch):
-    shutil.copytree(FOLDER, tmp_path / "my_lag")
-    texts = tmp_path / "my_lag" / "ports.py"
-    texts.write_text(texts.read_text().replace("fmus.first_order_lag", "my_lag"))
-    monkeypatch.chdir(tmp_path)
-    assert mistakes("my_lag") == (0, [])
-    (tmp_path / "my_lag" / "page.md").unlink()
-    status, [line] = mistakes("my_lag")
-    assert status == 0
-    assert line.startswith("my_lag: ") and "page.md" in line
-
-
 def test_what_a_hook_says_wrong_is_told_with_the_line_of_the_argument(tmp_path, monkeypatch):
     write(tmp_path, ("inputs: Inputs, h: float", "inputs: Inputs,\n    h: int"))
     monkeypatch.chdir(tmp_path)
-    why = "own_lag.py:55: own_lag.advance takes h as int; write float"
+    why = "own_lag.py:54: own_lag.update takes h as int; write float"
     assert mistakes("own_lag.py") == (0, [why])
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from pathlib import Path
 
 import fmpy
 import pytest
@@ -41,7 +40,7 @@ def test_anything_else_is_none(tmp_path, name):
     (tmp_path / "folder").mkdir()
     why = f"{name}: no such Python file"
     if name == "folder":
-        why = r"folder: has neither folder\.py nor all of __init__\.py, ports\.py, behaviour\.py"
+        why = r"folder: has no folder\.py"
     with pytest.raises(ValueError, match=why):
         script_in(tmp_path / name)
 
@@ -51,9 +50,9 @@ def test_anything_else_is_none(tmp_path, name):
     [
         (SLAVE, False),
         ("", False),
-        ("def begin():\n    pass\n", True),
-        ("from other import begin, advance\n", True),
-        ("class A:\n    def advance(self):\n        pass\n", False),
+        ("def outputs():\n    pass\n", True),
+        ("from other import outputs\n", True),
+        ("class A:\n    def outputs(self):\n        pass\n", False),
         ("def f(:\n", True),
     ],
 )
@@ -84,7 +83,7 @@ def test_source_has_name_page_and_root(tmp_path, monkeypatch, stem, name):
     monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.delitem(sys.modules, stem, raising=False)
     source = source_of_script(write(tmp_path, name=stem))
-    assert (source.name, source.modules, source.root) == (name, (stem,), tmp_path.resolve())
+    assert (source.name, source.module, source.root) == (name, stem, tmp_path.resolve())
     assert source.page == (
         f"# {name}\n\nA first-order lag, T dx/dt = u - x, solved exactly.\n\nIts page."
     )
@@ -101,14 +100,17 @@ MISTAKES = {
         ("state: State, inputs: Inputs", "state: State"),
         "own_lag.py:24: Inputs is there, but no hook takes inputs",
     ),
-    "hook": (("h: float", "dt: float"), "own_lag.py:54: own_lag.advance takes dt, which is not"),
-    "missing": (("def begin", "def _begin"), "own_lag.py: own_lag has no begin"),
+    "hook": (("h: float", "dt: float"), "own_lag.py:53: own_lag.update takes dt, which is not"),
+    "missing": (("def start", "def _start"), "own_lag.py:53: own_lag has update, but no start"),
     "import": (
         ("from math", "from maths"),
         "own_lag.py:8: ModuleNotFoundError: No module named 'maths'",
     ),
     "module": (("__version__ =", "__version__ = 1 / 0 #"), "own_lag.py:14: ZeroDivisionError: div"),
-    "syntax": (("x = state.x", "x = = state.x"), "own_lag.py:57: SyntaxError: invalid syntax"),
+    "syntax": (
+        ("State(state.x -", "State(= state.x -"),
+        "own_lag.py:55: SyntaxError: invalid syntax",
+    ),
 }
 
 
@@ -134,10 +136,10 @@ def test_a_mistake_in_a_module_beside_is_told_with_its_line(tmp_path):
 
 
 def test_what_is_outside_the_language_is_told_when_it_is_to_become_c(tmp_path, monkeypatch):
-    write(tmp_path, ("x = state.x -", "x = state.x ** 0.5 -"))
+    write(tmp_path, ("State(state.x -", "State(state.x ** 0.5 -"))
     monkeypatch.chdir(tmp_path)
     status, said = built("own_lag.py", "--kind", "native", "--out", tmp_path)
-    why = "own_lag.py:57: ** with other than a whole constant is not in the language of equations"
+    why = "own_lag.py:55: ** with other than a whole constant is not in the language of equations"
     assert (status, said[: len(why)]) == (FAILED, why)
     assert built("own_lag.py", "--out", tmp_path) == (0, "")
 
@@ -148,7 +150,7 @@ def test_a_slave_of_pythonfmu_runs_only_in_python(tmp_path, options):
     path.write_text(SLAVE)
     assert built(path, "--kind", "native", *options, "--out", tmp_path) == (
         2,
-        f"{path}: not a component, which has functions begin() and advance() (see `auv-fmu new`); "
+        f"{path}: not a component, which has a function outputs() (see `auv-fmu new`); "
         "a class of PythonFMU needs --kind python",
     )
 
@@ -167,19 +169,6 @@ def test_modules_beside_go_into_both_kinds_and_both_give_the_same_numbers(tmp_pa
             fmpy.simulate_fmu(fmu, stop_time=2.0, output_interval=0.1, start_values={"u": 3.0})
         )
     assert tables[0].tobytes() == tables[1].tobytes()
-
-
-def test_a_folder_of_two_modules_is_a_component(tmp_path):
-    """As those of the bundle are."""
-    text = (Path(__file__).parents[2] / "fmu/first_order_lag/ports.py").read_text()
-    folder = tmp_path / "first_order_lag"
-    folder.mkdir()
-    (folder / "ports.py").write_text(text.replace("fmus.first_order_lag", "first_order_lag"))
-    for name in ("__init__.py", "behaviour.py", "page.md"):
-        source = Path(__file__).parents[2] / "fmu/first_order_lag" / name
-        (folder / name).write_text(source.read_text())
-    assert built(folder, "--out", tmp_path) == (0, "")
-    assert (tmp_path / "FirstOrderLag.fmu").is_file()
 
 
 def test_main_says_what_cannot_be_built(tmp_path, capsys, monkeypatch):

@@ -53,7 +53,7 @@ def made(path: Path, name: str) -> ModuleType:
 def answer(module: ModuleType, x: np.ndarray) -> list[float]:
     [name] = module.Inputs._fields
     vector = vars(module)["Vector"]
-    return [*module.advance(module.Inputs(**{name: vector(x)}))[0]]
+    return [*module.outputs(module.Inputs(**{name: vector(x)}))[0]]
 
 
 @pytest.mark.parametrize("activation", ACTIVATIONS)
@@ -77,7 +77,7 @@ def test_both_kinds_give_the_same_bits(tmp_path: Path):
     np.savez(tmp_path / "policy.npz", **weights(), activations=["relu", "sigmoid", "tanh"])
     both = Twins(made(tmp_path / "policy.npz", "both_kinds"), tmp_path)
     for x in np.random.default_rng(3).normal(size=(50, SIZES[0])):
-        assert both.python("advance", [*x]).bits == both.c("advance", [*x]).bits
+        assert both.python("outputs", [*x]).bits == both.c("outputs", [*x]).bits
 
 
 def saved(

@@ -148,7 +148,7 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
     ("arguments", "why"),
     [
         (["build", "none.py"], "none.py: no such Python file"),
-        (["build", "."], "has neither"),
+        (["build", "."], "auv-fmu: .: has no "),
         (["build", "--watch"], "--watch is for your own component: name its script"),
         (["check", "none.py"], "none.py: no such Python file"),
         (
@@ -165,7 +165,7 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
         ),
         (
             ["build", "slave.py", "--kind", "native"],
-            "slave.py: not a component, which has functions begin() and advance()",
+            "slave.py: not a component, which has a function outputs()",
         ),
     ],
 )
@@ -181,10 +181,10 @@ def test_what_cannot_be_done_is_said_in_a_line(tmp_path, monkeypatch, capsys, ar
 
 def test_check_lists_problems(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    write(tmp_path, ("x = state.x -", "x = state.x ** 0.5 -"))
+    write(tmp_path, ("State(state.x -", "State(state.x ** 0.5 -"))
     assert main(["check", "own_lag.py"]) == 2
     assert capsys.readouterr().out == (
-        "problem: own_lag.py:57: ** with other than a whole constant is not in the language of "
+        "problem: own_lag.py:55: ** with other than a whole constant is not in the language of "
         "equations; write math.pow(x, y), or sqrt(x)\n"
     )
 
@@ -215,7 +215,7 @@ def test_watch_builds_again_until_the_user_ends_it(tmp_path):
         write(tmp_path, ("] = 0.5", "] = 0.7"))
         assert process.stdout.readline().startswith("OwnLag.fmu, ")
         assert (tmp_path / "OwnLag.fmu").read_bytes() != first
-        script.write_text("def begin(\n")
+        script.write_text("def outputs(\n")
         assert process.stderr.readline().startswith("auv-fmu: own_lag.py:1: ")
         time.sleep(0.3)
         process.send_signal(signal.SIGINT)
