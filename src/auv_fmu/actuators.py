@@ -79,6 +79,22 @@ def mean_response(before: float, tau_k: float, T: float, h: float) -> float:
     return tau_k + (before - tau_k) * (-expm1(-x) / x if x else 1.0)
 
 
+def given(before: Vector3, tau: Vector3, T: Vector3) -> Vector3:
+    """What the actuators u, q, r give: those that follow at once what they are to give.
+
+    Args:
+        before: what they gave just before [N, N.m].
+        tau: what they are to give [N, N.m].
+        T: their time constants [s]; 0: they follow at once.
+
+    """
+    return (
+        before[0] if T[0] else tau[0],
+        before[1] if T[1] else tau[1],
+        before[2] if T[2] else tau[2],
+    )
+
+
 def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
     """What the actuators u, q, r give within a step.
 
@@ -92,11 +108,7 @@ def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
         h: step [s].
 
     """
-    first = (
-        before[0] if T[0] else tau[0],
-        before[1] if T[1] else tau[1],
-        before[2] if T[2] else tau[2],
-    )
+    first = given(before, tau, T)
     last = (
         respond(before[0], tau[0], T[0], h),
         respond(before[1], tau[1], T[1], h),

@@ -6,7 +6,7 @@ module takes each state x to x + h dx/dt.
 
 from __future__ import annotations
 
-from math import ceil
+from math import ceil, inf
 
 from auv_fmu.vectors import Vector4
 
@@ -66,10 +66,10 @@ def end_of_step(start: float, t: float, h: float) -> float:
         h: length of the step, more than 0 [s].
 
     """
-    try:
-        k = round((t - start) / h)
-    except OverflowError:
+    counted = (t - start) / h
+    if not abs(counted) < inf:
         return t + h
+    k = round(counted)
     return start + (k + 1) * h if t == start + k * h else t + h
 
 

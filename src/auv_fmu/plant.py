@@ -13,7 +13,7 @@ from enum import IntEnum
 from random import Random
 from typing import Annotated, NamedTuple
 
-from auv_fmu.actuators import Drive, Limits, drive, limit_all
+from auv_fmu.actuators import Drive, Limits, drive, given, limit_all
 from auv_fmu.attitude import (
     euler_from_rotation,
     euler_without_roll,
@@ -434,12 +434,7 @@ def actuation(parameters: Parameters, state: PlantState, tau: Vector3) -> Vector
         tau: what they are to give, after the limits of (3) [N, N.m].
 
     """
-    T, lagging = parameters.T, state.tau
-    return (
-        lagging[0] if T[0] else tau[0],
-        lagging[1] if T[1] else tau[1],
-        lagging[2] if T[2] else tau[2],
-    )
+    return given(state.tau, tau, parameters.T)
 
 
 def advance(
