@@ -37,7 +37,6 @@ BUILT_IN = frozenset(
 OUTSIDE = {
     "plant.white_noise": "makes the generator of the standard library that has the state",
     "euler.internal_steps": "makes an integer; the runtime in C has a twin, which looks first",
-    "euler.end_of_step": "counts steps, however many; the runtime in C has a twin",
     "closed_loop.blocks_of": "selects functions by the types of parameters, before a run",
     "closed_loop.closed_loop": "is the generator of instants that all else is checked against",
 }
