@@ -107,6 +107,7 @@ def main() -> int:
     parser.add_argument("--kind", choices=KINDS, default=KINDS[0])
     parser.add_argument("--loader", choices=LOADERS, help="default: native if it can")
     parser.add_argument("--fmi", choices=FMI_VERSIONS, default=FMI_VERSIONS[0])
+    parser.add_argument("--arrays", action="store_true", help="of FMI 3.0, for vectors")
     parser.add_argument("--platforms", metavar="NAME,...|all", help="default: this machine")
     parser.add_argument(
         "--from", dest="home", default=".", help="the script's folder from the FMU's"
@@ -171,13 +172,15 @@ def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
 
     """
     if options.kind == PYTHON:
-        if options.platforms is not None or options.fmi != FMI_VERSIONS[0]:
-            raise ValueError("--platforms and --fmi 3 need --kind native")
+        if options.platforms is not None or options.fmi != FMI_VERSIONS[0] or options.arrays:
+            raise ValueError("--platforms, --fmi 3 and --arrays need --kind native")
         return PythonKind(chosen_loader(options.out, options.loader))
     if options.loader is not None:
         raise ValueError("--loader is for --kind python: the other kind loads no Python")
     wanted = platforms(options.fmi, options.platforms)
-    return NativeKind(options.fmi, wanted, compiler_for(wanted), _tell)
+    if options.arrays and options.fmi == FMI_VERSIONS[0]:
+        raise ValueError("--arrays needs --fmi 3")
+    return NativeKind(options.fmi, wanted, compiler_for(wanted), _tell, options.arrays)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from fmus import documentation
@@ -23,10 +24,6 @@ _FOLDER = Path(__file__).parent
 #: The file to compile, by the version of FMI: it includes all others.
 MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
 
-_DESCRIBE: dict[str, Callable[[Definition, str], bytes]] = dict(
-    zip(FMI_VERSIONS, (description.fmi2_description, description_fmi3.fmi3_description))
-)
-
 _IDENTITY = """\
 /* Which FMU this is. */
 #ifndef IDENTITY_H
@@ -39,20 +36,30 @@ _IDENTITY = """\
 """
 
 
-def _pictures(name: str, ports: Sequence[Port], fmi: str) -> dict[str, bytes]:
+def _described(definition: Definition, guid: str, fmi: str, arrays: bool) -> bytes:
+    if fmi == FMI_VERSIONS[0]:
+        return description.fmi2_description(definition, guid)
+    return description_fmi3.fmi3_description(definition, guid, arrays)
+
+
+def _pictures(name: str, ports: Sequence[Port], fmi: str, arrays: bool) -> dict[str, bytes]:
     """What a version of FMI has besides, nearly all of it to be drawn."""
     icon = documentation.ICON.read_bytes()
     if fmi == FMI_VERSIONS[0]:
         return {"model.png": icon}
     return {
         "sources/buildDescription.xml": description_fmi3.fmi3_build_description(name),
-        "terminalsAndIcons/terminalsAndIcons.xml": description_fmi3.terminals_and_icons(ports),
+        "terminalsAndIcons/terminalsAndIcons.xml": description_fmi3.terminals_and_icons(
+            ports, arrays
+        ),
         "terminalsAndIcons/icon.png": icon,
         "terminalsAndIcons/terminal.png": (_FOLDER / "terminal.png").read_bytes(),
     }
 
 
-def sources(definition: Definition, fmi: str = FMI_VERSIONS[0]) -> dict[str, str]:
+def sources(
+    definition: Definition, fmi: str = FMI_VERSIONS[0], arrays: bool = False
+) -> dict[str, str]:
     """The C sources of a component by their names, all but identity.h."""
     others = {name for version, name in MAIN.items() if version != fmi}
     return {
@@ -62,7 +69,7 @@ def sources(definition: Definition, fmi: str = FMI_VERSIONS[0]) -> dict[str, str
             if path.name not in others
         },
         "equations.c": translated(definition),
-        "ports.h": tables(definition),
+        "ports.h": tables(definition, arrays),
     }
 
 
@@ -72,6 +79,7 @@ def fmu_entries(
     platforms: Sequence[Platform],
     compiler: Compiler,
     tell: Callable[[str], None],
+    arrays: bool = False,
 ) -> dict[str, bytes]:
     """The contents of an FMU.
 
@@ -83,25 +91,30 @@ def fmu_entries(
         platforms: that it has libraries for.
         compiler: that makes them.
         tell: called with a line when a library is made.
+        arrays: whether vectors and matrices of one unit are variables of FMI 3.0.
 
     Raises:
         OSError: the compiler fails.
 
     """
     component, definition = source.name, source.definition
-    describe = _DESCRIBE[fmi]
-    written = {name: content.encode() for name, content in sources(definition, fmi).items()}
-    guid = guid_of(digest_of({**written, "modelDescription.xml": describe(definition, "")}))
+    describe = partial(_described, definition, fmi=fmi, arrays=arrays)
+    written = {name: text.encode() for name, text in sources(definition, fmi, arrays).items()}
+    guid = guid_of(digest_of({**written, "modelDescription.xml": describe("")}))
     written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
     libraries = {}
     for platform in platforms:
         path = f"binaries/{platform.name}/{component}{platform.ending}"
         libraries[path] = library(compiler, platform, component, written, MAIN[fmi])
         tell(f"{component} for {platform.name}, FMI {fmi}.0")
+    documents = documentation.fmu_documents(source, NATIVE, fmi)
+    if arrays:
+        # The reference results that it would carry are of scalars.
+        documents = {name: text for name, text in documents.items() if name.endswith(".html")}
     return {
-        "modelDescription.xml": describe(definition, guid),
-        **_pictures(component, definition.ports, fmi),
-        **documentation.fmu_documents(source, NATIVE, fmi),
+        "modelDescription.xml": describe(guid),
+        **_pictures(component, definition.ports, fmi, arrays),
+        **documents,
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
         **libraries,
@@ -116,6 +129,7 @@ class NativeKind:
     platforms: Sequence[Platform]
     compiler: Compiler
     tell: Callable[[str], None]
+    arrays: bool = False
     name = NATIVE
     #: How many are written at the same time: compilers are processes of their own.
     side_by_side = os.cpu_count()
@@ -128,6 +142,7 @@ class NativeKind:
             "fmi": self.fmi,
             "platforms": ",".join(platform.name for platform in self.platforms),
             "compiler": self.compiler.name,
+            **({"arrays": "true"} if self.arrays else {}),
         }
 
     def write(self, source: Source, path: Path) -> None:
@@ -137,5 +152,7 @@ class NativeKind:
             OSError: the compiler fails, or the file cannot be written.
 
         """
-        entries = fmu_entries(source, self.fmi, self.platforms, self.compiler, self.tell)
+        entries = fmu_entries(
+            source, self.fmi, self.platforms, self.compiler, self.tell, self.arrays
+        )
         write_archive(path, entries)

@@ -12,6 +12,7 @@ from auv_fmu import euler
 from fmus.native.layout import quoted
 from fmus.native.shapes import Shape, Structure, shape_of
 from fmus.ports.definition import Definition
+from fmus.ports.description_fmi3 import variables_of
 from fmus.ports.groups import hints_of, is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, Port
 
@@ -37,8 +38,8 @@ static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
 _TYPES = {float: "REAL", int: "INTEGER", bool: "BOOLEAN"}
 
 
-def tables(definition: Definition) -> str:
-    """The file ports.h of a component."""
+def tables(definition: Definition, arrays: bool = False) -> str:
+    """The file ports.h of a component; some of its ports may be elements of arrays."""
     ports = (*definition.ports, FAULT)
     places = {FAULT.name: "0", H_MAX: "PARAMETER_AT(h_max)"}
     parameters = shape_of(definition.behaviour.parameters)
@@ -58,11 +59,20 @@ def tables(definition: Definition) -> str:
             *(_choices(names[port.name], port.choices) for port in ports if port.choices),
             f"static const port ports[] = {{\n{rows}}};\n",
             f"enum {{ N_PORTS = {len(ports)} }};\n",
+            *(_arrays(ports) if arrays else ()),
             *(_references(causality, found, ports) for causality, found in values.items()),
             *_counts(values),
             *_state(definition.behaviour.state),
         )
     )
+
+
+def _arrays(ports: Sequence[Port]) -> Iterator[str]:
+    """How many ports a value reference stands for: those of an array that begins there."""
+    sizes = [1] * len(ports)
+    for reference, _, elements in variables_of(ports, arrays=True):
+        sizes[reference - 1] = len(elements)
+    yield f"#define ARRAYS\nstatic const size_t elements[] = {{{', '.join(map(str, sizes))}}};\n"
 
 
 def _member(shape: Shape, path: Sequence[str | int]) -> str:

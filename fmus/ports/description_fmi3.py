@@ -8,6 +8,10 @@ exchange the same, so a tool that joins two terminals of one name joins the righ
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import groupby
+from operator import attrgetter, itemgetter
+from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from auv_fmu.quantities import member_of
@@ -53,22 +57,24 @@ _LIBRARIES = {
 }
 
 
-def fmi3_description(definition: Definition, token: str) -> bytes:
+def fmi3_description(definition: Definition, token: str, arrays: bool = False) -> bytes:
     """The description of a component that is a library of the same name.
 
     Args:
         definition: of the component.
         token: as the library knows it.
+        arrays: whether vectors and matrices of one unit are variables of their own.
 
     """
-    variables = (*definition.ports, FAULT, TIME)
-    units = units_of(variables)
+    ports = (*definition.ports, FAULT, TIME)
+    variables = variables_of(ports, arrays)
+    units = units_of(ports)
     root = root_of(_VERSION, definition, instantiationToken=token)
     SubElement(root, "CoSimulation", _CAPABILITIES, modelIdentifier=definition.name)
     root.extend(
         (
             unit_definitions(units),
-            _type_definitions(variables),
+            _type_definitions(ports),
             log_categories("fmi3"),
             default_experiment(definition.behaviour),
             _variables(variables),
@@ -100,23 +106,69 @@ def _type_definitions(ports: Sequence[Port]) -> Element:
     return definitions
 
 
-def _variables(ports: Sequence[Port]) -> Element:
-    variables = Element("ModelVariables")
-    for place, port in enumerate(ports, start=1):
-        attributes = {**variable_attributes(place, port), **value_attributes(port)}
-        SubElement(variables, TYPES[port.type], attributes)
+class _Variable(NamedTuple):
+    """A scalar, or an array, which has the value reference of its first element."""
+
+    reference: int
+    port: Port
+    elements: Sequence[Port]
+
+
+def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]:
+    """Ports as variables.
+
+    Args:
+        ports: in the order of their value references.
+        arrays: whether ports of one array are one variable.
+
+    """
+    if not arrays:
+        ports = [replace(port, array=None) for port in ports]
+    names = {port.name: port.array.name if port.array else port.name for port in ports}
+    keyed = [(names[port.name], place, port) for place, port in enumerate(ports, start=1)]
+    variables = []
+    for name, found in groupby(keyed, itemgetter(0)):
+        members = [*found]
+        _, reference, first = members[0]
+        elements = [port for _, _, port in members]
+        described = first.array.description if first.array else first.description
+        direct, initial = (
+            dict.fromkeys(names.get(one, one) for port in elements for one in getattr(port, on))
+            for on in ("feedthrough", "initially")
+        )
+        later = tuple(one for one in initial if one not in direct)
+        whole = replace(
+            first, name=name, description=described, feedthrough=tuple(direct), initially=later
+        )
+        variables.append(_Variable(reference, whole, elements))
     return variables
 
 
-def _structure(ports: Sequence[Port]) -> Element:
+def _variables(variables: Sequence[_Variable]) -> Element:
+    root = Element("ModelVariables")
+    for reference, port, elements in variables:
+        attributes = {**variable_attributes(reference, port), **value_attributes(port)}
+        if port.start is not None:
+            attributes["start"] = " ".join(value_attributes(one)["start"] for one in elements)
+        variable = SubElement(root, TYPES[port.type], attributes)
+        for size in port.array.shape if port.array else ():
+            SubElement(variable, "Dimension", start=str(size))
+    return root
+
+
+def _structure(variables: Sequence[_Variable]) -> Element:
     """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
-    outputs = list(dependencies(ports))
+
+    def referred(places: Sequence[int]) -> list[int]:
+        return [variables[place - 1].reference for place in places]
+
+    outputs = list(dependencies([variable.port for variable in variables]))
     structure = Element("ModelStructure")
-    for out in outputs:
-        SubElement(structure, "Output", dependent_on(out.direct), valueReference=str(out.place))
-    for out in outputs:
-        known = dependent_on(out.initial)
-        SubElement(structure, "InitialUnknown", known, valueReference=str(out.place))
+    for name, of in (("Output", attrgetter("direct")), ("InitialUnknown", attrgetter("initial"))):
+        for out in outputs:
+            [reference] = referred([out.place])
+            known = dependent_on(referred(of(out)))
+            SubElement(structure, name, known, valueReference=str(reference))
     return structure
 
 
@@ -144,13 +196,15 @@ _COLOUR = "0 0 127"
 _PICTURE = "terminal"
 
 
-def terminals_and_icons(ports: Sequence[Port]) -> bytes:
+def terminals_and_icons(ports: Sequence[Port], arrays: bool = False) -> bytes:
     """terminalsAndIcons.xml of a component.
 
     Args:
         ports: all but `fault`, which no component takes.
+        arrays: whether ports of one array are one variable.
 
     """
+    ports = [variable.port for variable in variables_of(ports, arrays)]
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = SubElement(root, "GraphicalRepresentation")
     SubElement(graphics, "CoordinateSystem", _ICON, suggestedScalingFactorTo_mm=_SCALE)

@@ -11,7 +11,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 from auv_fmu.arrays import Matrix, Vector
 from auv_fmu.variable import Refusal, Variable
 from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
-from fmus.ports.port import Misdeclared, Port
+from fmus.ports.port import Array, Misdeclared, Port
 
 
 class _Part(NamedTuple):
@@ -80,6 +80,10 @@ def _declared(
                 if getattr(said, name) is None:
                     said = replace(said, **{name: getattr(default, name)})
         ports = [_port(causality, said, part, place) for part in parts]
+        if len({part.unit for part in parts}) == 1 and "{}" not in (said.name or ""):
+            shape = _shape(inner, notes, place)[0]
+            array = Array(prefix + (said.name or field), said.description, shape)
+            ports = [replace(port, array=array if shape else None) for port in ports]
         fields[field] = tuple(ports) if parts[0].member else ports[0]
     return fields
 

@@ -6,7 +6,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Union
+from typing import NamedTuple, Union
 
 from auv_fmu.variable import POSITIVE, Refusal
 
@@ -38,6 +38,14 @@ class Misdeclared(TypeError):
         super().__init__(why)
 
 
+class Array(NamedTuple):
+    """What scalar variables are the elements of."""
+
+    name: str
+    description: str
+    shape: tuple[int, ...]
+
+
 @dataclass(frozen=True)
 class Port:
     """One scalar variable of a component.
@@ -55,6 +63,7 @@ class Port:
         enumeration: what its type is called.
         feedthrough: of an output, what it depends on without a state between: inputs, the time.
         initially: of an output, inputs that its value at the start depends on besides.
+        array: that it is an element of, all of which have one unit; None: of none.
 
     """
 
@@ -71,6 +80,7 @@ class Port:
     enumeration: str = ""
     feedthrough: tuple[str, ...] = ()
     initially: tuple[str, ...] = ()
+    array: Array | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no description of an FMU can say."""

@@ -70,6 +70,12 @@ def add_build(parser: argparse.ArgumentParser) -> None:
         "is a C compiler",
     )
     parser.add_argument(
+        "--arrays",
+        action="store_true",
+        help="with --fmi 3: vectors and matrices whose elements have one unit are arrays; of the "
+        "bundle no SSP is written then",
+    )
+    parser.add_argument(
         "--watch",
         action="store_true",
         help="rebuild each time that SCRIPT.py, or a module beside it, changes; Ctrl-C ends it",
@@ -163,6 +169,7 @@ def _build(options: argparse.Namespace) -> int:
         kind=options.kind,
         fmi=options.fmi,
         platforms=options.platforms,
+        arrays=options.arrays,
         force=options.force,
         hear=say,
     )
@@ -180,6 +187,7 @@ def _build_own(options: argparse.Namespace) -> int:
         kind=options.kind,
         fmi=options.fmi,
         platforms=options.platforms,
+        arrays=options.arrays,
         force=options.force,
         hear=lambda line: None if options.watch else say(line),
     )

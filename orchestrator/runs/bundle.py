@@ -57,6 +57,7 @@ def build_bundle(
     kind: str = PYTHON,
     fmi: str = FMI_VERSIONS[0],
     platforms: str | None = None,
+    arrays: bool = False,
     force: bool = False,
     hear: Callable[[str], None] = lambda line: None,
 ) -> list[Path]:
@@ -69,6 +70,8 @@ def build_bundle(
         kind: one of :data:`fmus.kinds.KINDS`.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
         platforms: of the native kind, with commas between them; None: this machine.
+        arrays: whether vectors of one unit are arrays of FMI 3.0; the SSP is left out then, whose
+            connections are of scalars.
         force: move aside files of the user's that have names of these.
         hear: called with a line when a library is made.
 
@@ -87,10 +90,13 @@ def build_bundle(
         options = ["--kind", kind, "--fmi", fmi]
         options += ["--loader", loader] if loader is not None else []
         options += ["--platforms", platforms] if platforms is not None else []
+        options += ["--arrays"] * arrays
         run_fmus("build", unfinished, *options, hear=hear)
-        archive = unfinished / ARCHIVE
-        archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
-        files = [*sorted(unfinished.glob("*.fmu")), archive]
+        files = sorted(unfinished.glob("*.fmu"))
+        if not arrays:
+            archive = unfinished / ARCHIVE
+            archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
+            files.append(archive)
         write_papers(unfinished, files, settings_of(unfinished))
         for path in unfinished.iterdir():
             before = folder / path.name

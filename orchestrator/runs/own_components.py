@@ -171,6 +171,7 @@ def build_own(
     kind: str = PYTHON,
     fmi: str = FMI_VERSIONS[0],
     platforms: str | None = None,
+    arrays: bool = False,
     force: bool = False,
     hear: Callable[[str], None] = lambda line: None,
 ) -> Path:
@@ -184,6 +185,7 @@ def build_own(
         kind: one of :data:`fmus.kinds.KINDS`.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
         platforms: of the native kind, with commas between them; None: this machine.
+        arrays: whether vectors and matrices of one unit are arrays of FMI 3.0.
         force: move aside a file of the user's that has the name of the FMU.
         hear: called with a line when a library is made.
 
@@ -194,6 +196,7 @@ def build_own(
     options = [str(script), "--kind", kind, "--fmi", fmi]
     options += ["--loader", loader] if loader is not None else []
     options += ["--platforms", platforms] if platforms is not None else []
+    options += ["--arrays"] * arrays
     with TemporaryDirectory(dir=process_folder()) as temporary:
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder

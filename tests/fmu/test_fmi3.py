@@ -20,6 +20,7 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from orchestrator.master.experiment import Experiment
+from orchestrator.runs.own_components import build_own
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.structure import System
@@ -463,3 +464,60 @@ def test_state_continues_in_another_instance_bit_for_bit(unpacked: Path):
     for slave in slaves:
         slave.terminate()
         slave.freeInstance()
+
+
+# Arrays
+
+STATE_SPACE = Path(__file__).parents[2] / "examples/state_space/state_space.py"
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """A component with scalars, and with arrays."""
+    files = []
+    for arrays in (False, True):
+        folder = tmp_path_factory.mktemp("arrays" if arrays else "scalars")
+        files.append(str(build_own(STATE_SPACE, folder, kind="native", fmi="3", arrays=arrays)))
+    return files
+
+
+def test_vectors_and_matrices_may_be_arrays(both):
+    assert validate_fmu(both[1]) == []
+    variables = {v.name: v for v in fmpy.read_model_description(both[1]).modelVariables}
+    sizes = {name: [int(d.start) for d in v.dimensions] for name, v in variables.items()}
+    assert {name: size for name, size in sizes.items() if size} == {
+        "u": [3], "y": [3], "A": [3, 3], "B": [3, 3], "C": [3, 3], "D": [3, 3], "x0": [3],
+    }  # fmt: skip
+
+
+def test_arrays_hold_what_scalars_do(both):
+    numbers = np.arange(9.0) / 8 - 0.5
+    places = [f"[{i},{k}]" for i in (1, 2, 3) for k in (1, 2, 3)]
+    starts = (
+        {**{f"A{at}": n for at, n in zip(places, numbers, strict=True)}, "u[2]": -4.0},
+        {"A": [*numbers], "u": [1.0, -4.0, 3.0]},
+    )
+    scalars, arrays = (
+        fmpy.simulate_fmu(file, stop_time=1.0, output_interval=0.1, start_values=given)
+        for file, given in zip(both, starts, strict=True)
+    )
+    assert np.abs(arrays["y"]).max() > 1.0
+    for i in range(3):
+        np.testing.assert_array_equal(arrays["y"][:, i], scalars[f"y[{i + 1}]"])
+
+
+def test_an_array_is_passed_as_a_whole_only(both, tmp_path):
+    fmpy.extract(both[1], unzipdir=tmp_path)
+    description = fmpy.read_model_description(both[1])
+    fmu = FMU3Slave(
+        guid=description.guid,
+        unzipDirectory=str(tmp_path),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
+    fmu.instantiate()
+    [u] = [v.valueReference for v in description.modelVariables if v.name == "u"]
+    fmu.setFloat64([u], [5.0, 6.0, 7.0])
+    assert fmu.getFloat64([u], nValues=3) == [5.0, 6.0, 7.0]
+    with pytest.raises(fmpy.fmi1.FMICallException, match="status 3"):
+        fmu.setFloat64([u], [8.0])
+    fmu.freeInstance()

@@ -3,7 +3,7 @@
  * Where FMI3_FUNCTION_PREFIX is defined, as the standard has it, it stands before the names of the
  * functions, so that several FMUs can be linked into one program.
  *
- * What co-simulation without events, clocks, arrays and derivatives does not need is not supported,
+ * What co-simulation without events, clocks and derivatives does not need is not supported,
  * and answered with fmi3Error.
  */
 #include "component.h"
@@ -147,18 +147,38 @@ EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_s
     return end(&this);
 }
 
-/* Values. All variables are scalars: there are as many values as references. */
+/* Values. A reference stands for a scalar, or for an array: that of its first element. */
+
+#ifdef ARRAYS
+static size_t span(uint32_t reference) {
+    uint32_t place = reference - FIRST_REFERENCE;
+    return place < N_PORTS ? elements[place] : 1;
+}
+#else
+#define span(reference) ((size_t)1)
+#endif
 
 static string wrong_numbers(size_t n, const uint32_t r[], const void *values, size_t n_values) {
-    return n == n_values ? wrong_values(n, r, values) : "the numbers of values and of references differ";
+    size_t wanted = 0;
+    for (size_t i = 0; i < n; i++) wanted += r == NULL ? 1 : span(r[i]);
+    return wanted == n_values ? wrong_values(n, r, values)
+                              : "the numbers of values and of references differ";
 }
+
+#define FOR_EACH(action)                                                                         \
+    for (size_t i = 0, k = 0; i < n; i++) {                                                      \
+        for (size_t e = 0; e < span(r[i]); e++, k++) {                                           \
+            uint32_t reference = r[i] + (uint32_t)e;                                             \
+            action;                                                                              \
+        }                                                                                        \
+    }
 
 #define GET(name, type, get)                                                                     \
     EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
         call this = begin(handle, #name, MASK_Get);                                              \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
             prepare_to_get(&this, r, n);                                                         \
-            for (size_t i = 0; i < n; i++) v[i] = get(&this, r[i]);                              \
+            FOR_EACH(v[k] = get(&this, reference));                                              \
         }                                                                                        \
         return end(&this);                                                                       \
     }
@@ -169,7 +189,7 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
         call this = begin(handle, #name, MASK_Set);                                              \
         if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
             setting it = begin_setting(&this, type, r, n);                                       \
-            for (size_t i = 0; i < n; i++) set_value(&it, r[i], (double)(number));               \
+            FOR_EACH(set_value(&it, reference, (double)(number)));                               \
             end_setting(&it);                                                                    \
         }                                                                                        \
         return end(&this);                                                                       \
@@ -178,10 +198,18 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
 GET(fmi3GetInt32, int32_t, get_integer)
 GET(fmi3GetBoolean, boolean, get_boolean)
 GET(fmi3GetInt64, int64_t, get_enumeration)
-SET(fmi3SetInt32, int32_t, INTEGER, v[i])
-SET(fmi3SetBoolean, boolean, BOOLEAN, v[i] != 0)
-SET(fmi3SetInt64, int64_t, ENUMERATION, v[i])
+SET(fmi3SetInt32, int32_t, INTEGER, v[k])
+SET(fmi3SetBoolean, boolean, BOOLEAN, v[k] != 0)
+SET(fmi3SetInt64, int64_t, ENUMERATION, v[k])
 
+#ifdef ARRAYS
+static double get_float(call *this, uint32_t reference) {
+    return reference == TIME ? time_of(this) : number_of(this, reference, REAL);
+}
+
+GET(fmi3GetFloat64, double, get_float)
+SET(fmi3SetFloat64, double, REAL, v[k])
+#else
 EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
                                 size_t n_v) {
     call this = begin(handle, "fmi3GetFloat64", MASK_Get);
@@ -202,6 +230,7 @@ EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, cons
     if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(&this, r, n, v);
     return end(&this);
 }
+#endif
 
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
@@ -13,8 +14,9 @@ from fmus.ports.description_fmi3 import (
     fmi3_build_description,
     fmi3_description,
     terminals_and_icons,
+    variables_of,
 )
-from fmus.ports.port import FAULT, Port
+from fmus.ports.port import FAULT, TIME, Array, Port
 
 REAL = ("continuous", "Real")
 PORTS = (
@@ -180,3 +182,23 @@ def test_inputs_are_on_the_left_and_outputs_on_the_right_of_the_icon():
     assert output["x1"] == right
     assert upper["y1"] > lower["y2"]
     assert output["y1"] == -output["y2"]
+
+
+def test_arrays_depend_on_all_that_their_elements_do():
+    arrays = [Array(name, f"The {name}", (2,)) for name in "uy"]
+    ports = (
+        *(Port(f"u.{k}", "input", *REAL, f"The u: {k}", "m", 0.5, array=arrays[0]) for k in "ab"),
+        Port("k", "parameter", "fixed", "Real", "Gain", "1", 1.0),
+        *(
+            Port(f"y.{k}", "output", *REAL, f"The y: {k}", "m", None, feedthrough=of, initially=at,
+                 array=arrays[1])
+            for k, of, at in (("a", ("u.a", "time"), ()), ("b", (), ("u.b",)))
+        ),
+    )  # fmt: skip
+    found = variables_of((*ports, TIME), arrays=True)
+    assert [(it.reference, it.port.name, len(it.elements)) for it in found] == [
+        (1, "u", 2), (3, "k", 1), (4, "y", 2), (6, "time", 1),
+    ]  # fmt: skip
+    assert found[2].port.description == "The y"
+    assert (found[2].port.feedthrough, found[2].port.initially) == (("u", "time"), ())
+    assert [it.port for it in variables_of(ports)] == [replace(one, array=None) for one in ports]
