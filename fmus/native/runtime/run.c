@@ -270,15 +270,15 @@ static double time_of(const call *this) {
     return run->moments[run->now].time;
 }
 
-/* The latest end of a step: a host that adds its steps up reaches a stop time nearly. */
-static double latest_end(double start, double stop) {
-    return stop + ROUNDING * fmax(fabs(start), fabs(stop));
+/* Whether a step ends beyond the stop time, which a host that adds its steps up reaches nearly. */
+static int ends_too_late(double end, double start, double stop) {
+    return end > stop && end > stop + ROUNDING * fmax(fabs(start), fabs(stop));
 }
 
 static void take_step(call *this, double time, double step) {
     instance *it = this->instance;
     message why, said;
-    if (time + step > latest_end(it->run.start_time, it->run.stop_time)) {
+    if (ends_too_late(time + step, it->run.start_time, it->run.stop_time)) {
         compose(&why, "step from %g s to %g s: the stop time is %g s", time, time + step,
                 it->run.stop_time);
         fail(this, &why);
