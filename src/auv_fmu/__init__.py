@@ -31,8 +31,7 @@ module                      what it states
 
 The functions take and return Python floats and tuples and import nothing but the standard
 library, because they run inside FMUs in hosts that may have no numpy. `architecture.md`
-says why that form was chosen, with the measurements. Only `proof.control_point_model`,
-which never runs inside an FMU, uses numpy.
+says why that form was chosen, with the measurements.
 
 Symbols are the paper's: dx and ddx are the first and second time derivative of x, x_hat is its
 estimate, s_z is s(z). lambda_ is lambda, which Python keeps for itself.

@@ -21,7 +21,7 @@ ROOT = Path(__file__).parents[2]
 NAME, FOLDER = "FirstOrderLag", "first_order_lag"
 
 #: What is in that folder.
-WRITTEN = {"__init__.py", "component.py", "page.md"}
+WRITTEN = {"component.py", "page.md"}
 
 #: The component that stays: the fuzzer needs the states of another one.
 OTHER = "fmus.disturbance_generator.component"

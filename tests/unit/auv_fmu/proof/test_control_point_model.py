@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.control_point import control_point_velocity
-from auv_fmu.proof.control_point_model import (
+from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
+from support.control_point_model import (
     C_2,
     D_2,
     G_2,
@@ -26,7 +27,6 @@ from auv_fmu.proof.control_point_model import (
     tau_w2,
     xi,
 )
-from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 VEHICLE, ELL = Vehicle(), 0.35

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from auv_fmu import formation
 from auv_fmu.formation import Estimator, FormationState, Heading, Parameters
-from auv_fmu.proof import formation_bounds
-from auv_fmu.proof.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAIN, Messages
+from support import formation_bounds
+from support.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAIN, Messages
 from support.formations import follow, known, tables
 
 

@@ -12,7 +12,6 @@ from auv_fmu import output_feedback
 from auv_fmu.adaptation import robust_force
 from auv_fmu.attitude import rotation_from_euler
 from auv_fmu.output_feedback import ControllerState, Gains, Measurement
-from auv_fmu.proof.control_point_model import C_2, D_2, M_2, chi_1, chi_2
 from auv_fmu.proof.gain_conditions import (
     Bounds,
     Zetas,
@@ -24,6 +23,7 @@ from auv_fmu.proof.gain_conditions import (
     robust_rate,
 )
 from auv_fmu.vehicle import Vehicle
+from support.control_point_model import C_2, D_2, M_2, chi_1, chi_2
 from support.strategies import angles, lengths, pitch_angles
 
 NO_ZETAS = Zetas(0.0, 0.0)

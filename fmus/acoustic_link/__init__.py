@@ -1,1 +1,0 @@
-"""Messages from one vehicle to another."""

@@ -1,1 +1,0 @@
-"""Fins and propeller that give a commanded force and moments."""

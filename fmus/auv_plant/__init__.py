@@ -1,1 +1,0 @@
-"""The simulated vehicle, its actuators and its localisation system."""

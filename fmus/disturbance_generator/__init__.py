@@ -1,1 +1,0 @@
-"""Friction, waves and ocean currents."""

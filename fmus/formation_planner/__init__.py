@@ -1,1 +1,0 @@
-"""The reference of a vehicle in a formation."""

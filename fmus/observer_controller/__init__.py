@@ -1,1 +1,0 @@
-"""The proposed velocity-free saturated controller."""

@@ -1,1 +1,0 @@
-"""A reference trajectory through waypoints."""

@@ -1,1 +1,0 @@
-"""The REMUS 100: an underwater vehicle with fins and a propeller."""

@@ -1,1 +1,0 @@
-"""Waves and a current at the vehicle."""

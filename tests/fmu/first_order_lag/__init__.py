@@ -1,1 +1,0 @@
-"""A first-order lag, measured with noise."""
