@@ -161,7 +161,7 @@ def test_bounds_are_infinite_where_the_proof_does_not_reach():
 
 def test_page_has_the_gains_and_the_bounds():
     """formation.md: what its tables say of the filter, and of the estimate."""
-    page = (Path(__file__).parents[4] / "docs/explanation/formation.md").read_text("utf-8")
+    page = (Path(__file__).parents[2] / "docs/explanation/formation.md").read_text("utf-8")
     assert f"(1 + 10 exp(-3)) r = {RATE_GAIN:.3f} r" in page
     assert f"| {ACCELERATION_GAIN:.3f} omega r |" in page
     assert f"| {LAG_GAIN:.3f} r / omega |" in page
