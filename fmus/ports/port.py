@@ -129,7 +129,8 @@ class Port:
 
         """
         if type(value) not in _TYPES[self.type]:
-            raise Refusal(f"{self.name} = {value!r:.20}: must be a {self.type}")
+            article = "an" if self.type[0] in "IE" else "a"
+            raise Refusal(f"{self.name} = {value!r:.20}: must be {article} {self.type}")
         if not -_LARGEST <= value <= _LARGEST:
             raise Refusal(f"{self.name} = {value!r:.20}: must be finite")
         if self.type == "Integer" and not is_int32(value):

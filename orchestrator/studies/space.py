@@ -30,12 +30,20 @@ from orchestrator.studies.study import (
 )
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value, is_finite, literal, type_of, typed, unit_of
+from orchestrator.system.values import (
+    Value,
+    is_finite,
+    literal,
+    named,
+    type_of,
+    typed,
+    unit_of,
+)
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
 
 #: Types of values by the types of FMI's variables.
-_TYPES = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bool, "String": str}
+_TYPES = {"Real": float, "Integer": int, "Enumeration": str, "Boolean": bool, "String": str}
 
 
 class Space:
@@ -211,9 +219,10 @@ class _Known:
         return units.pop() if len(units) == 1 else ""
 
     def typed(self, name: str, value: Any) -> Value:
-        """A value in its type."""
+        """A value in its type; that of an Enumeration by its name."""
         if name != STEP:
-            return typed(name, self._variable(name), value)
+            variable = self._variable(name)
+            return named(variable, typed(name, variable, value))
         if not is_finite(value):
             raise InputError(f"{STEP} = {shortened(repr(value))}: not a number of seconds")
         return float(value)

@@ -526,7 +526,7 @@ def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
         (("state", 6, 3), 99, "99 is not of type Mode"),
         (("state", 6, 1), -1, "count = -1"),
         (("inputs", 8), -6, "k = -6: must be at least -5"),
-        (("inputs", 8), 1.0, "k = 1.0: must be a Integer"),
+        (("inputs", 8), 1.0, "k = 1.0: must be an Integer"),
         (("inputs", 9), 1, "go = 1: must be a Boolean"),
         (("inputs", 12), 1, "want = 1: use one of 0, 2, -7"),
         (("parameters", "mode"), "COLD", "mode = 'COLD': use one of off, heat, cool"),

@@ -10,7 +10,9 @@ from auv_fmu import Refusal, path_planner
 from auv_fmu.path_planner import Parameters, Waypoints
 from fmus.path_planner.component import check_state, start, update
 
-paths = st.builds(Waypoints, timed=st.booleans(), rounding=st.floats(0.5, 40.0))
+paths = st.builds(
+    lambda **values: Waypoints(**values), timed=st.booleans(), rounding=st.floats(0.5, 40.0)
+)  # what is not given keeps its start value
 
 
 @given(paths, st.floats(-10.0, 10.0), st.lists(st.floats(-20.0, 40.0), max_size=20))

@@ -247,7 +247,7 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         ),
         ("input", (Annotated[float, METRES], "x"), "starts with p = 'x': must be a Real"),
         ("input", (Annotated[float, METRES], None), None),
-        ("input", (Annotated[int, PLAIN], 1.5), "starts with p = 1.5: must be a Integer"),
+        ("input", (Annotated[int, PLAIN], 1.5), "starts with p = 1.5: must be an Integer"),
         ("input", (Annotated[float, METRES], float("nan")), "starts with p = nan: must be finite"),
         (
             "parameter",

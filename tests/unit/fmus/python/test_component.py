@@ -92,8 +92,8 @@ def test_infinities_that_cancel_are_found():
         ("ObserverController", "eps_t", 0.0),
         ("AuvPlant", "actuator__T__u", -0.1),
         ("AuvPlant", "current__x", nan),
-        ("ObserverController", "saturation", "sigmoid"),
-        ("ObserverController", "observer", "kalman"),
+        ("ObserverController", "saturation", 4),
+        ("ObserverController", "observer", -1),
         ("ObserverController", "k_d", -50.0),
         ("DisturbanceGenerator", "omega_d", nan),
         ("PdController", "sigma", -1.0),
@@ -152,10 +152,9 @@ def test_outputs_and_fixed_parameters_cannot_be_set_during_the_run(driver):
 def test_integers_and_truth_values_can_be_read_as_numbers(driver):
     """There are hosts that read all outputs with fmi2GetReal."""
     for reference, port in enumerate(driver.ports):
-        if port.type != "String":
-            [number] = driver.slave.get_real([reference])
-            assert type(number) is float
-            assert number == driver.get(port.name)
+        [number] = driver.slave.get_real([reference])
+        assert type(number) is float
+        assert number == driver.get(port.name)
     driver.slave.do_step(0.0, -1.0)
     fault = [port.name for port in driver.ports].index("fault")
     assert driver.slave.get_real([0, fault])[1] == 1.0
@@ -519,11 +518,6 @@ def test_step_of_half_an_eternity_is_refused():
     driver = ClassInstance("MotionPlanner")
     assert not driver.step(1e9)
     assert "h_max" in driver.messages()[0]
-
-
-def test_message_with_a_percent_sign_is_no_format_for_the_host():
-    driver = ClassInstance("ObserverController", saturation="%s%n")
-    assert "%%s%%n" in driver.messages()[0]
 
 
 def test_numbers_that_overflow_are_refused_and_the_state_is_kept():

@@ -30,6 +30,7 @@ from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.system.names import port_name
+from orchestrator.system.values import named
 from orchestrator.vehicle.signals import STANDARD, tracking_error
 from support.tables import table_of
 from support.variants import (
@@ -307,6 +308,7 @@ def test_every_option_changes_the_system(scenario, option):
     """Each parameter is there, takes the value, and has another one in the scenario."""
     system = prepare(*load_scenario(scenario), Request()).system
     for name, value in option.parameters.items():
-        assert system.value(port_name(name)) != value
         changed = system.with_parameters({port_name(name): value})
-        assert changed.value(port_name(name)) == value
+        variable = system.component(port_name(name).component).variable(port_name(name).port)
+        assert changed.value(port_name(name)) != system.value(port_name(name))
+        assert named(variable, changed.value(port_name(name))) == value

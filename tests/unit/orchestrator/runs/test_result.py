@@ -211,7 +211,7 @@ def test_parameters_are_a_mapping_by_text(result):
 
 
 def test_repr_is_one_line_and_tells_a_failure(result):
-    assert repr(result) == "<Result fig4: 6 rows of 106 columns, 0 to 0.1 s, gauss-seidel>"
+    assert repr(result) == "<Result fig4: 6 rows of 106 columns, 0 to 0.1 s, feedthrough>"
     failed = simulate("fig4", {"plant.d11": 1e4})
     assert failed.failure is not None
     assert failed.failure in repr(failed)

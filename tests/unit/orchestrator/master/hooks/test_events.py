@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import operator
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -87,6 +88,9 @@ class Trial:
             made=0,
             time=0.0,
             happened=[],
+            ahead=nullcontext,
+            passing=None,
+            refresh=lambda name: None,
         )
         self.due = 0
 

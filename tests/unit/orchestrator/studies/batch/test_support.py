@@ -6,6 +6,7 @@ import pytest
 
 from auv_fmu import allocation, remus100
 from auv_fmu.closed_loop import PAPER
+from auv_fmu.saturation import Saturation
 from auv_fmu.sea import Sea, regular_waves
 from auv_fmu.tail import Tail
 from auv_fmu.waves import Spectrum, Waves
@@ -30,7 +31,7 @@ def test_each_value_comes_to_its_component_alone():
         "plant.ell": 0.5,
         "planner.m11": 20.0,
         "controller.theta_0[2]": 3.0,
-        "controller.saturation": "algebraic",
+        "controller.saturation": Saturation.ALGEBRAIC.value,
         "planner.h_max": 0.01,
     }
     setting = setting_of(FMUS, {port_name(k): v for k, v in values.items()}, 0.04)
@@ -56,7 +57,7 @@ def test_values_of_other_blocks_come_to_their_places():
         "allocation.fin.max": 0.3,
         "planner.waypoint[2].y": 7.0,
         "planner.timed": True,
-        "sea.waves.spectrum": "none",
+        "sea.waves.spectrum": Spectrum.NONE.value,
         "sea.depth": 20.0,
     }
     setting = setting_of(fmus, {port_name(k): v for k, v in values.items()}, 0.02)
@@ -90,9 +91,9 @@ def test_values_that_do_not_fit_are_refused_as_the_fmu_does(fmu, name, value, wh
         setting_of({**FMUS, name.component: fmu}, {name: value}, 0.02)
 
 
-def test_text_that_is_no_choice_is_refused_as_the_fmu_does():
-    with pytest.raises(InputError, match="controller: saturation = 'x': use one of tanh, alge"):
-        setting_of(FMUS, {port_name("controller.saturation"): "x"}, 0.02)
+def test_number_that_is_no_choice_is_refused_as_the_fmu_does():
+    with pytest.raises(InputError, match=r"controller: saturation = 7: use one of 0 \(tanh\), 1"):
+        setting_of(FMUS, {port_name("controller.saturation"): 7}, 0.02)
 
 
 def test_water_moves_and_does_not_speed_up():
