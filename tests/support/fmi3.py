@@ -7,8 +7,20 @@ of FMI 2.0 is tried on one of FMI 3.0 by the same tests.
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from ctypes import CDLL, byref, c_bool, c_char_p, c_double, c_int, c_size_t, c_uint8, c_void_p
+from collections.abc import Callable, Container
+from ctypes import (
+    CDLL,
+    byref,
+    c_bool,
+    c_char_p,
+    c_double,
+    c_int,
+    c_int64,
+    c_size_t,
+    c_uint,
+    c_uint8,
+    c_void_p,
+)
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -21,7 +33,10 @@ from support.status_table import names_in_fmi3
 
 Logger = ctypes.CFUNCTYPE(None, c_void_p, c_int, c_char_p, c_char_p)
 
-_KINDS = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean", "String": "String"}
+_KINDS = {
+    "Float64": "Real", "Int32": "Integer", "Enumeration": "Integer",
+    "Boolean": "Boolean", "String": "String",
+}  # fmt: skip
 
 #: Start time, whether there is a stop time, and which, as fmi2SetupExperiment takes them.
 _NO_EXPERIMENT = (0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
@@ -59,14 +74,19 @@ class Fmi3Library(Library):
             getattr(self.own, f"fmi3Instantiate{name}").restype = c_void_p
         self.own.fmi3FreeInstance.restype = None
         self.own.fmi3GetVersion.restype = c_char_p
-        self.functions: Any = _Functions(self.own)
+        root = ElementTree.parse(folder / "modelDescription.xml")
+        enumerations = root.iterfind("ModelVariables/Enumeration")
+        self.functions: Any = _Functions(
+            self.own, {int(one.attrib["valueReference"]) for one in enumerations}
+        )
 
 
 class _Functions:
     """Has fmi2DoStep and the others as attributes."""
 
-    def __init__(self, library: CDLL) -> None:
+    def __init__(self, library: CDLL, enumerations: Container[int]) -> None:
         self._library = library
+        self._enumerations = enumerations
         self._loggers: list[Any] = []
         self._experiments: dict[Any, tuple[Any, ...]] = {}
 
@@ -134,9 +154,38 @@ class _Functions:
             values[i] = got[i]
         return status
 
+    # An enumeration has its own functions, of another type of C.
+
+    def fmi2SetInteger(self, component: c_void_p, references: Any, n: c_size_t, values: Any) -> int:
+        return self._integers("Set", component, references, n, values)
+
+    def fmi2GetInteger(self, component: c_void_p, references: Any, n: c_size_t, values: Any) -> int:
+        return self._integers("Get", component, references, n, values)
+
+    def _integers(
+        self, verb: str, component: c_void_p, references: Any, n: c_size_t, values: Any
+    ) -> int:
+        """Call the function of integers, and that of enumerations for what is one."""
+        wide = [i for i, one in enumerate(references or ()) if one in self._enumerations]
+        if values is None or not wide or len(references) != n.value:
+            function = getattr(self._library, f"fmi3{verb}Int32")
+            return int(function(component, references, n, values, n))
+        narrow = [i for i in range(n.value) if i not in wide]
+        worst = 0
+        for kind, c_type, places in (("Int64", c_int64, wide), ("Int32", c_int, narrow)):
+            m = len(places)
+            some = (c_type * m)(*(values[i] for i in places))
+            numbers = (c_uint * m)(*(references[i] for i in places))
+            function = getattr(self._library, f"fmi3{verb}{kind}")
+            if m:
+                worst = max(worst, function(component, numbers, c_size_t(m), some, c_size_t(m)))
+            for i, value in zip(places, some, strict=True):
+                values[i] = value
+        return worst
+
     def __getattr__(self, name: str) -> Callable[..., int]:
         function = getattr(self._library, names_in_fmi3()[name])
-        if name.endswith(("Real", "Integer", "String")):
+        if name.endswith(("Real", "String")):
             return lambda component, references, n, values: function(
                 component, references, n, values, n
             )

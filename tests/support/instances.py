@@ -35,11 +35,16 @@ def answers_of(slave: Component) -> list[Fmi2Status]:
 
 
 class Variable(NamedTuple):
-    """What a host knows of a port."""
+    """What a host knows of a port; its type has functions of its own."""
 
     reference: int
     type: str
     causality: str
+
+
+def _variable(reference: int, fmi_type: str, causality: str) -> Variable:
+    # Enumerations have the functions of integers.
+    return Variable(reference, fmi_type.replace("Enumeration", "Integer"), causality)
 
 
 class Instance(ABC):
@@ -117,7 +122,7 @@ class ClassInstance(Instance):
         self.ports = self.slave._store.ports
         super().__init__(
             {
-                port.name: Variable(reference, port.type, port.causality)
+                port.name: _variable(reference, port.type, port.causality)
                 for reference, port in enumerate(self.ports)
             }
         )
@@ -151,7 +156,7 @@ class FmuInstance(Instance):
         self.description = fmpy.read_model_description(folder)
         super().__init__(
             {
-                variable.name: Variable(variable.valueReference, variable.type, variable.causality)
+                variable.name: _variable(variable.valueReference, variable.type, variable.causality)
                 for variable in self.description.modelVariables
             }
         )

@@ -43,6 +43,7 @@ class Status(IntEnum):
 
 
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
+#: Types that have functions of their own; enumerations have those of integers.
 TYPES = ("Real", "Integer", "Boolean", "String")
 TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
 
@@ -170,8 +171,9 @@ def description_in(root: ElementTree.Element, kind: str) -> Description:
 
 
 def _variable(element: ElementTree.Element) -> Variable:
-    [value] = [child for child in element if child.tag in TYPES]
-    return variable(element, value.tag, value, value.get("start"))
+    [value] = [child for child in element if child.tag in (*TYPES, "Enumeration")]
+    fmi_type = "Integer" if value.tag == "Enumeration" else value.tag
+    return variable(element, fmi_type, value, value.get("start"))
 
 
 def variable(
