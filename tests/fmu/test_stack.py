@@ -94,7 +94,7 @@ _PLAIN = {"inputs": "float", "outputs": "float", "parameters": "float", "start":
           "state": "Vector, 1"}  # fmt: skip
 
 _START = """\
-def start() -> State:
+def start(parameters: Parameters, inputs: Inputs) -> State:
     \"\"\"State at the start.\"\"\"
     return State(Vector(0.0 for _ in range({n})))
 
@@ -164,7 +164,7 @@ def outputs(derived: Annotated[Matrix, 4, N]) -> Outputs:
     "a product of matrices": (
         {"state": "Matrix, N, N"},
         """\
-def start() -> State:
+def start(parameters: Parameters, inputs: Inputs) -> State:
     \"\"\"State at the start.\"\"\"
     return State(Matrix((0.001 for _ in range(N)) for _ in range(N)))
 
