@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
-from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import attrs
@@ -45,11 +43,6 @@ SAID = (
 ITS_OWN = {"instantiationToken", "generationTool", "buildConfigurations"}
 
 
-def declared(name: str) -> ModuleType:
-    """The ports of a component, and what it is."""
-    return import_module(f"{components()[name]}.ports")
-
-
 def everything(description: ModelDescription) -> dict[str, Any]:
     """All that a host reads, without what depends on the layout of the file."""
     return attrs.asdict(description, filter=lambda field, _: field.name != "sourceline")
@@ -73,7 +66,7 @@ def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
     path = written(tmp_path_factory.mktemp("fmi3"), fmi3_description, name)
     for file, content in (
         ("sources/buildDescription.xml", fmi3_build_description(name)),
-        ("terminalsAndIcons/terminalsAndIcons.xml", terminals_and_icons(declared(name).PORTS)),
+        ("terminalsAndIcons/terminalsAndIcons.xml", terminals_and_icons(ports_of(name))),
     ):
         (path / file).parent.mkdir()
         (path / file).write_bytes(content)
@@ -94,7 +87,7 @@ def test_descriptions_are_valid(fmi2: Path, fmi3: Path):
 
 def test_both_kinds_say_the_same(python: ModelDescription, fmi2: Path):
     one, other = everything(python), everything(read_model_description(str(fmi2)))
-    assert len(one["modelVariables"]) == len(declared(python.modelName).PORTS) + 1
+    assert len(one["modelVariables"]) == len(ports_of(python.modelName)) + 1
     for variable, twin in zip(one["modelVariables"], other["modelVariables"], strict=True):
         assert variable == twin
     assert other.keys() == one.keys()
@@ -164,14 +157,14 @@ def test_only_what_names_the_time_depends_on_it(fmi3: Path):
         for unknown in (*description.outputs, *description.initialUnknowns)
         if "time" in {known.name for known in unknown.dependencies}
     }
-    ports = declared(description.modelName).PORTS
+    ports = ports_of(description.modelName)
     assert found == {group_name(port.name) for port in ports if TIME.name in port.feedthrough}
     assert (found == {"tau_w"}) == (description.modelName == "DisturbanceGenerator")
 
 
 def terminals(name: str) -> dict[str, tuple[str, dict[str, str]]]:
     """The rule of each terminal of a component, and the variables of its members."""
-    root = etree.fromstring(terminals_and_icons(declared(name).PORTS))
+    root = etree.fromstring(terminals_and_icons(ports_of(name)))
     etree.XMLSchema(file=str(SCHEMA)).assertValid(root)
     return {
         terminal.get("name"): (
@@ -220,7 +213,7 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
     assert fed == {
         (component, port.name)
         for component, name in components_of.items()
-        for port in declared(name).PORTS
+        for port in ports_of(name)
         if port.causality == "input" and f"{component}.{group_name(port.name)}" in wires
     }
 

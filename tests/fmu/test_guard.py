@@ -292,7 +292,7 @@ REFUSED = [
     ),
     *(
         (ERROR, lambda host, name=name, value=value: put(host, name, value))
-        for name, value in (("tau.u", 1.0), ("h_max", 1.0), ("saturation", b"sigmoid"))
+        for name, value in (("tau.u", 1.0), ("h_max", 1.0), ("saturation", 1))
     ),
     (Status.Discard, lambda host: host.step(0.0, -1.0)),
     (ERROR, lambda host: host.get("Real", [UNKNOWN])[0]),

@@ -58,8 +58,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu import Variable
+from auv_fmu import Matrix, Variable, Vector
 
 N = {n}
 
@@ -94,10 +93,17 @@ class State(NamedTuple):
 _PLAIN = {"inputs": "float", "outputs": "float", "parameters": "float", "start": "0.0",
           "state": "Vector, 1"}  # fmt: skip
 
-_BEGIN = """\
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    \"\"\"At the start.\"\"\"
-    return State(Vector(0.0 for _ in range({n}))), Outputs(0.0)
+_START = """\
+def start(parameters: Parameters, inputs: Inputs) -> State:
+    \"\"\"State at the start.\"\"\"
+    return State(Vector(0.0 for _ in range({n})))
+
+
+"""
+_UPDATE = """\
+def update(state: State) -> State:
+    \"\"\"State after a step.\"\"\"
+    return state
 
 
 """
@@ -106,82 +112,82 @@ def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
 LARGE = {
     "additions": (
         {},
-        _BEGIN.replace("{n}", "1")
+        _START.replace("{n}", "1")
+        + _UPDATE
         + """\
-def advance(state: State, inputs: Inputs) -> tuple[State, Outputs]:
-    \"\"\"A step.\"\"\"
+def outputs(inputs: Inputs) -> Outputs:
+    \"\"\"What is seen.\"\"\"
     a = Vector(inputs.u for _ in range(N))
     b = a + a + a + a + a + a + a + a + a
-    return state, Outputs(b[0])
+    return Outputs(b[0])
 """,
     ),
     "a Runge-Kutta scheme": (
         {"state": "Vector, N"},
-        _BEGIN.replace("{n}", "N")
+        _START.replace("{n}", "N")
         + """\
 def _rate(x: Annotated[Vector, N], u: float) -> Annotated[Vector, N]:
     \"\"\"Of the state.\"\"\"
     return Vector(u - y for y in x)
 
 
-def advance(state: State, inputs: Inputs, h: float) -> tuple[State, Outputs]:
-    \"\"\"A step.\"\"\"
+def update(state: State, inputs: Inputs, h: float) -> State:
+    \"\"\"State after a step.\"\"\"
     x = state.x
     k1 = _rate(x, inputs.u)
     k2 = _rate(x + 0.5 * h * k1, inputs.u)
     k3 = _rate(x + 0.5 * h * k2, inputs.u)
     k4 = _rate(x + h * k3, inputs.u)
-    x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-    return State(x), Outputs(x[0])
+    return State(x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+
+
+def outputs(state: State) -> Outputs:
+    \"\"\"What is seen.\"\"\"
+    return Outputs(state.x[0])
 """,
     ),
     "what is derived": (
         {},
-        """\
+        _START.replace("{n}", "1")
+        + _UPDATE
+        + """\
 def derive(state: State) -> Annotated[Matrix, 4, N]:
     \"\"\"From the state.\"\"\"
     return Matrix((state.x[0] + float(i + j) for j in range(N)) for i in range(4))
 
 
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Annotated[Matrix, 4, N], Outputs]:
-    \"\"\"At the start.\"\"\"
-    state = State(Vector((1.0,)))
-    return state, derive(state), Outputs(0.0)
-
-
-def advance(
-    state: State, derived: Annotated[Matrix, 4, N]
-) -> tuple[State, Annotated[Matrix, 4, N], Outputs]:
-    \"\"\"A step.\"\"\"
-    return state, derive(state), Outputs(derived[0][1])
+def outputs(derived: Annotated[Matrix, 4, N]) -> Outputs:
+    \"\"\"What is seen.\"\"\"
+    return Outputs(derived[0][1])
 """,
     ),
     "a product of matrices": (
         {"state": "Matrix, N, N"},
         """\
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    \"\"\"At the start.\"\"\"
-    return State(Matrix((0.001 for _ in range(N)) for _ in range(N))), Outputs(0.0)
+def start(parameters: Parameters, inputs: Inputs) -> State:
+    \"\"\"State at the start.\"\"\"
+    return State(Matrix((0.001 for _ in range(N)) for _ in range(N)))
 
 
-def advance(state: State) -> tuple[State, Outputs]:
-    \"\"\"A step.\"\"\"
-    x = state.x @ state.x + state.x.T
-    return State(0.5 * x), Outputs(x[0][0])
+def update(state: State) -> State:
+    \"\"\"State after a step.\"\"\"
+    return State(0.5 * (state.x @ state.x + state.x.T))
+
+
+def outputs(state: State) -> Outputs:
+    \"\"\"What is seen.\"\"\"
+    return Outputs(state.x[0][0])
 """,
     ),
     "ports": (
         {"inputs": "Vector, N", "outputs": "Vector, N", "parameters": "Vector, N",
          "start": "Vector(0.0 for _ in range(N))"},
-        """\
-def begin(parameters: Parameters, inputs: Inputs) -> tuple[State, Outputs]:
-    \"\"\"At the start.\"\"\"
-    return State(Vector((0.0,))), Outputs(parameters.p + inputs.u)
-
-
-def advance(parameters: Parameters, state: State, inputs: Inputs) -> tuple[State, Outputs]:
-    \"\"\"A step.\"\"\"
-    return state, Outputs(parameters.p + inputs.u + state.x[0] * inputs.u)
+        _START.replace("{n}", "1")
+        + _UPDATE
+        + """\
+def outputs(parameters: Parameters, state: State, inputs: Inputs) -> Outputs:
+    \"\"\"What is seen.\"\"\"
+    return Outputs(parameters.p + inputs.u + state.x[0] * inputs.u)
 """,
     ),
 }  # fmt: skip
