@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double
 from functools import partial
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
@@ -33,6 +33,7 @@ from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
 from orchestrator.system.names import PortName
+from orchestrator.system.values import TYPES
 
 
 class Member(NamedTuple):
@@ -48,6 +49,7 @@ class StageCall:
     """Takes the place of an instance in a stage that acts but steps no component."""
 
     name, is_here = "", True
+    get_outputs: ClassVar[list[Callable[[], int]]] = []
 
     def __init__(self, act: Callable[[float, float], object]) -> None:
         """Do something in every step.
@@ -227,6 +229,7 @@ def _passing_first(
         name: [port for port in ports if components[name].has_feedthrough(port.port)]
         for name, ports in outputs.items()
     }
+    reads = {name: _reads(instances[name], component) for name, component in components.items()}
     ringed = {name for ring in rings for name in ring.names}
     passing: list[Stage] = []
     for names, connections in zip(sequence, gathers, strict=True):
@@ -234,12 +237,12 @@ def _passing_first(
             [one for one in connections if one.target.component not in ringed], decimation, row
         )
         through = [name for name in names if direct[name] and name not in ringed]
-        fast = [_passed(instances[name]) for name in through if decimation[name] == 1]
+        fast = [_passed(instances[name], reads[name]) for name in through if decimation[name] == 1]
         passing += [*slow, Stage(gathering, fast)]
         for name in through:
             if (n := decimation[name]) > 1:
                 passing += [
-                    Stage(nothing, [_passed(instances[name])], Decimation(n)),
+                    Stage(nothing, [_passed(instances[name], reads[name])], Decimation(n)),
                     Stage(Gathering(*row.hidden(direct[name])), [], Decimation(n)),
                 ]
         passing += [
@@ -248,7 +251,6 @@ def _passing_first(
             if ring.names[0] in names
         ]
     place = {name: i for i, names in enumerate(sequence) for name in names}
-    # What passes is read there, and before only where something takes it before.
     early = {
         one.source.component
         for one in plan.system.connections
@@ -259,9 +261,10 @@ def _passing_first(
     for n in sorted(set(decimation.values())):
         here = [name for name in place if decimation[name] == n]
         members = [
-            _stepped(instances[name], name in early or n > 1) if direct[name] else whole
+            _stepped(instances[name], reads[name], name in early or n > 1)
+            if direct[name]
+            else member(instances[name])
             for name in here
-            for whole in [member(instances[name])]
         ]
         stepping.append(Stage(nothing, members, Decimation(n) if n > 1 else None))
         if n > 1:
@@ -301,16 +304,48 @@ def member(instance: Instance) -> Member:
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
-def _passed(instance: Instance) -> Member:
+class Reads(NamedTuple):
+    """The calls that read the outputs of a component, each all of a type.
+
+    Attributes:
+        direct: of a type that has outputs with direct feedthrough.
+        states: of one that has others.
+
+    """
+
+    direct: list[Callable[[], int]]
+    states: list[Callable[[], int]]
+
+
+def _reads(instance: Instance, component: Component) -> Reads:
+    """How the outputs of a component are read."""
+    calls = instance.get_outputs
+    if not instance.is_here:
+        # The answer of another process has to be taken.
+        return Reads(calls, calls)
+    outputs = component.having("output")
+    types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
+    kinds = {(one.type, component.has_feedthrough(one.name)) for one in outputs}
+    return Reads(
+        *(
+            [call for call, of in zip(calls, types, strict=True) if (of, is_direct) in kinds]
+            for is_direct in (True, False)
+        )
+    )
+
+
+def _passed(instance: Instance, reads: Reads) -> Member:
     """The calls that let values pass through an instance."""
-    return Member(instance.set_inputs, instance.do_exchange, instance.get_outputs, instance)
+    return Member(instance.set_inputs, instance.do_exchange, reads.direct, instance)
 
 
-def _stepped(instance: Instance, is_read: bool) -> Member:
-    """The calls that step an instance which has its inputs already."""
-    # The answer of another process has to be taken.
-    outputs = instance.get_outputs if is_read or not instance.is_here else []
-    return Member([], instance.do_step, outputs, instance)
+def _stepped(instance: Instance, reads: Reads, is_early: bool) -> Member:
+    """The calls that step an instance which has its inputs already.
+
+    What is read when values pass is read before only if something takes it before.
+    """
+    outputs = [call for call in reads.states if is_early or call not in reads.direct]
+    return Member([], instance.do_step, outputs if instance.is_here else reads.states, instance)
 
 
 def make_stages(

@@ -17,7 +17,7 @@ from orchestrator.machine.children import compile_library, find_compiler, find_f
 from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.fmi.instance import CALLS
-from orchestrator.master.fmi.transfer import CMember
+from orchestrator.master.fmi.transfer import CMember, CMove
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import CBlock
 from orchestrator.master.schedule import Decimation, Member, Stage
@@ -145,7 +145,11 @@ def _pointers(member: Member) -> CMember:
     if member.do_step is None:
         pointers.do_step = None
     pointers.n_inputs *= bool(member.set_inputs)
-    pointers.n_outputs *= bool(member.get_outputs)
+    known, reads = member.instance.get_outputs, member.get_outputs
+    pointers.n_outputs = len(reads)
+    pointers.outputs = (CMove * len(reads))(
+        *(pointers.outputs[known.index(call)] for call in reads)
+    )
     return pointers
 
 
