@@ -45,6 +45,9 @@ EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
 }
 
 
+#: Tools that do not set parameters of a type.
+_LEAVING = {"Enumeration": "libcosim and ecos", "String": "OMSimulator and others"}
+
 #: Options of `verify` that are for a table only.
 _OF_TABLES = ("scenario", "step", "order", "initial", "events", "set")
 
@@ -208,16 +211,12 @@ def _export(options: argparse.Namespace) -> int:
     )
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
-    texts = [
-        str(name)
-        for name, value in system.parameters.items()
-        if isinstance(value, str) and value != system.component(name.component).start(name.port)
-    ]
-    if texts and options.format == "ssp":
-        say(
-            f"warning: {listed(texts)}: parameters of type String, which some tools, such as "
-            "OMSimulator, leave as they are in the FMU"
-        )
+    for family, tools in _LEAVING.items():
+        if options.format == "ssp" and (names := [*map(str, system.changed(family))]):
+            say(
+                f"warning: {listed(names)}: parameters of type {family}, which {tools} "
+                "leave as they are in the FMU"
+            )
     folder = options.out or Path("exports", prepared.scenario.stem)
     write = EXPORT_FORMATS[options.format]
     of_ssp = {name: getattr(options, name) for name in ("flat", "connectors")}
@@ -257,7 +256,7 @@ def _hosts(options: argparse.Namespace) -> int:
         host = HOSTS[verdict.host]
         said = verdict.failure
         if said is None:
-            order = f"{host.initial}: {host.order}"
+            order = f"{host.initial}: {host.order}{', after' if host.turned else ''}"
             microseconds = 1e6 / verdict.steps_per_second
             note = "" if verdict.agrees else f", above {BOUND:g}"
             said = f"{order:42} {verdict.deviation:9.1e} {microseconds:8.1f}  {verdict.port}{note}"

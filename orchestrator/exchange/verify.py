@@ -6,6 +6,7 @@ from array import array
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
+from math import inf
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,6 +23,7 @@ from orchestrator.formats.tables import (
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import (
     DELAY,
+    FEEDTHROUGH,
     FULL,
     NONE,
     ORDERS,
@@ -33,7 +35,8 @@ from orchestrator.master.experiment import (
     format_order,
 )
 from orchestrator.master.hooks.events import Event, Events
-from orchestrator.master.observers.observer import Ending, Header
+from orchestrator.master.hooks.hook import Hook, Run
+from orchestrator.master.observers.observer import Ending, Header, Observer
 from orchestrator.master.plan import check_order, make_plan
 from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.preparation import DEFAULT_STEP
@@ -64,6 +67,7 @@ class Algorithm(NamedTuple):
         coupling: how its rings are closed.
         exchange: of values.
         words: for it.
+        turned: whether outputs are read on the other side of the exchange of values than we do.
 
     """
 
@@ -71,6 +75,59 @@ class Algorithm(NamedTuple):
     coupling: str | None
     exchange: Exchange
     words: str
+    turned: bool = False
+
+    def turn(self) -> Algorithm:
+        """The same with outputs read on the other side."""
+        side = "before" if self.order == FEEDTHROUGH else "after"
+        words = f"{self.words}, outputs read {side} values are passed on"
+        return self._replace(words=words, turned=True)
+
+    def run(self, system: System, experiment: Experiment, observer: Observer, *hooks: Hook) -> None:
+        """Run a system this way.
+
+        Raises:
+            InputError: it cannot be run to its end.
+
+        """
+        experiment = replace(experiment, order=self.order, coupling=self.coupling)
+        plan = make_plan(system, experiment)
+        if self.turned:
+            turned = _Turned(observer)
+            observer, hooks = turned, (*hooks, turned)
+        simulate_to_end(plan, [observer], self.exchange, hooks)
+
+
+class _Turned:
+    """Gives an observer the rows of a tool that reads outputs on the other side of the exchange.
+
+    In feedthrough order we read them after values were passed on, in the others before. It reads
+    them again between two steps, as a hook, and leaves the row as it was.
+    """
+
+    def __init__(self, observer: Observer) -> None:
+        self._observer = observer
+        self.begin, self.end = observer.begin, observer.end
+
+    def take(self, rows: np.ndarray) -> None:
+        """Pass over our own rows."""
+
+    def act(self, run: Run) -> int:
+        """Give the row of now."""
+        row, before = run.row, run.row.values.copy()
+        if run.passing is None:
+            for name in run.instances:
+                run.overrides.refresh(name)
+            for instance in run.instances.values():
+                instance.exchange()
+        else:
+            for name, component in run.system.components.items():
+                outputs = [variable.name for variable in component.having("output")]
+                held = run.instances[name].read(outputs)
+                row.enter({PortName(name, port): value for port, value in held.items()})
+        self._observer.take(np.array([[run.time, *row.shown]]))
+        row.values[:] = before
+        return run.made + 1
 
 
 def verify(
@@ -136,12 +193,19 @@ def verify(
     step = DEFAULT_STEP if system.step is None else system.step
     experiment = Experiment(float(table.time[-1]), step, start_time=start)
     complaints = []
-    for way in algorithms:
-        complaint = _complaint(table, system, experiment, events, way, tolerance)
-        if complaint is None:
-            return "\n".join(_certificate(table, start, system, outputs, way, tolerance, verbose))
-        complaints.append(f"{way.words} {complaint}")
-    raise InputError(f"{path}: {'; '.join(complaints)}")
+    # Most tools read outputs where we do.
+    for turned in (False, True):
+        for way in algorithms:
+            way = way.turn() if turned else way
+            complaint = _complaint(table, system, experiment, events, way, tolerance)
+            if complaint is None:
+                said = _certificate(table, start, system, outputs, way, tolerance, verbose)
+                return "\n".join(said)
+            complaints.append(complaint)
+    # Of each pair the one that agrees for longer, which is the likelier one.
+    n = len(algorithms)
+    likelier = (max(pair) for pair in zip(complaints[:n], complaints[n:], strict=True))
+    raise InputError(f"{path}: {'; '.join(text for _, text in likelier)}")
 
 
 def _of_one(system: System, outputs: Collection[str], columns: Sequence[str]) -> str:
@@ -204,18 +268,17 @@ def _complaint(
     events: Sequence[Event],
     way: Algorithm,
     tolerance: float,
-) -> str | None:
-    """What is wrong with a table, seen from our own run; None: nothing."""
+) -> tuple[float, str] | None:
+    """Until when a table agrees with our own run, and what is wrong then; None: nothing is."""
     ours = _Samples(table.time, tuple(table.columns))
     try:
-        experiment = replace(experiment, order=way.order, coupling=way.coupling)
-        hooks = [Events(events)] if events else []
-        simulate_to_end(make_plan(system, experiment), [ours], way.exchange, hooks)
+        way.run(system, experiment, ours, *([Events(events)] if events else []))
     except InputError as error:
-        return f"our own run fails: {error}"
+        return -inf, f"{way.words} our own run fails: {error}"
     # What is shown before the first step depends on how a tool exchanges initial values.
     after = table.time > experiment.start_time
-    return _first_difference(table.time, table.columns, ours.values, tolerance, after)
+    difference = _first_difference(table.time, table.columns, ours.values, tolerance, after)
+    return difference and (difference[0], f"{way.words} {difference[1]}")
 
 
 class _Samples:
@@ -262,7 +325,7 @@ def _first_difference(
     ours: np.ndarray,
     tolerance: float,
     compared: np.ndarray,
-) -> str | None:
+) -> tuple[float, str] | None:
     first: tuple[float, str, float, float] | None = None
     for (name, column), expected in zip(columns.items(), ours.T, strict=True):
         accepted = tolerance * max(1.0, float(np.abs(expected).max()))
@@ -275,7 +338,7 @@ def _first_difference(
     if first is None:
         return None
     t, name, theirs, mine = first
-    return f"{name} differs first, at t = {t:g} s: {theirs:.9g} instead of {mine:.9g}"
+    return t, f"{name} differs first, at t = {t:g} s: {theirs:.9g} instead of {mine:.9g}"
 
 
 def _certificate(

@@ -21,7 +21,7 @@ from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import check_file, is_folder, read_archive
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, file_name, plain_file_names
+from orchestrator.system.names import PortName, file_name, listed, plain_file_names
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
@@ -58,6 +58,11 @@ def write_osp(system: System, folder: Path) -> list[Path]:
             raise InputError(
                 f"{connection.source} -> {connection.target}: is transformed; write an SSP"
             )
+    if choices := [*map(str, system.changed("Enumeration"))]:
+        raise InputError(
+            f"{listed(choices)}: libcosim sets no parameter of type Enumeration; leave the values "
+            "as they are in the FMU"
+        )
     for component in system.components.values():
         version = component.description.fmiVersion
         if version not in _TAKEN:
@@ -81,12 +86,17 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         step = str(system.steps.get(name, system.step))
         named = {"name": name, "source": fmus[component.fmu], "stepSize": step}
         simulator = SubElement(simulators, "Simulator", named)
-        parameters = system.parameters_of(name)
+        parameters = [
+            (port, component.variable(port), value)
+            for port, value in system.parameters_of(name).items()
+            # Of which libcosim knows none.
+            if component.variable(port).type != "Enumeration"
+        ]
         if parameters:
             values = SubElement(simulator, "InitialValues")
-            for port, value in parameters.items():
+            for port, variable, value in parameters:
                 element = SubElement(values, "InitialValue", variable=port)
-                SubElement(element, component.variable(port).type, value=literal(value))
+                SubElement(element, variable.type, value=literal(value))
     connections = SubElement(root, "Connections")
     for connection in system.connections:
         element = SubElement(connections, "VariableConnection")

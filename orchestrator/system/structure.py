@@ -24,7 +24,7 @@ from orchestrator.system.names import (
     port_name,
     splits,
 )  # fmt: skip
-from orchestrator.system.values import Value, is_finite, typed
+from orchestrator.system.values import Value, is_finite, type_of, typed
 
 #: Values by the names of ports or of groups, taken apart or as text.
 Values = Mapping[PortName, object] | Mapping[str, object]
@@ -177,6 +177,15 @@ class System:
         for target, value in self.parameters.items():
             found.setdefault(target.component, {})[target.port] = value
         return found
+
+    def changed(self, *types: str) -> dict[PortName, Value]:
+        """Parameters that differ from what their FMUs have themselves; of some types, or of all."""
+        return {
+            name: value
+            for name, value in self.parameters.items()
+            if value != (own := self.component(name.component)).start(name.port)
+            and (not types or type_of(own.variable(name.port)) in types)
+        }
 
     @cached_property
     def feeding(self) -> dict[str, list[Connection]]:

@@ -26,8 +26,6 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
 from orchestrator.master.experiment import FULL, JACOBI, NONE, ZERO, Experiment, read_order
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_to_end
 from orchestrator.system.structure import System
 
 #: Largest deviation that is rounding: many tools add up their time.
@@ -50,6 +48,7 @@ class Host:
         fmi: versions of FMI that it runs.
         order: in which it steps the components, as `auv-fmu verify` has it.
         initial: what it exchanges before the first step.
+        turned: whether outputs are read after values were passed on.
         pins: what is installed into an environment of its own, as pip has it; none: it is used as
             it is in the present one.
 
@@ -60,6 +59,7 @@ class Host:
     fmi: Sequence[str] = _FMI_2
     order: str = JACOBI
     initial: str = FULL
+    turned: bool = False
     pins: Sequence[str] = ()
 
     def label(self) -> str | None:
@@ -106,30 +106,33 @@ _REST = "planner,plant+controller+disturbance"
 HOSTS: dict[str, Host] = {
     "libcosim-ssp": Host("libcosimpy", here.libcosim_ssp),
     "libcosim-osp": Host("libcosimpy", here.libcosim_osp),
-    "ecos": Host("ecospy", here.ecos, _BOTH),
+    "ecos": Host("ecospy", here.ecos, _BOTH, turned=True),
     "container": Host("fmu_manipulation_toolbox", here.container, _BOTH),
     "fmpy": Host("fmpy", drivers.fmpy_slaves, _BOTH),
     "fmpy-ssp": Host("fmpy", here.fmpy_ssp, initial=ZERO),
     "c-program": Host("auv_fmu", here.c_program),
-    "cofmupy": Host("cofmupy", drivers.cofmupy, _BOTH, _REST, ZERO, ["cofmupy==1.0.0"]),
+    "cofmupy": Host("cofmupy", drivers.cofmupy, _BOTH, _REST, ZERO, pins=["cofmupy==1.0.0"]),
     "fmuloader": Host("fmuloader", drivers.fmuloader, _BOTH, pins=["fmuloader==0.1.2rc0"]),
-    "gemseo-fmu": Host("gemseo-fmu", drivers.gemseo_fmu, _BOTH, _REST, ZERO, ["gemseo-fmu==3.1.1"]),
+    "gemseo-fmu": Host(
+        "gemseo-fmu", drivers.gemseo_fmu, _BOTH, _REST, ZERO, pins=["gemseo-fmu==3.1.1"]
+    ),
     "pathsim-fmi": Host(
         "pathsim-fmi",
         drivers.pathsim_fmi,
         _BOTH,
         "plant,controller,disturbance,planner",
         NONE,
-        ["pathsim-fmi==0.1.1", "pathsim==0.27.1"],
+        pins=["pathsim-fmi==0.1.1", "pathsim==0.27.1"],
     ),
     "pycosimlibrary": Host(
         "PyCosimLibrary",
         drivers.pycosimlibrary,
         initial=NONE,
+        turned=True,
         pins=["PyCosimLibrary==0.0.5", "fmpy==0.2.14"],
     ),
     "sdf4sim": Host("sdf4sim", drivers.sdf4sim, initial=ZERO, pins=["sdf4sim==0.6.0"]),
-    "sofirpy": Host("sofirpy", drivers.sofirpy, initial=ZERO, pins=["sofirpy==1.0.2"]),
+    "sofirpy": Host("sofirpy", drivers.sofirpy, initial=ZERO, turned=True, pins=["sofirpy==1.0.2"]),
     "syssimx": Host(
         "syssimx",
         drivers.syssimx_gauss_seidel,
@@ -165,11 +168,10 @@ def compare(
     names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
 
     @cache
-    def expected(order: str, initial: str) -> tuple[Experiment, np.ndarray]:
+    def expected(order: str, initial: str, turned: bool) -> tuple[Experiment, np.ndarray]:
         way, table = next(ways(system, read_order(order), initial)), Table()
-        experiment = replace(asked, order=way.order, coupling=way.coupling)
-        simulate_to_end(make_plan(system, experiment), [table], way.exchange)
-        return experiment, table.group(*names)[1:]
+        (way.turn() if turned else way).run(system, asked, table)
+        return replace(asked, order=way.order), table.group(*names)[1:]
 
     def verdict(name: str) -> HostVerdict:
         host = HOSTS[name]
@@ -178,7 +180,7 @@ def compare(
             failure = "not installed: pip install 'auv-fmu[hosts]'"
             return HostVerdict(name, host.package, failure=failure)
         try:
-            experiment, table = expected(host.order, host.initial)
+            experiment, table = expected(host.order, host.initial, host.turned)
             rows, seconds, reading = _ran(host, label, system, experiment, told)
         except InputError as error:
             return HostVerdict(name, label, failure=str(error))

@@ -75,9 +75,14 @@ def check_parameters(system: System, host: str) -> None:
         InputError: one is not.
 
     """
-    for name, value in system.parameters.items():
-        if system.components[name.component].starts.get(name.port) != value:
-            raise InputError(f"{host} cannot set parameters, and the system has {name} = {value}")
+    for name, value in system.changed().items():
+        raise InputError(f"{host} cannot set parameters, and the system has {name} = {value}")
+
+
+def check_choices(system: System, host: str) -> None:
+    """The same for hosts that leave Enumerations as they are."""
+    for name, value in system.changed("Enumeration").items():
+        raise InputError(f"{host} cannot set choices, and the system has {name} = {value}")
 
 
 def _names(system: System, between: str = ".") -> list[str]:
@@ -129,6 +134,7 @@ def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) 
 
 
 def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
+    check_choices(system, "libcosim")
     # Of an SSP it reads the components of the outermost system only, as does ecos.
     system = flattened(system)
     [path] = write_ssp(system, folder, flat=True)
@@ -144,6 +150,7 @@ def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
     if experiment.start_time != 0.0:
         # It tells the FMUs a start time, and then steps them from 0 s.
         raise InputError(f"ecos can start at 0 s only, not at {experiment.start_time:g} s")
+    check_choices(system, "ecos")
     # ecospy needs libtbb, which the wheel tbb puts where the loader does not look.
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)

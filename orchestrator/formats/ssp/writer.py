@@ -22,7 +22,7 @@ from orchestrator.system.component import Component
 from orchestrator.system.names import PortName, file_name, plain_file_names
 from orchestrator.system.structure import System, flattened
 from orchestrator.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
-from orchestrator.system.values import Value, items_of, literal, type_of
+from orchestrator.system.values import Value, literal, type_of
 from orchestrator.system.variables import array_of
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
@@ -36,6 +36,9 @@ _LIBCOSIM = "com.opensimulationplatform"
 
 #: What marks annotations of this master.
 _OURS = "auv-fmu"
+
+#: Types of parameters that get no connectors.
+_WITHOUT_CONNECTORS = ("String", "Enumeration")
 
 #: What XML 1.0 cannot hold.
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
@@ -121,8 +124,10 @@ def parameter_set_xml(
         members = component.elements(port)
         element = _add(parameters, "ssv:Parameter", name=port)
         texts = [_text(component, member, values) for member in members]
-        value = _add(element, f"ssv:{members[0].type}")
-        if not members[0].shape or type_of(members[0]) not in ("String", "Enumeration"):
+        # Choices are numbers, which OMSimulator takes and at which no other tool ends.
+        is_choice = type_of(members[0]) == "Enumeration"
+        value = _add(element, f"ssv:{'Integer' if is_choice else members[0].type}")
+        if not members[0].shape or type_of(members[0]) != "String":
             value.set("value", " ".join(texts))
         else:
             for text in texts:
@@ -132,20 +137,17 @@ def parameter_set_xml(
 
 
 def _text(component: Component, variable: ModelVariable, values: Mapping[str, Value]) -> str:
-    """A value as a parameter set has it; values of an enumeration have names there."""
+    """A value as a parameter set has it."""
     value = values.get(variable.name, component.start(variable.name))
     if value is None:
         raise InputError(
             f"{component.name}.{variable.name} has no value, and an SSP holds whole arrays only"
         )
-    items = items_of(variable)
-    names = [item for item, number in items.items() if int(number) == value]
-    if (isinstance(value, float) and not isfinite(value)) or (items and not names):
+    if isinstance(value, float) and not isfinite(value):
         raise InputError(
-            f"{component.name}.{variable.name} = {literal(value)}: an SSP holds finite numbers and "
-            "items of enumerations only"
+            f"{component.name}.{variable.name} = {literal(value)}: an SSP holds finite numbers only"
         )
-    return names[0] if names else literal(value)
+    return literal(value)
 
 
 def _add_dimensions(parent: Element, variable: ModelVariable) -> None:
@@ -370,11 +372,12 @@ def _add_component(
     written = set[str]()
     for variable in component.variables.values():
         name = array_of(variable)
-        # OMSimulator knows no connectors of texts, and fmpy feeds an input that no connection ends
-        # at from another's source. Parameter sets reach variables without a connector.
-        is_text = variable.causality == "parameter" and variable.type == "String"
-        is_out = is_text or PortName(component.name, variable.name) in left_out or name in written
-        if variable.causality in ("input", "output", "parameter") and not is_out:
+        # OMSimulator knows no connectors of texts, libcosim none of enumerations, and fmpy feeds an
+        # input that no connection ends at from another's source. Parameter sets reach variables
+        # without a connector.
+        is_plain = variable.causality != "parameter" or type_of(variable) not in _WITHOUT_CONNECTORS
+        is_out = PortName(component.name, variable.name) in left_out or name in written
+        if variable.causality in ("input", "output", "parameter") and is_plain and not is_out:
             written.add(name)
             _add_connector(connectors, name, variable.causality, variable, variable.unit)
     _add_geometry(element, position)
