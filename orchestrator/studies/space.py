@@ -222,7 +222,8 @@ class _Known:
         """A value in its type; that of an Enumeration by its name."""
         if name != STEP:
             variable = self._variable(name)
-            return named(variable, typed(name, variable, value))
+            found: Value = named(variable, typed(name, variable, value))
+            return found
         if not is_finite(value):
             raise InputError(f"{STEP} = {shortened(repr(value))}: not a number of seconds")
         return float(value)

@@ -11,7 +11,9 @@ from auv_fmu.path_planner import Parameters, Waypoints
 from fmus.path_planner.component import check_state, start, update
 
 paths = st.builds(
-    lambda **values: Waypoints(**values), timed=st.booleans(), rounding=st.floats(0.5, 40.0)
+    lambda **values: Waypoints(**values),  # noqa: PLW0108
+    timed=st.booleans(),
+    rounding=st.floats(0.5, 40.0),
 )  # what is not given keeps its start value
 
 
