@@ -23,7 +23,7 @@ from orchestrator.formats.ssp.archive import read_document
 from orchestrator.formats.ssp.reader import bind_parameter_set
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import explain_errors
-from orchestrator.master.experiment import Experiment
+from orchestrator.master.experiment import GAUSS_SEIDEL, Experiment
 from orchestrator.master.hooks.hook import Hook
 from orchestrator.master.hooks.timing import Playback
 from orchestrator.master.observers.table import Table
@@ -228,7 +228,8 @@ class Carried:
             hooks.append(Playback(input_table))
             _note_unknown(stimuli, "the table of inputs", findings)
         table = Table()
-        plan = make_plan(system, Experiment(stop, step, start_time=start))
+        # Tools record results after a step, before they set the inputs of its end.
+        plan = make_plan(system, Experiment(stop, step, GAUSS_SEIDEL, start))
         simulate_to_end(plan, [table], hooks=hooks)
         _note_unknown(expected, "the table of results", findings)
         said = f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"

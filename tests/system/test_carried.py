@@ -11,7 +11,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from fmus.discovery import REFERENCE, components, package_folder
+from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
 from support import others, typed
 from support.linear import linear
@@ -333,7 +333,7 @@ def test_our_fmus_prove_themselves(request: pytest.FixtureRequest, kind: str, na
     fmu = request.getfixturevalue(kind) / f"{name}.fmu"
     assert main(["verify", str(fmu)]) == 0
     verdicts = [line for line in capsys.readouterr().out.splitlines() if " outputs agree " in line]
-    folder = package_folder(components()[name]) / REFERENCE
+    folder = source_of(name).folder / REFERENCE
     assert len(verdicts) == 1 + len([*folder.glob("*.ssv")])
     for verdict in verdicts:
         assert tells(verdict, (21, 0, 4)) and verdict.endswith(": fault")
