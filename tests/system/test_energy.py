@@ -51,13 +51,20 @@ def energy(parameters, state):
 
 
 def started(parameters, eta0, nu0, water=NONE_3):
-    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), NONE_3, water)
+    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), water)
+
+
+def drifted(parameters, state, water, dwater, h):
+    """A step without actuators and disturbances."""
+    rotation = rotation_from_quaternion(state.quaternion)
+    return plant.advance(parameters, state, rotation, NONE_3, NONE_6, water, dwater, h)
 
 
 @given(parameters=parameter_sets(), position=vectors(speeds, 3), psi=angles)
 def test_vehicle_at_rest_and_level_in_still_water_stays_so(parameters, position, psi):
-    state, rotation = started(parameters, (*position, 0.0, 0.0, psi), NONE_6)
-    later, _ = plant.steps(parameters, state, rotation, NONE_3, NONE_6, NONE_3, NONE_3, 0.02, 100)
+    state = later = started(parameters, (*position, 0.0, 0.0, psi), NONE_6)
+    for _ in range(100):
+        later = drifted(parameters, later, NONE_3, NONE_3, 0.02)
     assert later.position == state.position
     assert later.nu_r == NONE_6
     np.testing.assert_allclose(later.quaternion, state.quaternion, atol=1e-15)
@@ -108,13 +115,11 @@ def test_energy_never_grows_by_itself_in_any_steady_or_speeding_water(
     """Runs of the plant, in the frame of the water; the scheme of fourth order may add 1e-6."""
     if not parameters.roll.rolls:
         euler, nu = (0.0, 0.3 * euler[1], euler[2]), (*nu[:3], 0.0, *(0.3 * x for x in nu[4:]))
-    state, rotation = started(parameters, (0.0, 0.0, 0.0, *euler), nu, water)
+    state = started(parameters, (0.0, 0.0, 0.0, *euler), nu, water)
     before = first = energy(parameters, state)
     for k in range(40):
         now = tuple(np.add(water, np.multiply(0.0025 * k, dwater)).tolist())
-        state, rotation = plant.steps(
-            parameters, state, rotation, NONE_3, NONE_6, now, dwater, 0.0025, 1
-        )
+        state = drifted(parameters, state, now, dwater, 0.0025)
         after = energy(parameters, state)
         assert after <= before + 1e-6 * (first + 1.0)
         before = after
@@ -156,8 +161,9 @@ def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
 @given(psi=angles, position=vectors(speeds, 3))
 def test_remus_100_at_rest_and_level_in_still_water_stays_so(psi, position):
     vehicle = remus100.Parameters(eta0=(*position, 0.0, 0.0, psi))
-    state = remus100.begin(vehicle, NONE_3)
-    later = remus100.steps(vehicle, state, NONE_3, NONE_3, NONE_3, 0.02, 100)
+    state = later = remus100.begin(vehicle, NONE_3)
+    for _ in range(100):
+        later = remus100.advance(vehicle, later, NONE_3, NONE_3, NONE_3, 0.02)
     assert (later.position, later.euler, later.nu) == (state.position, state.euler, NONE_6)
 
 
