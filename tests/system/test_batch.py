@@ -292,7 +292,13 @@ def compare_refusals(run: Point) -> None:
     made = (engine.outcomes([run]) for engine in engines(run.scenario))
     for batch, fmus in zip(*made, strict=True):
         assert batch.failure and fmus.failure and not batch.indices
-        assert where(batch.failure) == where(fmus.failure)
+        if run.order == JACOBI and "outputs refused" in fmus.failure:
+            # They are read at the end of the step before.
+            assert float(where(batch.failure)[4:-2]) == pytest.approx(
+                float(where(fmus.failure)[4:-2]) + run.step
+            )
+        else:
+            assert where(batch.failure) == where(fmus.failure)
 
 
 @pytest.mark.parametrize("order", ORDERS)
