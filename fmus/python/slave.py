@@ -162,7 +162,8 @@ def _advance(said: Behaviour) -> Iterator[str]:
         yield f"{indent}state = {_call(said, 'update', derived=derived, t=t)}"
     if _made_of(said, "derive") & {"state", "t"}:
         yield f"{indent}{derived} = None"
-    yield f"if not norm(state) <= {LARGEST_STATE}: self.check_size(state)"
+    if said.hooks["update"]:
+        yield f"if not norm(state) <= {LARGEST_STATE}: self.check_size(state)"
     yield f"return state, {'None' if said.hooks['credible'] else 'derived'}"
 
 
