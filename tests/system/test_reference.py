@@ -11,7 +11,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
-from fmus.discovery import REFERENCE, components, package_folder
+from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
@@ -26,19 +26,16 @@ from support.texts import mentions, numbers_in, tells
 
 COMMITTED = Path(__file__).parents[2] / REFERENCE
 
-#: Packages of the components, by name.
-COMPONENTS = components()
-
 #: Orders in which tools step the components.
 ORDER = ("plant", "controller", "disturbance", "planner")
 OTHER_ORDER = ("controller", "plant", "planner", "disturbance")
 
 
-@pytest.mark.parametrize("name", COMPONENTS)
+@pytest.mark.parametrize("name", components())
 def test_a_fresh_run_of_each_fmu_is_the_reference(dist: Path, name: str):
     """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""
     component = read_component(name, dist / f"{name}.fmu")
-    committed = package_folder(COMPONENTS[name]) / REFERENCE
+    committed = source_of(name).folder / REFERENCE
     path = committed / f"{name}_in.csv"
     inputs = read_csv(path) if path.is_file() else None
     outputs = reference_outputs(component, inputs)
