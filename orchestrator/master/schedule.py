@@ -354,8 +354,8 @@ def make_stages(
     experiment: Experiment,
     steps: int,
     k: int,
-    t: float,
-    h: float,
+    t: c_double,
+    h: c_double,
 ) -> None:
     """Make some stages of a step.
 
@@ -368,8 +368,6 @@ def make_stages(
         t, h: beginning and length of the step [s].
 
     """
-    # Converted once for all of them.
-    time, length = c_double(t), c_double(h)
     for gather, members, decimation in stages:
         if decimation is None:
             # What most stages are costs no call.
@@ -377,10 +375,10 @@ def make_stages(
                 values[gather.targets] = values[gather.sources]
             elif gather.acts:
                 gather(values)
-            step_members(members, time, length)
+            step_members(members, t, h)
         elif decimation.is_due(k, steps):
             gather(values)
-            step_members(members, time, c_double(experiment.length(k, decimation.every)))
+            step_members(members, t, c_double(experiment.length(k, decimation.every)))
 
 
 def step_members(
