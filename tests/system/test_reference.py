@@ -161,23 +161,77 @@ class OtherTool:
             value = self.values[wire.source.component, wire.source.port]
             self.slaves[name].setReal([self.references[name][wire.target.port]], [value])
 
+    def step(self, k: int, group: Sequence[str]) -> None:
+        for name in group:
+            self.set(name)
+        for name in group:
+            self.slaves[name].doStep(k * 0.02, 0.02)
+        for name in group:
+            self.read(name)
+
     def rows(self, groups: Sequence[Sequence[str]], steps: int = 200) -> list[list[float]]:
         """Time and all values after each step."""
         rows = []
         for k in range(steps):
             for group in groups:
-                for name in group:
-                    self.set(name)
-                for name in group:
-                    self.slaves[name].doStep(k * 0.02, 0.02)
-                for name in group:
-                    self.read(name)
+                self.step(k, group)
             rows.append([(k + 1) * 0.02, *self.values.values()])
         return rows
 
     def write(self, path: Path, rows: Sequence[Sequence[float]]) -> None:
         lines = [",".join(["time", *map(".".join, self.values)])]
         path.write_text("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]))
+
+
+def test_table_of_a_tool_that_reads_outputs_after_it_has_passed_them_on_is_certified(
+    native: Path, tmp_path: Path
+):
+    """The others step with what they had before, as PyFMI and ecos do."""
+    path, system = tmp_path / "table.csv", closed_loop(native)
+    tool, rows = OtherTool(system, "full"), []
+    for k in range(200):
+        tool.step(k, ORDER)
+        passed_on = dict(tool.values)
+        for name in ORDER:
+            tool.set(name)
+        for name in ORDER:
+            tool.read(name)
+        rows.append([(k + 1) * 0.02, *tool.values.values()])
+        tool.values = passed_on
+    tool.write(path, rows)
+    certified(path, system, "in jacobi order, outputs read after values are passed on")
+
+
+def test_table_of_a_tool_that_follows_feedthrough_is_certified_before_and_after_it_does(
+    native: Path, tmp_path: Path
+):
+    """OMSimulator writes both rows, of which the first counts."""
+    path, system = tmp_path / "table.csv", closed_loop(native)
+    tool, before, after = OtherTool(system, "full"), [], []
+    for k in range(200):
+        # What comes round is there after as many exchanges as there are components.
+        for name in ORDER * len(ORDER):
+            tool.set(name)
+            tool.read(name)
+        after.append([k * 0.02, *tool.values.values()])
+        for name in ORDER:
+            tool.slaves[name].doStep(k * 0.02, 0.02)
+        for name in ORDER:
+            tool.read(name)
+        before.append([(k + 1) * 0.02, *tool.values.values()])
+    tool.write(path, after)
+    certified(path, system, "in feedthrough order")
+    tool.write(path, before)
+    certified(path, system, "in feedthrough order, outputs read before values are passed on")
+    before[100][1] += 1e-3
+    tool.write(path, before)
+    with pytest.raises(InputError, match=r"in feedthrough order, .* at t = 2\.02 s"):
+        verify(path, system, 1e-9)
+
+
+def certified(path: Path, system: System, way: str) -> None:
+    compared, *_ = verify(path, system, 1e-12).splitlines()
+    assert numbers_in(compared)[:2] == [66, 70] and compared.endswith(f" s, {way}")
 
 
 @pytest.mark.parametrize("initial", INITIAL)
