@@ -231,7 +231,12 @@ def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
     [
         ("Integer", {"k": -6}, Status.Discard, "k = -6: must be at least -5"),
         ("Integer", {"pair[1]": 5, "k": -9}, Status.Discard, "k = -9: must be at least -5"),
-        ("Integer", {"want": 1}, Status.Discard, "want = 1: use one of 0 (off), 2 (heat), -7 (cool)"),
+        (
+            "Integer",
+            {"want": 1},
+            Status.Discard,
+            "want = 1: use one of 0 (off), 2 (heat), -7 (cool)",
+        ),
         ("Integer", {"n": 1}, Status.Error, "n is an output and cannot be set"),
         ("Boolean", {"on": 1}, Status.Error, "on is an output and cannot be set"),
         ("Boolean", {"fault": 1}, Status.Error, "fault is an output and cannot be set"),
