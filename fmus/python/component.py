@@ -20,6 +20,7 @@ from xml.etree.ElementTree import Element
 
 from pythonfmu.enums import Fmi2Status
 
+from auv_fmu import __version__
 from auv_fmu.euler import (
     LARGEST_STATE,
     MOST_INTERNAL_STEPS,
@@ -341,4 +342,5 @@ class Component(Callbacks):
         # Two builds of the same sources must be the same bytes; the time of the build is not in
         # them.
         del root.attrib["generationDateAndTime"]
+        root.set("generationTool", f"auv-fmu {__version__} with {root.get('generationTool')}")
         return complete(root, self._store.ports)

@@ -52,7 +52,7 @@ _MAIN = "fmi2.c"
 _FUNCTIONS = (
     "Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode",
     "ExitInitializationMode", "Reset", "DoStep",
-    *(f"{way}{of}" for way in ("Get", "Set") for of in ("Real", "Integer", "Boolean", "String")),
+    *(f"{way}{of}" for way in ("Get", "Set") for of in ("Real", "Integer", "Boolean")),
 )  # fmt: skip
 _HOST_FUNCTIONS = ("malloc", "free", "host_callbacks")
 

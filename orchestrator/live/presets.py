@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from fmpy.model_description import ModelVariable
 
 from auv_fmu.quantities import POSITION, TAU, THETA, VELOCITY, Members
-from fmus.discovery import components, ports_of
+from fmus.discovery import components
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.machine.errors import InputError
@@ -43,7 +43,7 @@ from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
-from orchestrator.system.values import Value
+from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.reducers import LAST_SECONDS, SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
@@ -308,7 +308,6 @@ def _parameters(system: System) -> Iterator[Plain]:
     """What a user may change: parameters, and inputs that nothing feeds."""
     for name, component in system.components.items():
         fed = {connection.target.port for connection in system.feeding[name]}
-        ports = {port.name: port for port in ports_of(_type(component))}
         for variable in component.variables.values():
             is_input = variable.causality == "input" and variable.name not in fed
             if variable.causality != "parameter" and not is_input:
@@ -319,15 +318,15 @@ def _parameters(system: System) -> Iterator[Plain]:
                 "name": f"{name}.{variable.name}",
                 "type": variable.type,
                 "description": variable.description or "",
-                "default": start,
-                "value": value,
+                "default": named(variable, start),
+                "value": named(variable, value),
             }
             if variable.unit and variable.unit != "1":
                 found["unit"] = printed_unit(variable.unit)
             for end in ("min", "max"):
                 if (text := getattr(variable, end)) is not None:
                     found[end] = float(text)
-            if choices := ports[variable.name].choices:
+            if choices := items_of(variable):
                 found["choices"] = list(choices)
             yield found
 
@@ -341,12 +340,14 @@ def _fmu(component: Component) -> Plain:
 
 def _variable(component: Component, variable: ModelVariable) -> Plain:
     start = component.start(variable.name)
+    choices = {name: int(number) for name, number in items_of(variable).items()}
     return {
         "name": variable.name,
         "type": variable.type,
         "reference": variable.valueReference,
         "causality": variable.causality,
         **({} if start is None else {"start": start}),
+        **({"choices": choices} if choices else {}),
     }
 
 

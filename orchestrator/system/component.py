@@ -46,6 +46,9 @@ _OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 #: The versions of FMI that FMUs may have.
 _VERSIONS = ("2.0", "3.0")
 
+#: How this program names itself in descriptions of FMUs.
+_OWN = "auv-fmu "
+
 
 class Described(NamedTuple):
     """A description, and its flaw; None: it is valid."""
@@ -220,6 +223,11 @@ class Component:
             return terminals_of(self.folder)
         except InputError as error:
             raise InputError(f"{self.name}: {error}") from None
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether this program has built the FMU."""
+        return (self.description.generationTool or "").startswith(_OWN)
 
     @property
     def is_once_per_process(self) -> bool:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.observer import exact_gain
+from auv_fmu.observer import Form, exact_gain
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from auv_fmu.vehicle import Vehicle
 from orchestrator.master.observers.observer import Ending, Header
@@ -97,7 +97,7 @@ def values_of(system: System) -> ValueOf:
 def gain_of_a_step(value: ValueOf, h: float, controller: str = STANDARD.controller) -> float:
     """k_d as a step of h seconds takes it [1/s]: the form of the observer may change it."""
     k_d = float(value(f"{controller}.k_d") or 0.0)
-    return exact_gain(k_d, h) if value(f"{controller}.observer") == "exact" else k_d
+    return exact_gain(k_d, h) if value(f"{controller}.observer") in ("exact", Form.EXACT) else k_d
 
 
 def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution]:

@@ -64,7 +64,7 @@ def run(
     system: System,
     stop_time: float,
     step: float,
-    order: Order = "gauss-seidel",
+    order: Order = "feedthrough",
     loop: str = "python",
 ) -> Table:
     """All rows of a run, by its times."""

@@ -97,9 +97,9 @@ def test_tables_feed_inputs_of_nested_components(ssp: Path, tmp_path: Path):
     table.write_text("time,auv1.plant.water.x,auv2.plant.water.y\n0,0,0\n1,0.1,-0.05\n")
     run(ssp, tmp_path / "r", "--inputs", str(table))
     result = read(tmp_path / "r")
-    # A step takes the values of its beginning.
-    np.testing.assert_allclose(result["auv1.plant.water.x"][-1], 0.1 * 0.98, rtol=1e-12)
-    np.testing.assert_allclose(result["auv2.plant.water.y"][-1], -0.05 * 0.98, rtol=1e-12)
+    # A row has the values of its time.
+    np.testing.assert_allclose(result["auv1.plant.water.x"][-1], 0.1, rtol=1e-12)
+    np.testing.assert_allclose(result["auv2.plant.water.y"][-1], -0.05, rtol=1e-12)
 
 
 def test_nested_values_vary_in_a_study(ssp: Path, tmp_path: Path):

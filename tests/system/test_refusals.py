@@ -195,7 +195,7 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
                 ("parameter.toml", "real"),
                 ("unwired.toml", "'plant.tua' plant.tau"),
                 ("wire.toml", "controller dy dy.*"),
-                ("zero.toml", "UTF-8"),
+                ("zero.toml", "saturation tanh, algebraic"),
                 ("auv.ssp --kind native", "auv.ssp kind fmi"),
             )
         ),

@@ -96,7 +96,7 @@ def test_record_says_what_was_run_and_with_what():
         "start_time": 0.0,
         "stop_time": 0.2,
         "step": 0.02,
-        "order": "gauss-seidel",
+        "order": "feedthrough",
         "coupling": None,
     }
     assert record["experiment"] == experiment | {"steps": {}}

@@ -28,9 +28,6 @@ from orchestrator.master.fmi.slaves import slave_class
 from orchestrator.master.fmi.surroundings import restore_mode, within_folder
 from orchestrator.system.component import Component
 
-#: How this program names itself in descriptions of FMUs.
-_OWN = "auv-fmu "
-
 #: How ELF files of 32 and of 64 bits say where they have what: the place and form of that part of
 #: their header, and the length and form of the entries for their segments.
 _ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
@@ -96,9 +93,8 @@ class Library:
             ) from error
         finally:
             restore_mode()
-        tool = component.description.generationTool or ""
         self.runs_python = runs_python(folder)
-        self.is_akin = tool.startswith(_OWN) or self.runs_python
+        self.is_akin = component.is_ours or self.runs_python
         self.corrupted, self.users = False, 0
 
 

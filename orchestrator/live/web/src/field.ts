@@ -60,7 +60,7 @@ export class Field {
   #entered(): Value {
     const { element, parameter } = this;
     if (element instanceof HTMLInputElement && element.type === "checkbox") return element.checked;
-    return parameter.type === "String" ? element.value : entered(element.value);
+    return parameter.type === "Enumeration" ? element.value : entered(element.value);
   }
 
   /** Shows the value that is set; undefined: the preset's own. */

@@ -10,6 +10,9 @@ const CO_SIMULATION = 1;
 export const REAL = 8;
 const INT = 4;
 
+/** What FMI calls the functions of a type: enumerations have those of integers. */
+const called = (type: FmiType): FmiType => (type === "Enumeration" ? "Integer" : type);
+
 /** Types of ports, in the order of their columns. */
 const PORT_TYPES: readonly FmiType[] = ["Real", "Integer", "Boolean"];
 
@@ -263,29 +266,28 @@ export class Instance {
   /** Set variables, one after the other. */
   set(values: ReadonlyMap<string, Value>): void {
     for (const [port, value] of values) {
-      const { type, reference } = this.variable(port);
-      const [at, text] = [
-        this.scratch + REAL,
-        type === "String" ? this.machine.store(`${value}`) : 0,
-      ];
+      const { type, reference, choices } = this.variable(port);
+      const at = this.scratch + REAL;
+      const number = choices ? choices[`${value}`] : Number(value);
       this.machine.integers(this.scratch, 1)[0] = reference;
-      if (type === "Real") this.machine.doubles(at, 1)[0] = Number(value);
-      else this.machine.integers(at, 1)[0] = type === "String" ? text : Number(value);
-      const status = this.function(`Set${type}`)(this.component, this.scratch, 1, at);
-      if (text !== 0) this.machine.release(text);
-      this.done(`set${type}`, status);
+      if (type === "Real") this.machine.doubles(at, 1)[0] = number;
+      else this.machine.integers(at, 1)[0] = number;
+      const name = called(type);
+      const status = this.function(`Set${name}`)(this.component, this.scratch, 1, at);
+      this.done(`set${name}`, status);
     }
   }
 
   /** The value of a variable, as the FMU holds it. */
   read(port: string): Value {
-    const { type, reference } = this.variable(port);
+    const { type, reference, choices } = this.variable(port);
     const at = this.scratch + REAL;
     this.machine.integers(this.scratch, 1)[0] = reference;
-    this.done(`get${type}`, this.function(`Get${type}`)(this.component, this.scratch, 1, at));
+    const name = called(type);
+    this.done(`get${name}`, this.function(`Get${name}`)(this.component, this.scratch, 1, at));
     if (type === "Real") return this.machine.doubles(at, 1)[0];
     const number = this.machine.integers(at, 1)[0];
-    if (type === "String") return this.machine.text(number);
+    for (const [choice, of] of Object.entries(choices ?? {})) if (of === number) return choice;
     return type === "Boolean" ? number !== 0 : number;
   }
 

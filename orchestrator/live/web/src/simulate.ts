@@ -107,11 +107,13 @@ class Simulation {
 
   /** Take the value of a parameter: the user's, or the loop's. */
   private take(parameter: Parameter, changed: Value | undefined): void {
-    const { name, type } = parameter;
+    const { name, type, choices } = parameter;
     const value = changed ?? parameter.value;
-    const wanted = { Real: "number", Integer: "number", Boolean: "boolean", String: "string" }[
+    const wanted = { Real: "number", Integer: "number", Boolean: "boolean", Enumeration: "string" }[
       type
     ];
+    if (choices && !choices.includes(`${value}`))
+      throw new Refusal(`${name} = ${value}: not one of ${choices.join(", ")}`);
     if (Number.isNaN(value)) throw new Refusal(`${name}: not a number`);
     // Integers have 32 bits: a larger one would become another without a word.
     const fits = typeof value === wanted && (type !== "Integer" || (Number(value) | 0) === value);

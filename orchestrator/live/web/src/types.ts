@@ -6,7 +6,7 @@ export type Value = number | boolean | string;
 /** Values by `component.parameter`. */
 export type Values = Readonly<Record<string, Value>>;
 
-export type FmiType = "Real" | "Integer" | "Boolean" | "String";
+export type FmiType = "Real" | "Integer" | "Boolean" | "Enumeration";
 
 /** A variable of an FMU, as its modelDescription.xml has it. */
 export interface Variable {
@@ -15,6 +15,8 @@ export interface Variable {
   readonly type: FmiType;
   readonly causality: "input" | "output" | "parameter";
   readonly start?: Value;
+  /** Of an Enumeration: its numbers, by their names. */
+  readonly choices?: Readonly<Record<string, number>>;
 }
 
 /** A component type; its functions in the module have its name as their prefix. */
@@ -32,7 +34,7 @@ export interface Parameter {
   readonly unit?: string;
   readonly min?: number;
   readonly max?: number;
-  /** The texts that a String may be. */
+  /** The names that an Enumeration has, and its value is one of. */
   readonly choices?: readonly string[];
   /** The FMU's own value. */
   readonly default: Value;

@@ -31,7 +31,7 @@ const gains = [
 const ofPlant = [
   parameter("plant.noise.std", 0.001),
   parameter("plant.roll", true, { type: "Boolean" }),
-  parameter("plant.integrator", "euler", { type: "String", choices: ["euler", "rk4"] }),
+  parameter("plant.integrator", "euler", { type: "Enumeration", choices: ["euler", "rk4"] }),
 ];
 const events = {
   fault: [
