@@ -246,7 +246,10 @@ static int advance(instance *it, double time, double step, message *why) {
         if (MODEL_DERIVE_TAKES_STATE || MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
     if (!is_sound(&next->state, &error, why)) return 0;
-    next->time = end_of_step(run->start_time, time, step);
+    next->time = time + step;
+    if (MODEL_OUTPUTS_TAKE_TIME || MODEL_DERIVE_TAKES_TIME) {
+        next->time = end_of_step(run->start_time, time, step);
+    }
     next->outputs_are = MODEL_SAMPLED ? HELD : OUTDATED;
     if (MODEL_DRAWS > 0) {
         copy_for(&before, &run->noise, MODEL_DRAWS);
