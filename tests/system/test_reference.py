@@ -15,7 +15,7 @@ from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import INITIAL
+from orchestrator.master.experiment import INITIAL, ORDERS, OrderName
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -50,10 +50,11 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
     assert "to 4 s, in jacobi order" in verify(COMMITTED / "auv_ref.csv", system, 1e-9)
 
 
-def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
+@pytest.mark.parametrize("order", ORDERS)
+def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path, order: OrderName):
     path = tmp_path / "ours.csv"
-    write(run(system, 2.0, 0.02), path)
-    assert "in gauss-seidel order" in verify(path, system, 1e-12)
+    write(run(system, 2.0, 0.02, order), path)
+    assert f" s, in {order} order\n" in verify(path, system, 1e-12)
 
 
 def test_own_table_of_another_step_is_verified_with_that_step(workplace, capsys):
