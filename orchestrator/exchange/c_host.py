@@ -18,6 +18,7 @@ from orchestrator.master.fmi.binary import binary_of
 from orchestrator.master.plan import gathered_connections, stages
 from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
+from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value
@@ -50,7 +51,8 @@ def compile_host(
     Args:
         folder: where it is put.
         system: to run; its connections are of Reals.
-        experiment: whose steps are all of one length.
+        experiment: whose steps are all of one length. Without an order it is `feedthrough`, or
+            `gauss-seidel` where there are rings; outputs are taken to follow inputs between steps.
         library: where the library of an FMU is; beside its folder `binaries` is `resources`.
         command: of a C compiler; empty: this machine's.
         name: of the program.
@@ -81,17 +83,20 @@ def compile_host(
 
 def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
     """What the host is compiled with: FMUs and members in the order of the stages."""
-    if experiment.order == FEEDTHROUGH:
-        raise InputError(f"the C program has no order {FEEDTHROUGH}")
     if system.steps or any(connection.transformation for connection in system.connections):
         raise InputError(
             "the C program supports neither longer steps of components nor transformations"
         )
-    parts = stages(system, experiment.order or GAUSS_SEIDEL)
+    closed = rings(system)
+    order = experiment.order or (GAUSS_SEIDEL if closed else FEEDTHROUGH)
+    if closed and order == FEEDTHROUGH:
+        raise InputError(f"the C program solves no rings; leave out order {FEEDTHROUGH}")
+    parts = stages(system, order)
     columns: dict[PortName, int] = {}
     references: list[int] = []
     fmus, parameters, row = [], [], []
-    for number, name in enumerate(chain(*parts)):
+    numbers = {name: number for number, name in enumerate(chain(*parts))}
+    for name, number in numbers.items():
         component = system.components[name]
         path = library(component)
         fmu = {
@@ -112,31 +117,54 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
         fmus.append(_struct(**fmu))
         for parameter, value in system.parameters_of(name).items():
             parameters.append(_setting(f"&fmus[{number}]", component.variable(parameter), value))
+    whole = {name: _struct(of=numbers[name], sets=1, steps=1, gets=1) for name in numbers}
+    acting = [[whole[name] for name in names] for names in parts]
+    shown_after = len(parts)
+    takings = [system.connections, *gathered_connections(system, parts, order=order)]
+    if order == FEEDTHROUGH:
+        # Values pass through what has feedthrough, a row shows them, and all are stepped.
+        direct = {
+            name
+            for name, component in system.components.items()
+            if any(component.has_feedthrough(port.name) for port in component.having("output"))
+        }
+        passing = {name: _struct(of=numbers[name], sets=1, gets=1) for name in direct}
+        # States that something takes before they pass are read after the step.
+        place = {name: i for i, names in enumerate(parts) for name in names}
+        wires = [(one.source.component, one.target.component) for one in system.connections]
+        early = {source for source, target in wires if place[source] >= place[target]}
+        stepping = {
+            name: _struct(of=numbers[name], steps=1, gets=int(name in early)) for name in direct
+        }
+        acting = [[passing[name] for name in names if name in direct] for names in parts]
+        acting.append([*(whole | stepping).values()])
+        takings.append([])
     copies: list[Connection] = []
-    found, first = [], 0
-    takings = [system.connections, *gathered_connections(system, parts)]
-    for names, taken in zip([[], *parts], takings, strict=True):
-        at = len(copies)
-        copies += taken
-        what = {"targets": f"targets + {at}", "sources": f"sources + {at}"}
-        what |= {"factors": "ones", "offsets": "zeros", "members": f"members + {first}"}
-        counts = {"n_connections": len(taken), "n_members": len(names), "every": 1}
+    found: list[str] = []
+    actions: list[str] = []
+    for acts, taken in zip([[], *acting], takings, strict=True):
+        what = {"targets": f"targets + {len(copies)}", "sources": f"sources + {len(copies)}"}
+        what |= {"factors": "ones", "offsets": "zeros", "members": f"members + {len(actions)}"}
+        counts = {"n_connections": len(taken), "n_members": len(acts), "every": 1}
         found.append(_struct(**what, **counts))
-        first += len(names)
-    connections, *stepped = found
+        copies += taken
+        actions += acts
+    connections, *stages_of_a_step = found
     return f"""\
-enum {{ FMUS = {len(fmus)}, COLUMNS = {len(columns)} }};
+enum {{ FMUS = {len(fmus)}, COLUMNS = {len(columns)}, MEMBERS = {len(actions)} }};
+enum {{ SHOWN_AFTER = {shown_after} }};
 static const double START = {experiment.start_time!r}, STEP = {experiment.step!r};
 static const char header[] = {_text(",".join(("time", *map(str, columns))))};
 static double row[COLUMNS] = {_listed(row)};
 static const reference references[] = {_listed(references)};
 static fmu fmus[] = {_listed(fmus)};
-static member members[FMUS];
+static const action actions[] = {_listed(actions)};
+static member members[MEMBERS];
 static const size_t targets[] = {_listed(columns[copy.target] for copy in copies)};
 static const size_t sources[] = {_listed(columns[copy.source] for copy in copies)};
 static const double ones[] = {_listed(1.0 for _ in copies)}, zeros[{len(copies)}];
 static const stage connections = {connections};
-static const stage stages[] = {_listed(stepped)};
+static const stage stages[] = {_listed(stages_of_a_step)};
 static void set_parameters(void) {{ {" ".join(parameters)} }}
 """
 

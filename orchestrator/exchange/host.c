@@ -23,6 +23,12 @@
 
 enum { CO_SIMULATION = 1 };
 
+/* What one member of a stage does with an FMU. */
+typedef struct {
+    size_t of;
+    int sets, steps, gets;
+} action;
+
 /* Seconds that no run takes. */
 static const double NO_LIMIT = 1e9;
 
@@ -93,22 +99,26 @@ static inline void set_string(const fmu *of, reference number, const char *value
 
 #include "plan.h"
 
-static void load(fmu *of, member *as) {
+static void load(fmu *of) {
     static const callbacks functions = {log_message, calloc, free, NULL, NULL};
     void *(*instantiate)(const char *, int, const char *, const char *, const callbacks *, int, int);
     of->library = OPEN(of->path);
     if (of->library == NULL) fail("cannot be loaded", of->path);
     *(void **)&instantiate = function(of, "fmi2Instantiate");
-    *(void **)&as->do_step.fmi2 = function(of, "fmi2DoStep");
     *(void **)&of->inputs.call.fmi2 = function(of, "fmi2SetReal");
     *(void **)&of->outputs.call.fmi2 = function(of, "fmi2GetReal");
     of->instance = instantiate(of->name, CO_SIMULATION, of->guid, of->resources, &functions, 0, 1);
     if (of->instance == NULL) fail("no instance", of->name);
-    as->component = of->instance;
-    as->inputs = &of->inputs;
-    as->outputs = &of->outputs;
-    as->n_inputs = of->inputs.n > 0;
-    as->n_outputs = of->outputs.n > 0;
+}
+
+static void assign(const action *what, member *to) {
+    const fmu *of = &fmus[what->of];
+    if (what->steps) *(void **)&to->do_step.fmi2 = function(of, "fmi2DoStep");
+    to->component = of->instance;
+    to->inputs = &of->inputs;
+    to->outputs = &of->outputs;
+    to->n_inputs = what->sets && of->inputs.n > 0;
+    to->n_outputs = what->gets && of->outputs.n > 0;
 }
 
 static void read_reals(const fmu *of, const move *ports) {
@@ -127,7 +137,8 @@ static void exchange(void) {
 
 /* What follows from what at the start time comes to rest in as many exchanges as there are FMUs. */
 static void initialise(double stop_time) {
-    for (size_t i = 0; i < FMUS; i++) load(&fmus[i], &members[i]);
+    for (size_t i = 0; i < FMUS; i++) load(&fmus[i]);
+    for (size_t i = 0; i < MEMBERS; i++) assign(&actions[i], &members[i]);
     set_parameters();
     for (size_t i = 0; i < FMUS; i++) {
         const fmu *of = &fmus[i];
@@ -142,19 +153,31 @@ static void initialise(double stop_time) {
     exchange();
 }
 
-/* Make all steps, a row after each. */
+static void add_row(block *table, double time) {
+    double *last = table->rows + table->n++ * (1 + COLUMNS);
+    last[0] = time;
+    memcpy(last + 1, row, COLUMNS * sizeof *row);
+}
+
+/* Make all steps. A row shows the end of one, or what has passed before the next. */
 static void make_steps(const run *this, block *rows) {
     static const char *const calls[] = {"fmi2SetReal", "fmi2DoStep", "fmi2GetReal"};
+    const int shown_at_end = this->shown_after == this->n_stages;
     failure why;
     size_t made = 0;
-    switch (advance(this, &made, this->steps, NO_LIMIT, rows, &why)) {
-    case FAILED:
-        check(why.status, calls[why.call],
-              &fmus[this->stages[why.stage].members - members + why.member]);
-        break;
-    case NOT_FINITE:
-        fail("a value is not finite", "row");
+    int outcome;
+    if (shown_at_end) add_row(rows, START);
+    outcome = advance(this, &made, this->steps, NO_LIMIT, rows, &why);
+    if (outcome == DUE && !shown_at_end) {
+        if (stages_failed(this, 0, this->shown_after, made, &why)) outcome = FAILED;
+        else if (!all_finite(row, COLUMNS)) outcome = NOT_FINITE;
+        add_row(rows, this->stop_time);
     }
+    if (outcome == FAILED) {
+        const member *it = &this->stages[why.stage].members[why.member];
+        check(why.status, calls[why.call], &fmus[actions[it - members].of]);
+    }
+    if (outcome == NOT_FINITE) fail("a value is not finite", "row");
 }
 
 static void write_table(const char *path, const block *table) {
@@ -181,8 +204,8 @@ static void end(void) {
 
 int main(int n_arguments, char **arguments) {
     const size_t n = sizeof stages / sizeof *stages;
-    run all = {stages, row, n, n, COLUMNS, START, STEP, 0.0, 0, 0};
-    block table = {NULL, 0, 1};
+    run all = {stages, row, n, SHOWN_AFTER, COLUMNS, START, STEP, 0.0, 0, 0};
+    block table = {NULL, 0, 0};
     clock_t start;
     if (n_arguments != 3) fail("usage: host STEPS TABLE", "host");
     all.full_steps = all.steps = strtoul(arguments[1], NULL, 10);
@@ -191,8 +214,6 @@ int main(int n_arguments, char **arguments) {
     table.rows = calloc(table.most, (1 + COLUMNS) * sizeof *table.rows);
     if (table.rows == NULL) fail("too many rows", arguments[1]);
     initialise(all.stop_time);
-    table.rows[0] = START;
-    memcpy(table.rows + 1, row, COLUMNS * sizeof *row);
     start = clock();
     make_steps(&all, &table);
     start = clock() - start;

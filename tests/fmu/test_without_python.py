@@ -90,7 +90,7 @@ def test_host_runs_where_there_is_nothing_but_a_c_library(
     root = bare_root(tmp_path, host, *tmp_path.glob("*/binaries/linux64/*.so"))
     c_host.run_host([*root, "/host"], tmp_path, WHOLE.full_steps, [])
     said = verify(tmp_path / c_host.TABLE_FILE, system_of(dist, scenario), 0.0)
-    assert "to 100 s, in gauss-seidel order" in said
+    assert "to 100 s, in feedthrough order" in said
 
 
 def zig(machine: str) -> list[str]:

@@ -332,7 +332,7 @@ def test_table_is_accepted_by_verify(preset, events, changes, opened: Browser, t
     values = [word for name, value in changes.items() for word in ("--set", f"{name}={value}")]
     arguments = ["verify", str(tmp_path / "live.csv"), "--scenario", preset, *values, *events]
     assert main([*arguments, "--tolerance", "1e-9"]) == 0
-    assert bundle.BUNDLE_ORDER in capsys.readouterr().out
+    assert "in feedthrough order" in capsys.readouterr().out
     assert main(arguments[:-2]) == 2
 
 
