@@ -46,7 +46,7 @@ The FMU answers with fmi2Error if the host
 From then on it answers every call except a get with fmi2Error, until fmi2Reset or a good state. A
 refused get has no consequence. fmi2GetReal also gives the numbers of Integers and Booleans.
 
-The reason is logged; with logging off, only that of an fmi2Error. The complete table of calls,
+With logging off, the reason of an fmi2Error is logged, and no other. The complete table of calls,
 states and bad arguments is in `docs/reference/fmi-answers.md` of the project."""
 
 #: The place in a list of things that have members.

@@ -17,6 +17,7 @@ module               what it states
 :mod:`.flat`         inputs, outputs and states as arrays of doubles
 :mod:`.tables`       the ports of a component in C
 :mod:`.translator`   all equations of a component in C
+:mod:`.stack`        how much of a thread's stack a translation takes
 :mod:`.packaging`    an FMU that holds libraries, and their sources
 ==================== ===================================================================
 

@@ -111,8 +111,8 @@ _SCALARS: dict[Any, Scalar] = {float: DOUBLE, int: INTEGER, bool: BOOLEAN, str: 
 _NAMES = {hint: name for name, hint in vars(vectors).items() if get_origin(hint) is tuple}
 
 
-#: Words in capitals: the headers of each system have macros of their own.
-_MACROS = re.compile(r"[A-Z][A-Z0-9_]{3,}")
+#: Words in capitals: the headers of each system have macros of their own, and modes.h has others.
+_MACROS = re.compile(r"[A-Z][A-Z0-9_]{3,}|MASK_\w+")
 
 #: Functions and types of the C libraries that could be those of a module and a function in it.
 _LIBRARY = re.compile(

@@ -219,17 +219,18 @@ def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
     return f"make({name}, {text})"
 
 
-def packed(given: Any, text: str) -> str:
-    """The text of a list of the values of ports, Reals first, from that of groups.
+def packed(given: Any, groups: Mapping[str, str]) -> str:
+    """The text of a list of the values of ports, Reals first, from those of groups.
 
     It raises OverflowError for an integer that FMI has no room for.
 
     Args:
         given: NamedTuple with a number or a tuple a group, in the order of the ports.
-        text: of a value of it.
+        groups: the texts of its fields.
 
     """
-    texts = [*scattered(given, text)]
+    hints = hints_of(given)
+    texts = [pair for name, text in groups.items() for pair in scattered(hints[name], text)]
     return f"[{', '.join(text for text, _ in sorted(texts, key=lambda it: it[1] is not float))}]"
 
 

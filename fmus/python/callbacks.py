@@ -262,8 +262,8 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             if not store.fresh:
                 self._refresh_outputs(vrs)
             return self._get(vrs, "Real")
-        if not store.fresh:
-            self._refresh_to_get()
+        if not store.fresh and (why := self._refresh()):
+            self._answer(Fmi2Status.error, why)
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
         return store.outputs if store.only_outputs else store.outputs[: len(vrs)]
 
@@ -305,12 +305,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._set(vrs, values, "String")
 
     def _refresh_outputs(self, vrs: list[int]) -> None:
-        if not self._store.all_outputs.isdisjoint(vrs):
-            self._refresh_to_get()
-
-    def _refresh_to_get(self) -> None:
-        why = self._refresh()
-        if why:
+        if not self._store.all_outputs.isdisjoint(vrs) and (why := self._refresh()):
             self._answer(Fmi2Status.error, why)
 
     def _get(self, vrs: list[int], fmi_type: str) -> list[Any]:

@@ -36,6 +36,7 @@ class Noise:
 
         """
         self._generator, self._count = generator, count
+        self._means, self._deviations = (0.0,) * count, (1.0,) * count
         self._note()
 
     @classmethod
@@ -69,7 +70,7 @@ class Noise:
             self._note()
         self._drawn += self._count
         gauss = self._generator.gauss
-        return tuple([gauss(0.0, 1.0) for _ in range(self._count)])
+        return tuple(map(gauss, self._means, self._deviations))
 
     def take_back(self) -> None:
         """Let the numbers that were drawn last be the next ones."""

@@ -4,15 +4,17 @@ Its methods are written out and compiled, because they run once a step: `advance
 that derives something of its state, may restart, and splits its steps becomes
 
     def advance(self, state, derived, inputs, t, h, n):
-        if not credible(self.parameters, state, inputs):
-            self.say(RESTARTED.format(t=t), warning, RESTARTED)
-            state = restarted(self.parameters, state, inputs)
+        if derived is None:
+            good = credible(self.parameters, state, inputs)
+            if not good: state = restarted(self.parameters, state, inputs)
+            derived = good, state, derive(self.parameters, state, inputs)
+        good, state, known = derived
+        if not good: self.say(RESTARTED.format(t=t), warning, RESTARTED)
         for i in range(n):
-            if derived is None:
-                derived = derive(self.parameters, state, inputs)
-            state = update(self.parameters, state, derived, inputs, t + i * h, h)
-            derived = None
-        return state, derived
+            if known is None: known = derive(self.parameters, state, inputs)
+            state = update(self.parameters, state, known, inputs, t + i * h, h)
+            known = None
+        return state, None
 
 and the method of a simpler one is shorter by what it lacks.
 """
@@ -29,7 +31,6 @@ from pythonfmu import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu.euler import LARGEST_STATE
-from auv_fmu.variable import Refusal
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import Definition, define
 from fmus.ports.groups import (
@@ -38,8 +39,6 @@ from fmus.ports.groups import (
     gathered,
     hints_of,
     packed,
-    reals_first,
-    scattered,
     unpacking,
 )
 from fmus.python.component import Component
@@ -70,7 +69,7 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
         "definition": definition,
         "ports": definition.ports,
         "outputs_of": _made_of(said, "outputs"),
-        "derived_of": _made_of(said, "derive"),
+        "derived_of": _made_of(said, "derive", *_GUARD),
         "unpack": staticmethod(unpacking(said.inputs, inputs)),
         "norm": staticmethod(norm),
     }
@@ -80,7 +79,6 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
         "isfinite": isfinite,
         "norm": norm,
         "nothing": Nothing(),
-        "Refusal": Refusal,
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
     }
@@ -103,14 +101,17 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
 #: Hooks that a method does nothing but call.
 _PLAIN = ("start", "check", "check_state", "seed")
 
+#: Hooks of a guard.
+_GUARD = ("credible", "restarted")
+
 _EVALUATE = ("state", "derived", "inputs", "t", "draws")
 _ADVANCE = ("state", "derived", "inputs", "t", "h", "n")
 
 
-def _made_of(said: Behaviour, hook: str) -> frozenset[str]:
-    """What a hook's result changes with."""
+def _made_of(said: Behaviour, *hooks: str) -> frozenset[str]:
+    """What the results of hooks change with."""
     known = ("inputs", "parameters", "t", "state")
-    return frozenset(argument for argument in known if said.takes(hook, argument))
+    return frozenset(one for one in known if any(said.takes(hook, one) for hook in hooks))
 
 
 def _method(name: str, arguments: tuple[str, ...], lines: Iterator[str] | list[str]) -> str:
@@ -128,62 +129,57 @@ def _plain(said: Behaviour, hook: str) -> Iterator[str]:
     yield f"return {_call(said, hook, parameters='parameters')}"
 
 
-def _guard(said: Behaviour, *lines: str) -> Iterator[str]:
-    """How a run goes on from another state; the lines are executed where it does."""
+def _known(said: Behaviour, hook: str) -> Iterator[str]:
+    """How what a hook needs is found out, once; with a guard that is of which state it is.
+
+    The name `known` is then for what is derived.
+    """
+    derive = _call(said, "derive") if "derived" in said.arguments(hook) else "None"
     if said.hooks["credible"]:
-        yield f"if not {_call(said, 'credible')}:"
-        yield from (f"    {line}" for line in (*lines, f"state = {_call(said, 'restarted')}"))
-
-
-def _derive(said: Behaviour, hook: str, t: str) -> Iterator[str]:
-    """How what a hook needs is derived, once."""
-    if "derived" in said.arguments(hook):
-        yield f"if derived is None: derived = {_call(said, 'derive', t=t)}"
+        yield "if derived is None:"
+        yield f"    good = {_call(said, 'credible')}"
+        yield f"    if not good: state = {_call(said, 'restarted')}"
+        yield f"    derived = good, state, {derive}"
+        yield "good, state, known = derived"
+    elif derive != "None":
+        yield f"if derived is None: derived = {derive}"
 
 
 def _advance(said: Behaviour) -> Iterator[str]:
     """How a run goes on."""
-    yield from _guard(said, "self.say(RESTARTED.format(t=t), warning, RESTARTED)")
+    derived = "derived"
+    if said.hooks["credible"]:
+        yield from _known(said, "update")
+        yield "if not good: self.say(RESTARTED.format(t=t), warning, RESTARTED)"
+        derived = "known"
     t, indent = "t", ""
     if said.h_max is not None:
         yield "for i in range(n):"
         t, indent = "t + i * h", "    "
     if said.hooks["update"]:
-        for line in _derive(said, "update", t):
-            yield indent + line
-        yield f"{indent}state = {_call(said, 'update', t=t)}"
+        if "derived" in said.arguments("update"):
+            yield f"{indent}if {derived} is None: {derived} = {_call(said, 'derive', t=t)}"
+        yield f"{indent}state = {_call(said, 'update', derived=derived, t=t)}"
     if _made_of(said, "derive") & {"state", "t"}:
-        yield f"{indent}derived = None"
-    yield f"if not norm(state) <= {LARGEST_STATE}: self.check_size(state)"
-    yield "return state, derived"
+        yield f"{indent}{derived} = None"
+    if said.hooks["update"]:
+        yield f"if not norm(state) <= {LARGEST_STATE}: self.check_size(state)"
+    yield f"return state, {'None' if said.hooks['credible'] else 'derived'}"
 
 
 def _evaluate(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
     """How outputs are evaluated; the names that it needs are put into the scope."""
     said = definition.behaviour
-    yield from _guard(said)
-    yield from _derive(said, "outputs", "t")
-    yield f"groups = {_call(said, 'outputs')}"
-    yield f"values = {packed(said.outputs, 'groups')}"
+    yield from _known(said, "outputs")
+    groups = {name: f"_{name}" for name in hints_of(said.outputs)}
+    call = _call(said, "outputs", derived="known" if said.hooks["credible"] else "derived")
+    yield f"{', '.join(groups.values())}, = {call}"
+    if said.noisy:
+        hint = hints_of(said.hooks["measured"])["n"]
+        n = gathered(hint, iter([f"draws[{i}]" for i in range(said.draws)]), scope)
+        noisy = groups[said.noisy]
+        yield f"{noisy} = {_call(said, 'measured', **{'n': n, said.noisy: noisy})}"
+    yield f"values = {packed(said.outputs, groups)}"
     # What is finite may still be too large to be added up.
     yield "if not isfinite(sum(values)): self._store.check_outputs(values)"
-    if said.noisy:
-        yield from _measure(definition, scope)
     yield "return derived, values"
-
-
-def _measure(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
-    """How an output gets its noise."""
-    said = definition.behaviour
-    order = [p.name for p in reals_first(definition.ports) if p.causality == "output"]
-    values = [f"values[{order.index(name)}]" for name in definition.noisy]
-    hint = hints_of(said.outputs)[said.noisy]
-    drawn = iter([f"draws[{i}]" for i in range(said.draws)])
-    n = gathered(hints_of(said.hooks["measured"])["n"], drawn, scope)
-    before = gathered(hint, iter(values), scope)
-    flat = ", ".join(text for text, _ in scattered(hint, "noisy"))
-    after = "noisy" if flat == "*noisy" else f"({flat},)"
-    yield f"noisy = {_call(said, 'measured', **{'n': n, said.noisy: before})}"
-    yield f"{', '.join(values)}, = noisy = {after}"
-    yield "if not isfinite(sum(noisy)) and not all(map(isfinite, noisy)):"
-    yield "    raise Refusal('a sampled output is not finite')"

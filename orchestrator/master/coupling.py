@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from ctypes import c_double
 from dataclasses import replace
 
 from orchestrator.machine.errors import InputError, StartError, shortened
@@ -142,14 +143,14 @@ class _LinearSteps:
         begin = values.copy()
         for instance in self._fed:
             instance.keep()
-        step_members(self._all, t, h, is_final=False)
+        step_members(self._all, c_double(t), c_double(h), is_final=False)
         self._settling.settle()
         slopes = (values - begin) / h
         values[self._inputs] = begin[self._inputs]
         for instance, (references, columns) in zip(self._fed, self._changing, strict=True):
             instance.go_back()
             instance.let_change(references, slopes[columns].tolist())
-        step_members(self._again, t, h)
+        step_members(self._again, c_double(t), c_double(h))
         for instance, (references, _) in zip(self._fed, self._changing, strict=True):
             instance.let_change(references, [0.0] * len(references))
         self._settling.settle()

@@ -7,6 +7,7 @@ same stage, have made their whole steps; the others are stepped in Python to whe
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from ctypes import c_double
 from dataclasses import replace
 from functools import partial
 
@@ -125,10 +126,10 @@ def _stepped_on(stage: Stage, end: Ended, t: float, h: float) -> Ended:
     for i, member in enumerate(stage.members):
         idle = _idle(member)
         try:
-            step_members([idle if i < begun else member], t, h)
+            step_members([idle if i < begun else member], c_double(t), c_double(h))
         except Ended as other:
             end = min(end, other, key=lambda one: one.time)
-            step_members([idle], t, h)
+            step_members([idle], c_double(t), c_double(h))
     return end
 
 
@@ -185,7 +186,7 @@ def _step_those_before(
             reached[name] = after if takes else t
         if not name or reached[name] > t:
             stepped.append(member)
-    step_members(stepped, t, h)
+    step_members(stepped, c_double(t), c_double(h))
 
 
 def _every(stage: Stage) -> int:

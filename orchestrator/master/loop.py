@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from ctypes import CDLL
+from ctypes import CDLL, c_double
 from functools import partial
 from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args
 
@@ -62,12 +62,14 @@ def step_interpreted(run: Run) -> Iterator[None]:
     steps = experiment.rows - 1
     is_not_finite = _watch(shown)
     for k, t, h, end in experiment.steps(run.made):
+        # Converted once for all of them.
+        time, length = c_double(t), c_double(h)
         if passing is not None:
-            make_stages(passing, values, experiment, steps, k - 1, t, h)
+            make_stages(passing, values, experiment, steps, k - 1, time, length)
             if is_not_finite():
                 return
             append(t, shown)
-        make_stages(stages, values, experiment, steps, k - 1, t, h)
+        make_stages(stages, values, experiment, steps, k - 1, time, length)
         if passing is None:
             if is_not_finite():
                 return

@@ -218,7 +218,8 @@ class Gathering:
         targets, sources: where they are in the row.
         factors, offsets: one for each.
         mapped: places of those that are mapped first, and what to; others stay what they are.
-        is_plain: whether all values arrive as they are.
+        acts: whether there are any values.
+        is_plain: whether there are, and all arrive as they are.
 
     """
 
@@ -228,7 +229,7 @@ class Gathering:
         self.factors = np.full(len(targets), FACTOR)
         self.offsets = np.full(len(targets), OFFSET)
         self.mapped: dict[int, Mapping[float, float]] = {}
-        self.is_plain = True
+        self.acts = self.is_plain = len(targets) > 0
 
     @classmethod
     def along(cls, row: Row, connections: Sequence[Connection]) -> Gathering:

@@ -126,7 +126,7 @@ class Stage(NamedTuple):
     @property
     def acts(self) -> bool:
         """Whether there is anything to do."""
-        return bool(self.members or len(self.gather.targets))
+        return bool(self.members) or self.gather.acts
 
 
 class Schedule(NamedTuple):
@@ -354,8 +354,8 @@ def make_stages(
     experiment: Experiment,
     steps: int,
     k: int,
-    t: float,
-    h: float,
+    t: c_double,
+    h: c_double,
 ) -> None:
     """Make some stages of a step.
 
@@ -373,15 +373,17 @@ def make_stages(
             # What most stages are costs no call.
             if gather.is_plain:
                 values[gather.targets] = values[gather.sources]
-            else:
+            elif gather.acts:
                 gather(values)
             step_members(members, t, h)
         elif decimation.is_due(k, steps):
             gather(values)
-            step_members(members, t, experiment.length(k, decimation.every))
+            step_members(members, t, c_double(experiment.length(k, decimation.every)))
 
 
-def step_members(members: Sequence[Member], t: float, h: float, is_final: bool = True) -> None:
+def step_members(
+    members: Sequence[Member], t: c_double, h: c_double, is_final: bool = True
+) -> None:
     """Step the components of a stage, which may run side by side until their outputs are asked.
 
     Values only pass through a component whose calls have no step.
@@ -392,15 +394,13 @@ def step_members(members: Sequence[Member], t: float, h: float, is_final: bool =
         is_final: whether no component will go back to its beginning.
 
     """
-    # Converted once for all of them.
-    time, length = c_double(t), c_double(h)
     for set_inputs, do_step, _, instance in members:
         for call in set_inputs:
             if (status := call()) != fmi2OK and status != fmi2Warning:
                 raise instance.failed(status, SET_INPUTS)
         if (
             do_step is not None
-            and (status := do_step(time, length, is_final)) != fmi2OK
+            and (status := do_step(t, h, is_final)) != fmi2OK
             and status != fmi2Warning
         ):
             raise instance.failed(status, DO_STEP)

@@ -132,7 +132,8 @@ def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
     table = read_result(folder / "native-kind")[1]["Pid.command"]
     for row in rows:
         np.testing.assert_array_equal(row, rows[0])
-        np.testing.assert_allclose(row, table, rtol=1e-12)
+        # A sampled component holds its outputs after a step, and fmpy reads them then.
+        np.testing.assert_allclose(row, [table[0], *table[:-1]], rtol=1e-12)
     if all(map(find_spec, EXTRAS[" hosts "])):
         lines = [line.split() for line in said.splitlines()]
         found = {words[0]: words for words in lines if words[:1] and "0.0e+00" in words}

@@ -59,10 +59,10 @@ def test_runs_of_the_guide_are_drawn(followed: Path):
 
 
 def test_both_bases_give_the_same_motion(followed: Path):
-    """Commands stand in the rows of the order that the run took: the plain slave has no other."""
-    plain, hardened = (
-        read_result(followed / folder / "results")[1] for folder in ("my_law", "hardened")
-    )
+    """In the only order that a plain slave allows, in which the disturbance acts a step earlier."""
+    plain = read_result(followed / "my_law/results")[1]
+    script = str(followed / "hardened/my_law.toml")
+    hardened = simulate(script, {"controller.k_p": 120.0}, order="gauss-seidel")
     motion = [
         name for name in plain.columns if name.startswith(("plant.eta", "plant.nu", "plant.y"))
     ]

@@ -100,12 +100,13 @@ def test_rho_hat_takes_the_command_beyond_any_limit(limit):
 def test_the_helix_is_not_bounded():
     text = text_of("Assumption 4: the helix is not bounded")
     planner = motion_planner.Parameters()
-    state, moving = motion_planner.begin(planner)
+    state = motion_planner.initial_state(planner.eta0, planner.nu0)
     found = []
-    for steps in (0, 5_000, 45_000):
-        if steps:
-            state, moving = motion_planner.steps(planner, state, moving, PAPER.h, steps)
-        found.append(f"{motion_planner.reference(state, moving, planner.ell).y_d[2]:.1f}")
+    for k in range(50_001):
+        moving = motion_planner.motion(planner.vehicle, state, planner.tau_d)
+        if k in (0, 5_000, 50_000):
+            found.append(f"{motion_planner.reference(state, moving, planner.ell).y_d[2]:.1f}")
+        state = motion_planner.step(state, moving, PAPER.h)
     assert all(tells(text, [depth]) for depth in found)
 
 

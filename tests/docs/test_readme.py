@@ -16,7 +16,7 @@ import pytest
 from auv_fmu.control_point import ELL
 from auv_fmu.output_feedback import Gains
 from auv_fmu.proof.attraction import theorem
-from auv_fmu.saturation import MAXIMUM_SLOPE
+from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.vehicle import Vehicle
 from orchestrator import simulate
 from orchestrator.paper.measures import (
@@ -78,7 +78,7 @@ def ranges(seed: int) -> list[float]:
 
 
 def no_gains_meet_31() -> bool:
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE["tanh"])
+    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
     return found.zeta_of_any_gains > found.bounds.lambda_d2
 
 

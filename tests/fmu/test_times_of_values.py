@@ -5,8 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import fmpy
+import numpy as np
 import pytest
 
+from auv_fmu.ocean_current import begin
+from auv_fmu.sea import Sea, regular_waves, water
 from fmus.compilers import machines_compiler
 from fmus.kinds import KINDS
 from orchestrator.runs.own_components import build_own
@@ -169,3 +172,19 @@ def test_time_is_that_of_a_host_that_counts_its_steps(continuous: Library):
         t = start + 1000.5 * h
         assert host.step(t, h) == Status.OK
         assert seen(host)[1][1] == t + h
+
+
+@pytest.mark.parametrize("bundle", ["dist", "native", "dist3"])
+def test_a_long_step_of_the_sea_ends_with_the_elevation_of_its_end(request, bundle: str):
+    """A tool that steps the FMU alone, once a second, shows at t what holds at t."""
+    fmu = request.getfixturevalue(bundle) / "Sea.fmu"
+    table = fmpy.simulate_fmu(
+        str(fmu), stop_time=20.0, step_size=1.0, output_interval=1.0, output=["elevation"]
+    )
+    given = Sea()
+    components, begun = regular_waves(given), begin(given.current)
+    expected = [
+        water(given, components, begun, (0.0, 0.0, 0.0), t).elevation for t in table["time"]
+    ]
+    assert max(map(abs, expected)) > 0.1
+    np.testing.assert_allclose(table["elevation"], expected, rtol=0.0, atol=1e-12)

@@ -192,16 +192,23 @@ def test_one_fmu_is_a_system_with_its_own_experiment(tmp_path: Path, capsys):
     assert "has no variants" in capsys.readouterr().err
 
 
-def test_export_names_the_texts_that_other_tools_may_leave_out(tmp_path: Path, capsys):
+@pytest.mark.parametrize(
+    ("kind", "own", "other", "tools"),
+    [("String", "a", "b", "OMSimulator"), ("Enumeration", "slow", "fast", "libcosim ecos")],
+)
+def test_export_names_the_values_that_other_tools_may_leave_out(
+    tmp_path: Path, capsys, kind: str, own: str, other: str, tools: str
+):
     ports = (variable("u", "input"), variable("y", "output"))
-    texts = (variable(f"text{i}", "parameter", "String", start="a") for i in (1, 2))
-    path = fmu(tmp_path / "m.fmu", *ports, *texts)
+    given = {"start": own} if kind == "String" else {}
+    values = (variable(f"p{i}", "parameter", kind, **given) for i in (1, 2))
+    path = fmu(tmp_path / "m.fmu", *ports, *values)
     command = ["export", str(path), "--out", str(tmp_path / "x"), "--force"]
-    assert main([*command, "--set", "m.text1=a"]) == 0
-    assert "text" not in capsys.readouterr().err
-    assert main([*command, "--set", "m.text2=b"]) == 0
+    assert main([*command, "--set", f"m.p1={own}"]) == 0
+    assert "m.p" not in capsys.readouterr().err
+    assert main([*command, "--set", f"m.p2={other}"]) == 0
     [line] = capsys.readouterr().err.splitlines()
-    assert mentions(line, "m.text2 String OMSimulator") and "text1" not in line
+    assert mentions(line, f"m.p2 {kind} {tools}") and "p1" not in line
 
 
 @pytest.mark.parametrize("name", ["", "SystemStructure.ssd", "Winter.ssd"])

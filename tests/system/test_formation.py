@@ -82,7 +82,7 @@ def test_followers_lose_their_leader_as_the_remark_says(fleets):
     proposed, pd = fleets("formation-lost-link")
     assert 1.7 < proposed.largest(25.0) < 1.8 and 2.2 < pd.largest(25.0) < 2.3
     assert proposed.largest(100.0) == pytest.approx(0.12, abs=0.005)
-    assert pd.largest(100.0) == pytest.approx(0.085, abs=0.005)
+    assert pd.largest(100.0) == pytest.approx(0.09, abs=0.005)
     for fleet in (proposed, pd):
         assert fleet.distance.min() == pytest.approx(0.2, abs=0.05)
         lost = fleet.result["auv2.link.lost"]

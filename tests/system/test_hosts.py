@@ -22,7 +22,6 @@ from orchestrator.exchange.hosts import comparison, here
 from orchestrator.exchange.hosts.comparison import HOSTS, Host, compare
 from orchestrator.exchange.hosts.environments import folder_of, is_whole
 from orchestrator.exchange.verify import verify
-from orchestrator.formats.ssp.writer import structure_xml
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import JACOBI, Experiment
 from orchestrator.runs.scenario import read_scenario
@@ -154,6 +153,13 @@ def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: s
 @pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos", "container"])
 def test_formations_and_seas_have_our_numbers_in_other_hosts(native: Path, host: str, scenario):
     system = closed_loop(native, read_scenario(scenario))
+    if host != "container":
+        # They leave the other shape as it is in the FMU.
+        own = {
+            name: system.component(name.component).start(name.port)
+            for name in system.changed("Enumeration")
+        }
+        system = system.with_parameters(own)
     if (scenario, host) == ("sea", "container"):
         # It passes initial values on once: friction has not heard of the water by then.
         system = system.with_parameters({PortName("disturbance", "A_f"): 0.0})
@@ -188,12 +194,22 @@ def test_host_gives_the_numbers_of_our_master_with_fmi_3(dist3: Path, host: str)
     check(closed_loop(dist3, read_scenario("fig4")), host, 500)
 
 
-@pytest.mark.parametrize("host", ["libcosim-ssp", *slow("ecos")])
-def test_text_in_a_parameter_set_reaches_its_component_without_a_connector(dist: Path, host: str):
-    """The other saturation moves the vehicle by 19 cm in these steps."""
-    system = closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
-    assert b'name="saturation"' not in structure_xml(system)
-    check(system, host, 300)
+def chosen(dist: Path) -> System:
+    """With the other saturation, which moves the vehicle by 19 cm in 300 steps."""
+    return closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
+
+
+@pytest.mark.parametrize("host", ["c-program", *slow("container")])
+def test_a_choice_reaches_its_component(dist: Path, host: str):
+    check(chosen(dist), host, 300)
+
+
+@pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos"])
+def test_tools_without_enumerations_are_held_to_no_choice(dist: Path, host: str):
+    require(host)
+    [verdict] = compare(chosen(dist), [host], 3, 0.02)
+    assert "controller.saturation" in str(verdict.failure)
+    assert "Error" not in str(verdict.failure)
 
 
 @pytest.mark.parametrize("host", slow("libcosim-ssp", "libcosim-osp"))
@@ -297,4 +313,4 @@ def test_ecos_command_line_runs_the_ssp_with_an_empty_environment(dist: Path, tm
     )  # fmt: skip
     assert process.returncode == 0, process.stdout + process.stderr
     said = verify(tmp_path / "auv.csv", closed_loop(dist), 1e-5)
-    assert "to 5 s, in jacobi order" in said
+    assert "to 5 s, in jacobi order, outputs read after values are passed on" in said

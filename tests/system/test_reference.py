@@ -11,11 +11,11 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
-from fmus.discovery import REFERENCE, components, package_folder
+from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import INITIAL
+from orchestrator.master.experiment import INITIAL, ORDERS, OrderName
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.system.component import read_component
 from orchestrator.system.names import PortName
@@ -26,19 +26,16 @@ from support.texts import mentions, numbers_in, tells
 
 COMMITTED = Path(__file__).parents[2] / REFERENCE
 
-#: Packages of the components, by name.
-COMPONENTS = components()
-
 #: Orders in which tools step the components.
 ORDER = ("plant", "controller", "disturbance", "planner")
 OTHER_ORDER = ("controller", "plant", "planner", "disturbance")
 
 
-@pytest.mark.parametrize("name", COMPONENTS)
+@pytest.mark.parametrize("name", components())
 def test_a_fresh_run_of_each_fmu_is_the_reference(dist: Path, name: str):
     """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""
     component = read_component(name, dist / f"{name}.fmu")
-    committed = package_folder(COMPONENTS[name]) / REFERENCE
+    committed = source_of(name).folder / REFERENCE
     path = committed / f"{name}_in.csv"
     inputs = read_csv(path) if path.is_file() else None
     outputs = reference_outputs(component, inputs)
@@ -53,10 +50,11 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
     assert "to 4 s, in jacobi order" in verify(COMMITTED / "auv_ref.csv", system, 1e-9)
 
 
-def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path):
+@pytest.mark.parametrize("order", ORDERS)
+def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path, order: OrderName):
     path = tmp_path / "ours.csv"
-    write(run(system, 2.0, 0.02), path)
-    assert "in gauss-seidel order" in verify(path, system, 1e-12)
+    write(run(system, 2.0, 0.02, order), path)
+    assert f" s, in {order} order\n" in verify(path, system, 1e-12)
 
 
 def test_own_table_of_another_step_is_verified_with_that_step(workplace, capsys):
@@ -164,23 +162,77 @@ class OtherTool:
             value = self.values[wire.source.component, wire.source.port]
             self.slaves[name].setReal([self.references[name][wire.target.port]], [value])
 
+    def step(self, k: int, group: Sequence[str]) -> None:
+        for name in group:
+            self.set(name)
+        for name in group:
+            self.slaves[name].doStep(k * 0.02, 0.02)
+        for name in group:
+            self.read(name)
+
     def rows(self, groups: Sequence[Sequence[str]], steps: int = 200) -> list[list[float]]:
         """Time and all values after each step."""
         rows = []
         for k in range(steps):
             for group in groups:
-                for name in group:
-                    self.set(name)
-                for name in group:
-                    self.slaves[name].doStep(k * 0.02, 0.02)
-                for name in group:
-                    self.read(name)
+                self.step(k, group)
             rows.append([(k + 1) * 0.02, *self.values.values()])
         return rows
 
     def write(self, path: Path, rows: Sequence[Sequence[float]]) -> None:
         lines = [",".join(["time", *map(".".join, self.values)])]
         path.write_text("\n".join([*lines, *(",".join(map(repr, row)) for row in rows)]))
+
+
+def test_table_of_a_tool_that_reads_outputs_after_it_has_passed_them_on_is_certified(
+    native: Path, tmp_path: Path
+):
+    """The others step with what they had before, as PyFMI and ecos do."""
+    path, system = tmp_path / "table.csv", closed_loop(native)
+    tool, rows = OtherTool(system, "full"), []
+    for k in range(200):
+        tool.step(k, ORDER)
+        passed_on = dict(tool.values)
+        for name in ORDER:
+            tool.set(name)
+        for name in ORDER:
+            tool.read(name)
+        rows.append([(k + 1) * 0.02, *tool.values.values()])
+        tool.values = passed_on
+    tool.write(path, rows)
+    certified(path, system, "in jacobi order, outputs read after values are passed on")
+
+
+def test_table_of_a_tool_that_follows_feedthrough_is_certified_before_and_after_it_does(
+    native: Path, tmp_path: Path
+):
+    """OMSimulator writes both rows, of which the first counts."""
+    path, system = tmp_path / "table.csv", closed_loop(native)
+    tool, before, after = OtherTool(system, "full"), [], []
+    for k in range(200):
+        # What comes round is there after as many exchanges as there are components.
+        for name in ORDER * len(ORDER):
+            tool.set(name)
+            tool.read(name)
+        after.append([k * 0.02, *tool.values.values()])
+        for name in ORDER:
+            tool.slaves[name].doStep(k * 0.02, 0.02)
+        for name in ORDER:
+            tool.read(name)
+        before.append([(k + 1) * 0.02, *tool.values.values()])
+    tool.write(path, after)
+    certified(path, system, "in feedthrough order")
+    tool.write(path, before)
+    certified(path, system, "in feedthrough order, outputs read before values are passed on")
+    before[100][1] += 1e-3
+    tool.write(path, before)
+    with pytest.raises(InputError, match=r"in feedthrough order, .* at t = 2\.02 s"):
+        verify(path, system, 1e-9)
+
+
+def certified(path: Path, system: System, way: str) -> None:
+    compared, *_ = verify(path, system, 1e-12).splitlines()
+    assert numbers_in(compared)[:2] == [66, 70] and compared.endswith(f" s, {way}")
 
 
 @pytest.mark.parametrize("initial", INITIAL)

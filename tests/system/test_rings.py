@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import permutations
 from math import isfinite, sin
+from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 
@@ -54,6 +56,31 @@ def test_static_rings_are_solved_in_every_row_whatever_their_gain(folder, k, l, 
     solution = np.sin(table.time) / (1.0 - k * l)
     np.testing.assert_allclose(table["a.y1"], solution, rtol=0.0, atol=1e-13)
     np.testing.assert_allclose(table["b.y1"], l * solution, rtol=0.0, atol=1e-13)
+
+
+def test_a_ring_through_our_controller_is_solved_without_a_step(folder, dist: Path):
+    """What it measures follows its own command, 50 times too much for going round in circles.
+
+    FMPy gives it alone what the ring has come to, and gets its commands after the step.
+    """
+    fmu, controller = linear(folder, can=False), dist / "ObserverController.fmu"
+    k, own = 0.1, {"innovation_gate": 0.0}
+    system = system_of(
+        {"s": fmu, "gain": fmu, "controller": controller},
+        {"s": SINE, "gain": Part(D=[[0.0, 0.0], [k, 0.1]])},
+        {"gain.u0": "controller.tau.u", "gain.u1": "s.y0", "controller.y.x": "gain.y1"},
+    ).with_parameters({PortName("controller", name): value for name, value in own.items()})
+    table = run(system, Experiment(1.0, 0.02))
+    assert table.header.experiment.order == "feedthrough"
+    tau, y = table["controller.tau.u"], table["gain.y1"]
+    np.testing.assert_allclose(y, k * tau + 0.1 * np.sin(table.time), rtol=0.0, atol=1e-9)
+    given = np.array([*zip(table.time, y, strict=True)], dtype=[("time", float), ("y.x", float)])
+    alone = fmpy.simulate_fmu(
+        str(controller), stop_time=1.0, step_size=0.02, output_interval=0.02, input=given,
+        output=["tau.u"], start_values=own,
+    )  # fmt: skip
+    assert np.ptp(tau) > 0.1
+    np.testing.assert_allclose(tau[:-1], alone["tau.u"][1:], rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("names", list(permutations("sab")))

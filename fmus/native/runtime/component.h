@@ -89,7 +89,6 @@ static void get_reals(call *this, const uint32_t references[], size_t n, double 
 static void prepare_to_get(call *this, const uint32_t references[], size_t n);
 static int32_t get_integer(call *this, uint32_t reference);
 static int get_boolean(call *this, uint32_t reference);
-static int64_t get_enumeration(call *this, uint32_t reference);
 
 /* All values of a call are taken, or none: they are set one by one between the beginning and the
  * end of a setting. */

@@ -195,6 +195,10 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
         return end(&this);                                                                       \
     }
 
+static int64_t get_enumeration(call *this, uint32_t reference) {
+    return (int64_t)number_of(this, reference, ENUMERATION);
+}
+
 GET(fmi3GetInt32, int32_t, get_integer)
 GET(fmi3GetBoolean, boolean, get_boolean)
 GET(fmi3GetInt64, int64_t, get_enumeration)

@@ -151,10 +151,6 @@ static int get_boolean(call *this, uint32_t reference) {
     return number_of(this, reference, BOOLEAN) != 0.0;
 }
 
-static int64_t get_enumeration(call *this, uint32_t reference) {
-    return (int64_t)number_of(this, reference, ENUMERATION);
-}
-
 /* Setting */
 
 /* Inputs or parameters of the run have changed: what depends on them has to follow. */

@@ -139,38 +139,12 @@ static void append_number(message *it, string directive, double number) {
     append_text(it, text);
 }
 
-/* A text as Python's repr shows it, except rare characters that it takes to be unprintable. */
-static void append_quoted(message *it, string text) {
-    char quote = strchr(text, '\'') != NULL && strchr(text, '"') == NULL ? '"' : '\'';
-    char ends[] = {quote, '\0'};
-    append_text(it, ends);
-    while (*text != '\0' && it->characters < MOST_CHARACTERS) {
-        char shown[16];
-        uint32_t character;
-        int length = character_of(text, &character);
-        int unprintable = character < 0x20 || (character >= 0x7f && character <= 0xa0) ||
-                          character == 0xad;
-        if (character == '\\' || character == (unsigned char)quote) {
-            snprintf(shown, sizeof shown, "\\%c", (char)character);
-        } else if (character == '\t' || character == '\n' || character == '\r') {
-            snprintf(shown, sizeof shown, "\\%c", "tn\0\0r"[character - '\t']);
-        } else if (unprintable) {
-            snprintf(shown, sizeof shown, "\\x%02x", (unsigned)character);
-        } else {
-            snprintf(shown, sizeof shown, "%.*s", length, text);
-        }
-        append_text(it, shown);
-        text += length;
-    }
-    append_text(it, ends);
-}
-
 /* What a directive may have between its % and its letter, and how long it is with both. */
 static const char MODIFIERS[] = "+ .0123456789";
 enum { LONGEST_DIRECTIVE = 16 };
 
-/* Writes a text: %s is a text; %q a text in quotes; %r a number exactly; %d an integer; %u a
- * reference; %% a percent sign; all else a number as printf writes it, such as %g or %+.2f. */
+/* Writes a text: %s is a text; %r a number exactly; %d an integer; %u a reference; %% a percent
+ * sign; all else a number as printf writes it, such as %g or %+.2f. */
 static void compose_from(message *it, string format, va_list arguments) {
     clear(it);
     while (*format != '\0') {
@@ -184,7 +158,6 @@ static void compose_from(message *it, string format, va_list arguments) {
         switch (letter) {
             case '%': append_text(it, "%"); break;
             case 's': append_text(it, va_arg(arguments, string)); break;
-            case 'q': append_quoted(it, va_arg(arguments, string)); break;
             case 'r': append_exactly(it, va_arg(arguments, double)); break;
             case 'd':
                 snprintf(number, sizeof number, "%d", va_arg(arguments, int));

@@ -172,7 +172,7 @@ class _Slave:
         """
         called = self.dll[f"{self.prefix}{name}"]
         called.argtypes, called.restype = types, fmi2Status
-        return partial(called, ctypes.c_void_p(self.component))
+        return partial(called, ctypes.c_void_p.from_param(self.component))
 
     def address(self, name: str) -> int | None:
         """Where one of the FMU's functions is."""
@@ -327,7 +327,7 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
         self._told = told = CTold()
         called = self.function("DoStep")
         outputs = [
-            ctypes.c_void_p(addressof(told) + getattr(type(told), name).offset)
+            ctypes.c_void_p.from_param(addressof(told) + getattr(type(told), name).offset)
             for name, _ in told._fields_
         ]
 

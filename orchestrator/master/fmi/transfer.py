@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
-from ctypes import CFUNCTYPE, POINTER, Structure, addressof, c_size_t, c_void_p, cast
+from ctypes import CFUNCTYPE, POINTER, Structure, addressof, byref, c_size_t, c_void_p, cast
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -147,9 +147,11 @@ class PortBlock:
             # A byte of a Boolean may be neither 0 nor 1.
             of = np.uint8 if moved.c_type is ctypes.c_bool else np.dtype(moved.c_type)
             self._numbers = np.frombuffer(self._values, dtype=of)
-        self._arguments: tuple[Any, ...] = (self._references, c_size_t(n_references), self._values)
+        # As ctypes passes them on: to convert them in every call costs a third of it.
+        count = c_size_t.from_param
+        self._arguments = [byref(self._references), count(n_references), byref(self._values)]
         if moved.is_counted:
-            self._arguments += (c_size_t(n),)
+            self._arguments.append(count(n))
 
     def mover(self, function: Callable[..., int]) -> Callable[[], int]:
         """A call that hands the values to an FMU or takes them, by its function of this block."""

@@ -13,6 +13,7 @@ import socket
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from contextlib import suppress
+from ctypes import c_double
 from functools import partial
 from math import inf
 from pathlib import Path
@@ -204,7 +205,7 @@ class _Served:
     def _step(self) -> None:
         t, h = self._channel.incoming[:2]
         if h:
-            step_members([self._member], t, h)
+            step_members([self._member], c_double(t), c_double(h))
         else:
             self._instance.exchange()
 

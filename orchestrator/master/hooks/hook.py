@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from ctypes import c_double
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
@@ -68,7 +69,7 @@ class Run:
         experiment, k = self.experiment, self.made
         make_stages(
             self.passing or (), self.row.values, experiment, experiment.rows - 1,
-            k, self.time, experiment.length(k, 1),
+            k, c_double(self.time), c_double(experiment.length(k, 1)),
         )  # fmt: skip
 
     @contextmanager

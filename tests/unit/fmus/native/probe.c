@@ -36,10 +36,10 @@ EXPORT void show_in(string format, double number, char *text) {
     strcpy(text, it.text);
 }
 
-EXPORT void show_text(string text, char *quoted) {
+EXPORT void show_text(string text, char *shown) {
     message it;
-    compose(&it, "%q", text);
-    strcpy(quoted, it.text);
+    compose(&it, "%s", text);
+    strcpy(shown, it.text);
 }
 
 EXPORT int utf8(string text) { return is_utf8(text); }

@@ -17,8 +17,8 @@ class One(NamedTuple):
 
 
 def chosen(name: str, choices: dict[str, int]) -> Port:
-    """A parameter whose value is one of some texts."""
-    return Port(name, "parameter", "fixed", "String", "", start=[*choices][-1], choices=choices)
+    """A parameter whose value is one of some numbers."""
+    return Port(name, "parameter", "fixed", "Enumeration", "", start=0, choices=choices)
 
 
 def row_of(name: str) -> list[str]:
@@ -59,7 +59,7 @@ def test_a_start_of_minus_zero_stays_one():
     assert '"u.x", REAL, INPUT, CONTINUOUS, 0, -0.0, ' in tables(of)
 
 
-def test_choices_are_texts_in_c():
+def test_names_of_choices_are_texts_in_c():
     odd = {'a"b\\': 0, "??/": -(2**31)}
     of = replace(build.definition(), ports=(chosen("odd", odd),))
     of = replace(of, parameters=ParameterSet(One, odd=of.ports[0]))
@@ -67,7 +67,7 @@ def test_choices_are_texts_in_c():
     assert r'{{"a\"b\\", 0}, {"\?\?/", -2147483648}};' in tables(of)
 
 
-def test_members_of_enumerations_are_choices_of_texts_and_states():
+def test_members_of_enumerations_are_choices_of_ports_and_states():
     text = tables(build.definition())
     choices = '{{"off", 0}, {"heat", 2}, {"cool", -7}};'
     for name in ("choices_of_mode", "choices_of_limits_kind"):

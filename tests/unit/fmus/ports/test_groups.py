@@ -11,7 +11,16 @@ import pytest
 from auv_fmu import Matrix, Variable, Vector
 from auv_fmu.quantities import NU, POSITION, TAU, per_axis
 from fmus.ports.fields import declared
-from fmus.ports.groups import SCOPE, Nothing, ParameterSet, packed, ports_in, slices, unpacking
+from fmus.ports.groups import (
+    SCOPE,
+    Nothing,
+    ParameterSet,
+    hints_of,
+    packed,
+    ports_in,
+    slices,
+    unpacking,
+)
 from fmus.ports.port import Port
 
 Vector3 = tuple[float, float, float]
@@ -25,7 +34,8 @@ def ports_of(made: type, causality: str = "input") -> list[Port]:
 
 def packing(made: type) -> Callable[[Any], list[Any]]:
     """What a slave does with the outputs, whose text it puts into its own."""
-    function: Callable[[Any], list[Any]] = eval(f"lambda it: {packed(made, 'it')}", {**SCOPE})
+    groups = {name: f"it.{name}" for name in hints_of(made)}
+    function: Callable[[Any], list[Any]] = eval(f"lambda it: {packed(made, groups)}", {**SCOPE})
     return function
 
 

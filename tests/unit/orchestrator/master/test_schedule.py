@@ -65,7 +65,7 @@ def test_outputs_are_asked_for_when_all_of_a_stage_have_been_stepped():
 
         return Member([call("set")], call("step"), [call("get")], SimpleNamespace())
 
-    step_members([called("a"), called("b")], 1.5, 0.5)
+    step_members([called("a"), called("b")], c_double(1.5), c_double(0.5))
     assert calls == [
         ("a", "set"), ("a", "step", 1.5, 0.5), ("b", "set"), ("b", "step", 1.5, 0.5),
         ("a", "get"), ("b", "get"),
@@ -79,9 +79,9 @@ def test_a_status_worse_than_a_warning_ends_the_step(where):
     failed = SimpleNamespace(failed=ValueError)
     member = Member([lambda: status[0]], lambda *_: status[1], [lambda: status[2]], failed)
     with pytest.raises(ValueError, match=("inputs", "doStep", "outputs")[where]) as error:
-        step_members([member], 0.0, 1.0)
+        step_members([member], c_double(0.0), c_double(1.0))
     assert error.value.args[0] == fmi2Error
-    step_members([Member([], lambda *_: fmi2Warning, [], failed)], 0.0, 1.0)
+    step_members([Member([], lambda *_: fmi2Warning, [], failed)], c_double(0.0), c_double(1.0))
 
 
 def test_what_acts_in_place_of_a_step_may_fail_as_one_does():

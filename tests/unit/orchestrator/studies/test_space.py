@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -60,7 +61,10 @@ def test_list_for_a_group_is_a_value_for_each_member():
         space(parameters={"controller.K1": [1, 2]}, vary={"plant.ell": [0.3, 0.4]})
 
 
-FORMATION = load_scenario("formation-v")
+@cache
+def formation() -> Any:
+    """Loaded in a test, not where tests are collected: FMUs may have to be built."""
+    return load_scenario("formation-v")
 
 
 @given(
@@ -78,7 +82,7 @@ def test_parameters_of_a_study_are_those_of_a_scenario(star, own, is_first):
     stars = {"auv*.plant.noise.std": star}
     parameters = {**stars, **named} if is_first else {**named, **stars}
     content = {"scenario": "x", "parameters": parameters, "vary": {"auv1.plant.ell": [0.3]}}
-    runs = Space(study_of("mine", content), {"x": FORMATION})
+    runs = Space(study_of("mine", content), {"x": formation()})
     expected = {"auv1.plant.ell": 0.3}
     for k in range(3):
         value = star

@@ -108,6 +108,30 @@ def test_what_is_written_is_valid(found: System, tmp_path: Path, step: float | N
         read_ssv(str(path), name)
 
 
+def test_choices_are_numbers_without_connectors(found: System, tmp_path: Path):
+    """Other tools end at an Enumeration there, or do not set it."""
+    [path] = write_ssp(found, tmp_path)
+    with ZipFile(path) as content:
+        [of_k] = [name for name in content.namelist() if name.startswith("parameters/inner")]
+        assert b'<ssv:Integer value="5" />' in content.read(of_k)
+        written = ElementTree.fromstring(content.read("SystemStructure.ssd"))
+    kinds = {(c.get("name"), c.get("kind")) for c in written.iterfind(".//{*}Connector")}
+    assert ("n", "output") in kinds and not {("k", "parameter"), ("t", "parameter")} & kinds
+
+
+def test_choices_that_libcosim_does_not_set_are_not_written_for_it(tmp_path: Path):
+    path = fmu(
+        tmp_path / "a.fmu", variable("y", "output"), variable("k", "parameter", "Enumeration")
+    )
+    (tmp_path / "out").mkdir()
+    system = replace(small_fmus.connected("s", {"a": path}, {}, {"a.k": "slow"}), step=0.1)
+    structure, _ = write_osp(system, tmp_path / "out")
+    assert "InitialValue" not in structure.read_text()
+    with pytest.raises(InputError) as error:
+        write_osp(system.with_parameters({PortName("a", "k"): "fast"}), tmp_path / "out")
+    assert mentions(str(error.value), "a.k Enumeration libcosim")
+
+
 def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
     found: System, tmp_path: Path
 ):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from ctypes import c_double
 from pathlib import Path
 
 import numpy as np
@@ -44,7 +45,7 @@ def stepped(instance: Instance, row: Row, first: int, n: int) -> np.ndarray:
     """The rows after some steps, of which the first is given by its number."""
     rows = np.empty((n, len(row.values)))
     for i in range(n):
-        step_members([member(instance)], (first + i) * STEP, STEP)
+        step_members([member(instance)], c_double((first + i) * STEP), c_double(STEP))
         rows[i] = row.values
     return rows
 
