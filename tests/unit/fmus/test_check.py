@@ -103,7 +103,7 @@ def test_what_is_no_component_is_refused(tmp_path):
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_what_the_compiler_says_of_the_translation_is_told(tmp_path, monkeypatch):
-    monkeypatch.setattr(packaging, "tables", lambda definition: "int = 1;\n")
+    monkeypatch.setattr(packaging, "tables", lambda *_: "int = 1;\n")
     monkeypatch.chdir(tmp_path)
     write(tmp_path, name="own_c")
     [line] = check.mistakes(Path("own_c.py"), tmp_path)

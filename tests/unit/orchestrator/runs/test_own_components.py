@@ -157,11 +157,11 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
         ),
         (
             ["build", "own_lag.py", "--fmi", "3"],
-            "cannot build the FMUs: --platforms and --fmi 3 need --kind native",
+            "cannot build the FMUs: --platforms, --fmi 3 and --arrays need --kind native",
         ),
         (
             ["build", "slave.py", "--fmi", "3"],
-            "cannot build the FMUs: --platforms and --fmi 3 need --kind native",
+            "cannot build the FMUs: --platforms, --fmi 3 and --arrays need --kind native",
         ),
         (
             ["build", "slave.py", "--kind", "native"],
