@@ -130,9 +130,9 @@ def _plan(system: System, experiment: Experiment, library: LibraryOf) -> str:
         }
         passing = {name: _struct(of=numbers[name], sets=1, gets=1) for name in direct}
         # States that something takes before they pass are read after the step.
-        place = {name: i for i, names in enumerate(parts) for name in names}
+        positions = {name: i for i, names in enumerate(parts) for name in names}
         wires = [(one.source.component, one.target.component) for one in system.connections]
-        early = {source for source, target in wires if place[source] >= place[target]}
+        early = {source for source, target in wires if positions[source] >= positions[target]}
         stepping = {
             name: _struct(of=numbers[name], steps=1, gets=int(name in early)) for name in direct
         }

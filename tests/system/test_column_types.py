@@ -101,12 +101,12 @@ def write_inputs(path: Path, rows: Sequence[dict[str, Value]]) -> None:
 
 
 def check(result: Result, rows: Sequence[dict[str, Value]]) -> None:
-    """A row has what its step was made with; the first one, what the first step will be."""
+    """A row has what its time has in the table, and what follows from it at once."""
     for kind in VALUES:
-        expected = [rows[max(k - 1, 0)][kind] for k in range(len(rows) + 1)]
+        expected = [rows[min(k, len(rows) - 1)][kind] for k in range(len(rows) + 1)]
         for port in (f"a.u_{kind}", f"a.y_{kind}"):
             assert result[port].tolist() == expected, port
-    assert result["a.joined[2]"].tolist() == [f"b{rows[max(k - 1, 0)]['String']}" for k in range(4)]
+    assert result["a.joined[2]"].tolist() == [f"b{rows[min(k, 2)]['String']}" for k in range(4)]
 
 
 @given(rows=st.lists(ROW, min_size=3, max_size=3), data=st.data())
