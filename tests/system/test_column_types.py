@@ -139,9 +139,7 @@ def test_a_column_is_what_the_fmu_has_wherever_it_is_read(fmu: Path, rows, data)
         places = [0, *(i for i, name in enumerate(lines[0]) if name.startswith("a.u_"))]
         with (folder / "twice.csv").open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, quoting=csv.QUOTE_ALL)
-            writer.writerow([lines[0][i] for i in places])
-            for k, line in enumerate(lines[2:]):
-                writer.writerow([k * H, *(line[i] for i in places[1:])])
+            writer.writerows([line[i] for i in places] for line in lines)
         twice = simulate(typed.system_of(fmu), stop_time=3 * H, step=H, inputs=folder / "twice.csv")
         check(twice, rows)
 
