@@ -20,7 +20,7 @@ from auv_fmu.variable import Refusal
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import class_of, is_class, parts_of, whole
 from fmus.ports.port import Value, is_int32
-from fmus.python.callbacks import INSTANTIATED, MODES, STEPPING, Store
+from fmus.python.callbacks import INITIALISING, INSTANTIATED, MODES, STEPPING, Store
 from fmus.python.noise import check_draws
 
 #: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
@@ -185,10 +185,13 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         raise Refusal("it has missing or unknown parts")
     mode, state = saved["mode"], saved["state"]
     start_time, stop_time = restored(float, saved["start_time"]), _time(saved["stop_time"])
+    time = _time(saved["time"])  # one that is finite may have a step to one that is not
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
     if not start_time < stop_time:
         raise Refusal("its stop time is not after its start time")
+    if mode in (INSTANTIATED, INITIALISING) and time != start_time:
+        raise Refusal("its time is not its start time")
     if not isinstance(saved["fault"], bool):
         raise Refusal("its fault is neither true nor false")
     if not (isinstance(saved["fresh"], bool) and isinstance(saved["held"], bool)):
@@ -211,8 +214,7 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
         mode=mode,
         start_time=start_time,
         stop_time=stop_time,
-        # A time that is finite may have a step to one that is not.
-        time=_time(saved["time"]),
+        time=time,
         parameters={port.name: port.checked(parameters[port.name]) for port in declared},
         inputs=_values(store, store.input_references, saved["inputs"]),
         outputs=_values(store, sampled, saved["outputs"]),

@@ -310,7 +310,8 @@ class _Samples:
 
     def end(self, ending: Ending) -> None:
         """Take the samples that lie after the last row, apart from rounding."""
-        self._sample(self._last, len(self._times))
+        if len(self._last):
+            self._sample(self._last, len(self._times))
 
     def _sample(self, rows: np.ndarray, end: int) -> None:
         times = self._times[self._n : end]

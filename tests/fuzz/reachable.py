@@ -58,6 +58,8 @@ def _faults(
     if said["mode"] not in MODES:
         yield "no mode"
     yield from _faults_of_times(said["start_time"], said["stop_time"])
+    if said["mode"] in MODES[:2] and said["time"] != said["start_time"]:
+        yield "a time that is not the start time"
     keeps = behaviour_of(description.name).is_sampled and said["state"] is not None
     for key, causality in (("inputs", "input"), *([("outputs", "output")] * keeps)):
         all_ports = [port for port in description.of(causality) if port.name != "fault"]
@@ -125,8 +127,8 @@ def _is_number(value: Any) -> bool:
 
 
 def _fits(fmu: Description, port: Variable, value: Any) -> bool:
-    if port.type == "String":
-        return value in choices_of(fmu.name, port.name)
+    if choices := choices_of(fmu.name, port.name):
+        return type(value) is int and value in choices
     if port.type == "Boolean":
         return isinstance(value, bool)
     if port.type == "Integer" and not isinstance(value, int):
@@ -211,7 +213,10 @@ def _follows(said: dict[str, Any], name: str) -> Iterator[str]:
     behaviour = behaviour_of(name)
     if behaviour.draws:
         yield from _generator(said["generator"])
-        if not all(abs(draw) <= _MOST_SIGMAS for draw in said["draws"]):
+        draws = said["draws"]
+        if not isinstance(draws, (list, tuple)) or not all(
+            _is_number(draw) and abs(draw) <= _MOST_SIGMAS for draw in draws
+        ):
             yield "noise that no generator makes"
     check = behaviour.hooks["check_state"]
     if check is None:

@@ -132,17 +132,8 @@ TAKEN_ONCE: dict[str, tuple[list[str], Callable[[dict[str, Any]], None]]] = {
     "outputs before the start": (
         NAMES, lambda said: said.update(mode="instantiated", state=None, hidden=None)
     ),
-    "eta": (["AuvPlant"], lambda said: change_output(said, 0, 1.0)),
-    "nu": (["AuvPlant"], lambda said: change_output(said, 9, 1.0)),
-    "y": (["AuvPlant"], lambda said: change_output(said, 14, -2e199)),
-    "tau_applied": (["AuvPlant"], lambda said: change_output(said, 18, 1e6)),
-    "ddy_d": (["MotionPlanner"], lambda said: change_output(said, 7, 1.0)),
     "damping": (["MotionPlanner"], lambda said: said["parameters"].update(d11=4e11)),
 }  # fmt: skip
-
-
-def change_output(said: dict[str, Any], i: int, more: float) -> None:
-    said["outputs"][i] += more
 
 
 @each_kind

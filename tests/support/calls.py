@@ -141,8 +141,10 @@ class Draw:
     def good_value(self, variable: Variable) -> Any:
         """One that a run goes on well with."""
         start, low, high = variable.start, variable.minimum, variable.maximum
+        if choices := choices_of(self.description.name, variable.name):
+            return self.random.choice(choices)
         if variable.type == "String":
-            return self.random.choice(choices_of(self.description.name, variable.name) or (start,))
+            return start
         if variable.type == "Boolean":
             return self.random.randrange(2)
         if variable.type == "Integer":

@@ -61,9 +61,9 @@ def trials_of(name: str) -> Trials:
 
 
 @cache
-def choices_of(name: str, port: str) -> Sequence[str]:
-    """The texts that a port of a component takes: modelDescription.xml has no place for them."""
-    return [text for p in ports_of(name) if p.name == port for text in p.choices]
+def choices_of(name: str, port: str) -> Sequence[int]:
+    """The values of a port that is an enumeration; of another port none."""
+    return [number for p in ports_of(name) if p.name == port for number in p.choices.values()]
 
 
 def parameters_of(name: str) -> ParameterSet[Any]:
