@@ -9,5 +9,5 @@ module                      what it states
 ==========================  ==========================================================
 
 Nothing here runs inside an FMU. The model that it works on, (4) to (8), (14), (15), (20), (25) and
-(28), is in the tests, which hold it against the equations: tests/support/control_point_model.py.
+(28), is in the tests, which hold it against the equations: `support.control_point_model`.
 """
