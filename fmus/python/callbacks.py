@@ -11,6 +11,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from math import inf, isfinite
+from struct import pack
 from typing import Any, ClassVar
 
 from pythonfmu import Fmi2Slave
@@ -227,6 +228,11 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self.say(why, status, key)
         if self._has_loader:
             self.log("", status, ANSWER)
+
+    def _tell_time(self, time: float) -> None:
+        """Tell the native loader a time that does not follow from the arguments of the call."""
+        if self._has_loader:
+            self.log(pack(">d", time).hex(), Fmi2Status.ok, ANSWER)
 
     def describe(self, error: BaseException) -> str:
         """Give the reason in an exception; one that is not a Refusal is named by its type."""

@@ -164,6 +164,10 @@ EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names
 
 /* Modes and steps */
 
+static void come_to(instance *it, double time) {
+    it->last_successful_time = isnan(it->time_told) ? time : it->time_told;
+}
+
 /* A function that is forwarded, and after which steps have come to a time. */
 #define FORWARD_TO(time_after, name, allowed, parameters, arguments)                             \
     EXPORT int name parameters {                                                                 \
@@ -172,7 +176,7 @@ EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
             take_answer(&this, 1);                                                               \
-            if (this.status == FMI_OK) this.instance->last_successful_time = time_after;         \
+            if (this.status == FMI_OK) come_to(this.instance, time_after);                       \
         }                                                                                        \
         return end(&this);                                                                       \
     }
@@ -246,7 +250,10 @@ EXPORT int fmi2SetFMUstate(component c, void *state) {
         TO_PYTHONFMU(this, fmi2SetFMUstate, (component, void *),
                      (this.instance->slave, thing_of(state, STATE)));
         take_answer(&this, 1);
-        if (this.status == FMI_OK) this.instance->condition = SOUND;
+        if (this.status == FMI_OK) {
+            this.instance->condition = SOUND;
+            come_to(this.instance, this.instance->last_successful_time);
+        }
     }
     return end(&this);
 }

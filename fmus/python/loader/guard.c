@@ -4,20 +4,27 @@
  * marked: a call of the same instance from another thread waits, one from the host's logger, which
  * is told what there is to tell after that, is refused.
  */
+#include <math.h>
 #include <stdarg.h>
+#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 /* The logger that PythonFMU gets. An entry of the category "answer" is no message: with it the
- * slave says what PythonFMU cannot, the status of the call. */
+ * slave says what PythonFMU cannot, the status of the call, and as the digits of a double's bits
+ * the time that it has come to, if that does not follow from the arguments. */
 static void hear(void *environment, string name, int status, string category, string text, ...) {
     instance *it = environment;
     (void)name;
     if (category == NULL || strcmp(category, "answer") != 0) {
         tell(it, status, category, text);
-    } else if (status > it->answer) {
-        it->answer = status;
+    } else {
+        if (status > it->answer) it->answer = status;
+        if (text != NULL && *text != '\0') {
+            uint64_t bits = strtoull(text, NULL, 16);
+            memcpy(&it->time_told, &bits, sizeof bits);
+        }
     }
 }
 
@@ -99,6 +106,7 @@ call begin(component handle, string function, int allowed) {
     }
     this.instance = it;
     it->answer = FMI_OK;
+    it->time_told = NAN;
     it->busy = 1;
     it->thread = pthread_self();
     if (it->condition == LOST) {

@@ -131,6 +131,7 @@ typedef struct {
     component slave; /* PythonFMU's own instance */
     int answer;      /* the status that the slave has for the call */
     double last_successful_time;
+    double time_told; /* by the slave in the call, NaN: none */
     enum { SOUND, IN_ERROR, LOST } condition;
     int busy;
     pthread_t thread; /* that is in a call */
