@@ -35,7 +35,6 @@ _WEIGHTS = {
     ("fmi2SetReal", "n = 2^60"): 0.2,
     ("fmi2SetReal", "100,000 times the same"): 0.02,
     ("fmi2GetReal", "100,000 times the same"): 0.02,
-    ("fmi2SetString", "a text of 100,000 characters"): 0.2,
     ("fmi2EnterInitializationMode", ""): 25,
     ("fmi2ExitInitializationMode", ""): 25,
     ("fmi2SetupExperiment", "start"): 6,
