@@ -191,4 +191,4 @@ def test_constant_that_is_changed_in_one_equation_changes_both_kinds(dist, nativ
     assert difference(runs["python", "changed"], runs["native", "changed"]) == ""
     for one, other in (("python", "native"), ("native", "python"), ("python", "python")):
         found = difference(runs[one, "as it is"], runs[other, "changed"])
-        assert "tau_w.u at t = 0.04 s" in found
+        assert "tau_w.u at t = 0.02 s" in found

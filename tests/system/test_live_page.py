@@ -425,7 +425,7 @@ def test_all_vehicles_are_shown_and_one_is_chosen(opened):
         assert f"{vehicle}.controller.eps_t" in sliders
         assert not any(other in one for one in sliders)
         # Its indices, and the one of all vehicles.
-        applied = found[1:, header.index(f"{vehicle}.plant.tau_applied.u")]
+        applied = found[:-1, header.index(f"{vehicle}.plant.tau_applied.u")]
         effort = np.sqrt(np.sum(applied**2 * np.diff(found[:, 0])))
         assert f"{effort:.4g}".rstrip("0") in opened.run(TABLE)
     places = np.array(
