@@ -249,8 +249,7 @@ class Component(Callbacks):
         store.outputs, store.draws = outputs, draws
         store.time, store.held = end, self._is_sampled
         store.fresh = self._is_prompt or self._is_sampled
-        if end != current_time + step_size:
-            self._tell_time(end)
+        self._tell_time(end, t + h)
         return True
 
     def _fail_step(self, t: float, end: float) -> bool:
@@ -333,7 +332,7 @@ class Component(Callbacks):
         self._stale = self._mode == INITIALISING
         store.fresh = not self._stale and (state is None or wanted["fresh"])
         store.held = wanted["held"]
-        self._tell_time(store.time)
+        self._tell_time(store.time, None)
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

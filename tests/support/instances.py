@@ -31,7 +31,8 @@ def messages_of(slave: Component) -> list[str]:
 
 def answers_of(slave: Component) -> list[Fmi2Status]:
     """The statuses that a slave has told the native loader."""
-    return [entry.status for entry in slave.log_queue if entry.category == ANSWER]
+    # An entry with a text tells a time.
+    return [e.status for e in slave.log_queue if e.category == ANSWER and not e.msg]
 
 
 class Variable(NamedTuple):

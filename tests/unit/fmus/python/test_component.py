@@ -34,7 +34,7 @@ def test_nothing_is_refused_in_a_normal_run(driver):
         driver.excite(k)
         assert driver.step()
     assert driver.get("fault") is False
-    assert driver.slave.log_queue == []
+    assert driver.messages() == driver.answers() == []
 
 
 def test_parameters_report_their_declared_start_values(driver):

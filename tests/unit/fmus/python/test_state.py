@@ -231,7 +231,7 @@ def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver
     driver.excite(1)
     driver.step(0.02)
     driver.slave._set_fmu_state({**driver.slave._get_fmu_state(), "mode": "initialising",
-                                 "inputs": true["inputs"]})  # fmt: skip
+                                 "time": 0.0, "inputs": true["inputs"]})  # fmt: skip
     assert driver.slave._get_fmu_state() == true
 
 
