@@ -388,7 +388,7 @@ def _odd_boolean(draw: Draw) -> Arguments:
     return _item(port, draw.random.choice((2, -1, 2**31 - 1)))
 
 
-@_case("fmi2SetInteger", "a number that is no item of its Enumeration")
+@_case("fmi2SetInteger", "a number that its Enumeration lacks")
 def _no_item(draw: Draw) -> Arguments:
     found = draw.description.of("parameter", "Integer")
     items = {port: choices_of(draw.description.name, port.name) for port in found}
