@@ -122,10 +122,11 @@ class Trials:
             self._check_start(said)
         for name, value in host.values().items():
             assert not isinstance(value, float) or isfinite(value), f"taken with {name} = {value}"
-        status = host.step(0.0, self._length(host.description))
+        h = self._length(host.description)
+        status = host.step(0.0, h)
         expected = (
             (Status.OK, Status.Discard)
-            if said is None or said["mode"] == "stepping"
+            if said is None or (said["mode"] == "stepping" and h <= said["stop_time"])
             else (Status.Error,)
         )
         assert status in expected, status.name
