@@ -8,7 +8,8 @@ from ctypes import c_double
 from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
-import numpy as np
+# By name: an FMU in Python may change what the module holds.
+from numpy import isfinite
 
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.master.experiment import MOST_STEPS, Experiment
@@ -92,7 +93,7 @@ class Run:
         """Complete the row of now, which no step follows, and keep it if it is finite."""
         if self.blocks.count == self.made:
             self.pass_on()
-            if np.isfinite(self.row.shown).all():
+            if isfinite(self.row.shown).all():
                 self.blocks.append(self.time, self.row.shown)
 
 
