@@ -32,6 +32,7 @@ from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
 from orchestrator.system.component import Component
 from orchestrator.system.connection import Connection
+from orchestrator.system.graph import delayed_connections
 from orchestrator.system.names import PortName
 from orchestrator.system.values import TYPES
 
@@ -256,13 +257,15 @@ def _passing_first(
         for one in plan.system.connections
         if place[one.source.component] >= place[one.target.component]
     }
+    delayed = delayed_connections(plan.system, [*place], [ring.names for ring in rings])
+    late = {one.source.component for one in delayed}
     stepping: list[Stage] = []
     later: list[Stage] = []
     for n in sorted(set(decimation.values())):
         here = [name for name in place if decimation[name] == n]
         members = [
             _stepped(instances[name], reads[name], name in early or n > 1)
-            if direct[name]
+            if direct[name] and name not in late
             else member(instances[name])
             for name in here
         ]
@@ -342,7 +345,8 @@ def _passed(instance: Instance, reads: Reads) -> Member:
 def _stepped(instance: Instance, reads: Reads, is_early: bool) -> Member:
     """The calls that step an instance which has its inputs already.
 
-    What is read when values pass is read before only if something takes it before.
+    What is read when values pass is read before only if something takes it before. What takes an
+    output with direct feedthrough before, takes what follows from the inputs of the last step.
     """
     outputs = [call for call in reads.states if is_early or call not in reads.direct]
     return Member([], instance.do_step, outputs if instance.is_here else reads.states, instance)
