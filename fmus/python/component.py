@@ -249,7 +249,8 @@ class Component(Callbacks):
         store.outputs, store.draws = outputs, draws
         store.time, store.held = end, self._is_sampled
         store.fresh = self._is_prompt or self._is_sampled
-        self._tell_time(end, t + h)
+        if end != t + h:
+            self._tell_time(end)
         return True
 
     def _fail_step(self, t: float, end: float) -> bool:
@@ -332,7 +333,7 @@ class Component(Callbacks):
         self._stale = self._mode == INITIALISING
         store.fresh = not self._stale and (state is None or wanted["fresh"])
         store.held = wanted["held"]
-        self._tell_time(store.time, None)
+        self._tell_time(store.time)
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)
