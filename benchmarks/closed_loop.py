@@ -4,7 +4,7 @@ Every repetition times, one after the other in this process:
 
 - the straight line `auv_fmu.closed_loop`, the same equations without FMI or master;
 - the loop of FMUs, with all checks of the components on;
-- the same FMUs with an empty do_step, set on their loaded classes;
+- the same FMUs when their components compute nothing, set on their loaded classes;
 - the master alone, with every FMI call replaced by nothing;
 - the loop of FMUs compiled, and the compiled loop alone.
 
@@ -20,6 +20,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import ExitStack
 from statistics import median
+from typing import Any
 from unittest.mock import patch
 
 from measuring import options, python, steps_time, timed
@@ -27,6 +28,8 @@ from measuring import options, python, steps_time, timed
 from auv_fmu.closed_loop import closed_loop
 from auv_fmu.euler import STEP
 from fmus.kinds import PYTHON
+from fmus.python.callbacks import STEPPING
+from fmus.python.component import Component
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.slaves import FMU2OfOthers
@@ -39,21 +42,33 @@ from orchestrator.system.structure import System
 #: So many times the steps, so that what they cost is not lost in the set-up that is subtracted.
 _TIMES = 30
 
-
-def slave_classes() -> list[type]:
-    """The classes of the FMUs that are loaded into this process."""
-    return [
-        getattr(module, name.rsplit("_", 1)[0])
-        for name, module in list(sys.modules.items())
-        if hasattr(module, name.rsplit("_", 1)[0]) and hasattr(module, "settle")
-    ]
+Calls = list[Callable[[], int]]
 
 
-def with_empty_steps(system: System, steps: int) -> float:
+def slave_classes() -> list[type[Component]]:
+    """The classes of the FMUs that are loaded into this process, where `settle` has put them."""
+    return [vars(module)[""] for module in list(sys.modules.values()) if "" in vars(module)]
+
+
+def without_equations(system: System, steps: int) -> float:
     """Seconds of the steps when the components compute nothing."""
+
+    def idle(evaluate: Callable[..., Any]) -> Callable[..., Any]:
+        def evaluated(self: Component, state: Any, derived: Any, *rest: Any) -> Any:
+            if self._mode != STEPPING:
+                return evaluate(self, state, derived, *rest)
+            return derived, self._store.outputs
+
+        return evaluated
+
     with ExitStack() as stack:
-        for slave in slave_classes():
-            stack.enter_context(patch.object(slave, "do_step", lambda *_: True))
+        slaves = slave_classes()
+        assert len(slaves) == len(system.components)
+        for slave in slaves:
+            stack.enter_context(patch.object(slave, "evaluate", idle(slave.evaluate)))
+            stack.enter_context(
+                patch.object(slave, "advance", lambda self, state, derived, *_: (state, derived))
+            )
         return steps_time(system, steps)
 
 
@@ -63,10 +78,12 @@ def master_alone(system: System, steps: int) -> float:
     def nothing(*_: object) -> int:
         return 0
 
-    def calls(instance: Instance) -> Member:
-        return Member([nothing], nothing, [nothing], instance)
+    def idle(set_inputs: Calls, do_step: Any, get_outputs: Calls, instance: Instance) -> Member:
+        return Member(
+            [nothing] * len(set_inputs), do_step and nothing, [nothing] * len(get_outputs), instance
+        )
 
-    with patch("orchestrator.master.schedule.member", calls):
+    with patch("orchestrator.master.schedule.Member", idle):
         return steps_time(system, steps)
 
 
@@ -88,11 +105,11 @@ def main() -> None:
     for _ in range(given.repetitions):
         straight = timed(lambda: deque(closed_loop(given.steps), maxlen=0))
         fmus = steps_time(system, given.steps)
-        empty = with_empty_steps(system, given.steps)
+        idle = without_equations(system, given.steps)
         master = master_alone(system, given.steps)
         compiled = steps_time(system, given.steps, stepping=fast)
         stepper = compiled_alone(system, given.steps, fast)
-        rows.append((straight, fmus, empty, master, compiled, stepper))
+        rows.append((straight, fmus, idle, master, compiled, stepper))
 
     def per_step(index: int) -> float:
         return 1e6 * median(row[index] for row in rows) / given.steps
@@ -104,15 +121,15 @@ def main() -> None:
     print(f"medians of {given.repetitions} repetitions of {given.steps} steps")
     print(f"straight-line Python loop         {per_step(0):7.1f} us a step")
     print(f"FMU loop                          {per_step(1):7.1f} us a step")
-    print(f"FMU loop, empty do_step           {per_step(2):7.1f} us a step")
+    print(f"FMU loop without equations        {per_step(2):7.1f} us a step")
     print(f"FMU loop, compiled                {per_step(4):7.1f} us a step")
     print(f"compiled loop alone               {per_step(5):7.2f} us a step")
     print(f"FMU loop / straight-line loop     {median(b / a for a, b, *_ in rows):7.2f}")
-    print(f"FMU loop / FMUs with empty do_step{median(b / c for _, b, c, *_ in rows):7.2f}")
+    print(f"FMU loop / without equations      {median(b / c for _, b, c, *_ in rows):7.2f}")
     print(f"FMU loop / compiled               {median(row[1] / row[4] for row in rows):7.2f}")
     print(f"share of the master               {share(lambda b, c, d: d):7.0f} %")
     print(f"share of wrapper and FMI calls    {share(lambda b, c, d: c - d):7.0f} %")
-    print(f"share of the components' steps    {share(lambda b, c, d: b - c):7.0f} %")
+    print(f"share of the equations            {share(lambda b, c, d: b - c):7.0f} %")
 
 
 if __name__ == "__main__":
