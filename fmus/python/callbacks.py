@@ -280,9 +280,11 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def get_boolean(self, vrs: list[int]) -> list[bool]:
         store = self._store
+        if vrs == store.fault_references:
+            return [store.fault]
         if not store.fresh:
             self._refresh_outputs(vrs)
-        return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
+        return self._get(vrs, "Boolean")
 
     def get_string(self, vrs: list[int]) -> list[str]:
         return self._get(vrs, "String")
