@@ -135,13 +135,15 @@ class Ring:
             for relative, absolute in (_REST, _ROUNDING)
         )
         self._parts: list[_Part] = []
+        into: dict[str, list[int]] = {name: [] for name in names}
+        out_of: dict[str, list[int]] = {name: [] for name in names}
+        for i, connection in enumerate(connections):
+            into[connection.target.component].append(i)
+            out_of[connection.source.component].append(i)
         for name in names:
-            variables = system.components[name].variables
-            inner = [i for i, c in enumerate(connections) if c.target.component == name]
+            variables, inner = system.components[name].variables, into[name]
             unknowns = [i for i in inner if self._real[i]]
-            feeds = [
-                i for i, c in enumerate(connections) if c.source.component == name and self._real[i]
-            ]
+            feeds = [i for i in out_of[name] if self._real[i]]
             self._parts.append(
                 _Part(
                     instances[name],
