@@ -215,9 +215,7 @@ class Component(Callbacks):
         state, derived = store.state, store.derived
         outputs, draws = store.outputs, store.draws
         try:
-            if self._untold:
-                raise Refusal(self._untold)
-            if 0.0 < h <= self._longest_step and isfinite(t):
+            if 0.0 < h <= self._longest_step and isfinite(t) and not self._untold:
                 n = 1
             else:
                 n = self._internal_steps(t, h)
@@ -261,6 +259,8 @@ class Component(Callbacks):
         return False
 
     def _internal_steps(self, t: float, h: float) -> int:
+        if self._untold:
+            raise Refusal(self._untold)
         if not isfinite(t) or not isfinite(h):
             raise Refusal(f"time {t} and step {h} must be finite")
         if h < 0.0:
