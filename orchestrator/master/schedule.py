@@ -174,9 +174,9 @@ def schedule(
     gathers = gathered_connections(
         system, sequence, [ring.names for ring in rings], order, latest=latest
     )
-    if order == FEEDTHROUGH:
-        return _passing_first(plan, sequence, gathers, instances, row, rings)
     ring_of = {ring.names[0]: ring for ring in rings}
+    if order == FEEDTHROUGH:
+        return _passing_first(plan, sequence, gathers, instances, row, ring_of)
     renewed = [Stage(Gathering.along(row, ()), [_action(ring.renew)]) for ring in rings]
     found: list[Stage] = []
     shown: list[Stage] = []
@@ -217,9 +217,9 @@ def _passing_first(
     gathers: Sequence[Sequence[Connection]],
     instances: Mapping[str, Instance],
     row: Row,
-    rings: Sequence[Ring],
+    ring_of: Mapping[str, Ring],
 ) -> Schedule:
-    """The stages in feedthrough order."""
+    """The stages in feedthrough order, with each ring by its first component."""
     components, decimation = plan.system.components, plan.decimations
     nothing = Gathering.along(row, ())
     outputs = {
@@ -231,7 +231,8 @@ def _passing_first(
         for name, ports in outputs.items()
     }
     reads = {name: _reads(instances[name], component) for name, component in components.items()}
-    ringed = {name for ring in rings for name in ring.names}
+    rings = [ring.names for ring in ring_of.values()]
+    ringed = {name for names in rings for name in names}
     passing: list[Stage] = []
     for names, connections in zip(sequence, gathers, strict=True):
         slow, gathering = _gatherings(
@@ -247,9 +248,9 @@ def _passing_first(
                     Stage(Gathering(*row.hidden(direct[name])), [], Decimation(n)),
                 ]
         passing += [
-            Stage(nothing, [_action(partial(ring.renew, True))])
-            for ring in rings
-            if ring.names[0] in names
+            Stage(nothing, [_action(partial(ring_of[name].renew, True))])
+            for name in names
+            if name in ring_of
         ]
     place = {name: i for i, names in enumerate(sequence) for name in names}
     early = {
@@ -257,15 +258,14 @@ def _passing_first(
         for one in plan.system.connections
         if place[one.source.component] >= place[one.target.component]
     }
-    delayed = delayed_connections(plan.system, [*place], [ring.names for ring in rings])
-    late = {one.source.component for one in delayed}
+    late = {one.source.component for one in delayed_connections(plan.system, [*place], rings)}
     stepping: list[Stage] = []
     later: list[Stage] = []
     for n in sorted(set(decimation.values())):
         here = [name for name in place if decimation[name] == n]
         members = [
-            _stepped(instances[name], reads[name], name in early or n > 1)
-            if direct[name] and name not in late
+            _stepped(instances[name], reads[name], name in early or n > 1, name in late)
+            if direct[name]
             else member(instances[name])
             for name in here
         ]
@@ -342,14 +342,26 @@ def _passed(instance: Instance, reads: Reads) -> Member:
     return Member(instance.set_inputs, instance.do_exchange, reads.direct, instance)
 
 
-def _stepped(instance: Instance, reads: Reads, is_early: bool) -> Member:
+def _stepped(instance: Instance, reads: Reads, is_early: bool, is_late: bool) -> Member:
     """The calls that step an instance which has its inputs already.
 
-    What is read when values pass is read before only if something takes it before. What takes an
-    output with direct feedthrough before, takes what follows from the inputs of the last step.
+    What is read when values pass is read here too if something takes it before. Whatever takes an
+    output with direct feedthrough then, takes what follows from the inputs of this step.
+
+    Args:
+        instance: to step.
+        reads: how its outputs are read.
+        is_early: whether something takes outputs before they pass.
+        is_late: whether outputs with direct feedthrough are among these.
+
     """
-    outputs = [call for call in reads.states if is_early or call not in reads.direct]
-    return Member([], instance.do_step, outputs if instance.is_here else reads.states, instance)
+    if is_late:
+        outputs = instance.get_outputs
+    elif is_early or not instance.is_here:
+        outputs = reads.states
+    else:
+        outputs = [call for call in reads.states if call not in reads.direct]
+    return Member([], instance.do_step, outputs, instance)
 
 
 def make_stages(
