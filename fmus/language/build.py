@@ -112,7 +112,12 @@ _Hold = Callable[[Expression, ast.expr, str], Expression]
 
 
 class Untranslatable(Exception):
-    """Some of a program is outside the language; the text has a line for each mistake."""
+    """Some of a program is outside the language; each argument is a mistake, with its place."""
+
+    def __str__(self) -> str:
+        """The first mistake, and how many there are besides."""
+        first, *others = map(str, self.args)
+        return f"{first} (and {len(others)} more: see auv-fmu check)" if others else first
 
 
 class _Outside(Exception):
@@ -155,6 +160,11 @@ class Program:
         self._begun: set[Hashable] = set()
         self._mistakes: dict[str, str] = {}
 
+    @property
+    def mistakes(self) -> list[str]:
+        """All that is wrong with it: a line each, in the order of files and lines."""
+        return sorted((f"{place}{what}" for place, what in self._mistakes.items()), key=_place)
+
     def check(self) -> None:
         """Refuse a program with mistakes.
 
@@ -163,8 +173,7 @@ class Program:
 
         """
         if self._mistakes:
-            lines = (f"{place}{what}" for place, what in self._mistakes.items())
-            raise Untranslatable("\n".join(sorted(lines, key=_place)))
+            raise Untranslatable(*self.mistakes)
 
     def refuse(self, place: str, what: str) -> None:
         """Note a mistake; a line has one, as others follow from it."""
@@ -715,7 +724,7 @@ class _Builder:
         test: Expression = Number(True, BOOL)
         with self._noting():
             test = self.condition(node.test)
-        before = self.known
+        before = self._before_loop(node.body)
         body = self._block(node.body)
         self.known = None if is_endless and not _leaves(node.body) else before
         found.append(tree.While(test, body))
@@ -733,7 +742,7 @@ class _Builder:
                 return value
             return self._kept(value, f"{first}_{word}")
 
-        before = self.known
+        before = self._before_loop([node.target, *node.body])
         counter = Local(self._unused(f"{first}_at"), INT)
         try:
             loop = self._loop(node.target, node.iter, counter, hold)
@@ -748,8 +757,10 @@ class _Builder:
         names = {name: value for name, value in loop.bound if name in used or loop.turns}
         stores = [self._store(node, [each]) for each in names.items()]
         if before is not None:
+            mine = frozenset((turns,))
             of_loop: _Known = {
-                name: (value.type, frozenset((turns,))) for name, value in names.items()
+                name: (value.type, _PLAIN if name in before and not before[name][1] else mine)
+                for name, value in names.items()
             }
             self.known = {**before, **of_loop}
         counts = [name for name, value in names.items() if value is counter]
@@ -761,6 +772,16 @@ class _Builder:
         made.body = [*stores, *body]
         self.known = {**before, **of_loop} if before is not None and loop.turns else before
         found.append(made)
+
+    def _before_loop(self, nodes: Sequence[ast.AST]) -> _Known | None:
+        """What is known before a loop: names of earlier loops that it uses again begin anew."""
+        if self.known is not None:
+            again = {*_stored(*nodes)}
+            self.known = {
+                name: value for name, value in self.known.items()
+                if name not in again or not value[1] - {*self._loops}
+            }  # fmt: skip
+        return self.known
 
     # Functions within this one
 
@@ -939,7 +960,7 @@ class _Builder:
                 raise _Outside(node, "what returns nothing is used as a value")
             if known and known[0] == INT and getattr(value.type, "made", None):
                 value = _as_int(value)
-            if known and known[0] != value.type:
+            if known and known[0] != value.type and not known[1]:
                 raise _Outside(node, self._other(name, known[0], value))
             stores.append((self._variable(name, value.type), value))
             self._know(name, value.type)
@@ -1435,9 +1456,11 @@ class _Builder:
     def _element(self, node: ast.Subscript, place: ast.expr, value: Expression) -> Expression:
         type_ = value.type
         n = type_.n if isinstance(type_, Array) else len(parts_of(type_))
-        key = self._size(place)
+        key = _constant(place)
         if key is None:
-            key = _constant(place)
+            key = self._size(place)
+            if isinstance(type_, Array) and key not in range(-n, n):
+                key = None
         if isinstance(key, int) and not isinstance(key, bool):
             key += n if key < 0 else 0
         if key is not None:
