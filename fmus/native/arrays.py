@@ -6,7 +6,7 @@ import ast
 from collections.abc import Callable
 from typing import NamedTuple
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.native.program import Function, Program
 from fmus.native.shapes import BOOLEAN, DOUBLE, INTEGER, Scalar, Shape, Structure, matrix, vector
 

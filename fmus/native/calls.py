@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from types import BuiltinFunctionType, FunctionType
 from typing import Any
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.native import arrays
 from fmus.native.expressions import (
     EQUALITY,

@@ -13,7 +13,7 @@ from itertools import count
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from auv_fmu.arrays import Matrix
+from auv_fmu.language.arrays import Matrix
 from fmus.native import arrays
 from fmus.native.language import word_of
 from fmus.native.layout import quoted

@@ -141,8 +141,8 @@ INSTEAD = {
     "the name divmod": "write // and %",
     "the name hypot": "write sqrt(x * x + y * y): Python's hypot has an algorithm of its own",
     "the name list": "use a Vector or a tuple",
-    "the name np": "use Vector and Matrix of auv_fmu.linear_algebra",
-    "the name numpy": "use Vector and Matrix of auv_fmu.linear_algebra",
+    "the name np": "use Vector and Matrix of auv_fmu",
+    "the name numpy": "use Vector and Matrix of auv_fmu",
     "the name pow": "write math.pow",
     "the name print": "use a debugger, or an output",
     "the name random": "use the hooks seed and measured",
@@ -230,7 +230,7 @@ def _module(tree: ast.Module, path: Path) -> _Found:
     modules = dict(_modules(tree, path))
     for node in tree.body:
         if isinstance(node, ast.FunctionDef):
-            is_ours = path.resolve().parent == _EQUATIONS
+            is_ours = _EQUATIONS in path.resolve().parents
             if not (is_ours and f"{path.stem}.{node.name}" in OUTSIDE):
                 yield from _function(node)
                 yield from _names(node, known, modules)

@@ -14,7 +14,7 @@ from math import isinf, isnan
 from types import FunctionType, ModuleType
 from typing import Any
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.native.shapes import (
     BOOLEAN,
     DOUBLE,

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Annotated, Any, Union, get_args, get_origin
 from unicodedata import category
 
-from auv_fmu import vectors
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language import vectors
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.ports.groups import hints_of, is_class, is_record
 
 #: What all components share in C.

@@ -16,7 +16,7 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from auv_fmu.quantities import group_name
+from auv_fmu.language.quantities import group_name
 from fmus.discovery import components, package_folder, ports_of, source_of
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description import fmi2_description

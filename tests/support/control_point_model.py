@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.control_point import jacobian
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import jacobian
+from auv_fmu.paper.vehicle import Vehicle
 
 Matrix = np.ndarray[Any, Any]
 

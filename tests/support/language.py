@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.compilers import SAME_NUMBERS
 from fmus.native.functions import function_in_c
 from fmus.native.language import CONSTANTS, MATHEMATICS
@@ -36,7 +36,7 @@ from math import isnan
 from math import {", ".join(sorted(MATHEMATICS | CONSTANTS))}
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, interpolate, solve
+from auv_fmu.language.linear_algebra import Matrix, Vector, interpolate, solve
 from fmus.ports.port import Refusal
 
 """

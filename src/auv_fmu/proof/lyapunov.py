@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu.control_point import actuated_velocity
-from auv_fmu.saturation import Saturation, integral, saturation
-from auv_fmu.vectors import Rotation, Vector3, difference, minus_scaled
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.language.vectors import Rotation, Vector3, difference, minus_scaled
+from auv_fmu.paper.control_point import actuated_velocity
+from auv_fmu.paper.saturation import Saturation, integral, saturation
+from auv_fmu.paper.vehicle import Vehicle
 
 
 class Errors(NamedTuple):
