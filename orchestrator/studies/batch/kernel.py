@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.language.vectors import Vector3, Vector4, difference, norm
+from auv_fmu.language.vectors import Vector3, Vector4, norm, sub
 from auv_fmu.loop import closed_loop
 from auv_fmu.loop.blocks import Blocks
 from auv_fmu.loop.closed_loop import PAPER, Instant, Moment, Setting, Splits, blocks_of
@@ -195,7 +195,7 @@ def row_of(setting: Setting, moment: Moment) -> RowSignals:
     return RowSignals(
         moment.t,
         cos(theta),
-        difference(y, moment.scene.reference.y_d),
+        sub(y, moment.scene.reference.y_d),
         seen.dy,
         sqrt(v * v + w * w),
     )
@@ -221,7 +221,7 @@ def signals_of(setting: Setting, instant: Instant, moment: Moment, before: Vecto
         instant.command,
         blocks.vehicle.acting(setting.plant, moment.vehicles.plant, instant.tau),
         before,
-        difference(velocity, scene.plant.dy),
+        sub(velocity, scene.plant.dy),
         theta_hat,
     )
 

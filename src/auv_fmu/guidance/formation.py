@@ -40,13 +40,13 @@ from auv_fmu.language.vectors import (
     Vector3,
     Vector4,
     Vector5,
-    difference,
+    add,
+    add_scaled,
+    add_two_scaled,
     distance,
-    minus_scaled,
     norm,
-    plus_scaled,
-    plus_two_scaled,
-    total,
+    sub,
+    sub_scaled,
 )
 from auv_fmu.paper import observer
 from auv_fmu.paper.actuators import Limits
@@ -262,12 +262,12 @@ def place(parameters: Parameters, t: float) -> Place:
             T = stages.duration[k - 1]
             a = (t - stages.t[k - 1]) / T
             after = offset(parameters, k)
-            change = difference(after, before)
+            change = sub(after, before)
             if a < 1.0:
                 b = a * (1.0 - a)
-                d = plus_scaled(d, a * a * a * (10.0 + a * (6.0 * a - 15.0)), change)
-                dd = plus_scaled(dd, 30.0 * b * b / T, change)
-                ddd = plus_scaled(ddd, 60.0 * b * (1.0 - 2.0 * a) / (T * T), change)
+                d = add_scaled(d, a * a * a * (10.0 + a * (6.0 * a - 15.0)), change)
+                dd = add_scaled(dd, 30.0 * b * b / T, change)
+                ddd = add_scaled(ddd, 60.0 * b * (1.0 - 2.0 * a) / (T * T), change)
             else:
                 d, dd, ddd = after, _NOWHERE, _NOWHERE
             before = after
@@ -335,7 +335,7 @@ def innovation(estimator: Estimator, state: FormationState, known: Known) -> Vec
     """
     if known.age > estimator.age_max:
         return _NOWHERE
-    z = difference(plus_scaled(known.y_0, known.age, state.dy_hat_o), state.y_hat)
+    z = sub(add_scaled(known.y_0, known.age, state.dy_hat_o), state.y_hat)
     most = estimator.z_max
     return (
         max(-most, min(most, z[0])),
@@ -365,7 +365,7 @@ def leader(parameters: Parameters, state: FormationState, known: Known) -> Refer
         return Reference(known.y_0, known.dy_0, known.ddy_0)
     estimator = parameters.estimator
     z = innovation(estimator, state, known)
-    dy_hat = plus_two_scaled(
+    dy_hat = add_two_scaled(
         state.dy_hat_o, estimator.lambda_, saturation(TANH, z), estimator.k_d, z
     )  # (23)
     return Reference(state.y_hat, dy_hat, acceleration(estimator, z))
@@ -395,8 +395,8 @@ def step(parameters: Parameters, state: FormationState, known: Known, h: float) 
     heading = turned(parameters.omega_chi, parameters.turn_chi, state.heading, known.psi_0, h)
     if parameters.estimated:
         _, dy_hat, ddy_hat_o = leader(parameters, state, known)
-        y_hat = plus_scaled(state.y_hat, h, dy_hat)
-        return FormationState(heading, y_hat, plus_scaled(state.dy_hat_o, h, ddy_hat_o))
+        y_hat = add_scaled(state.y_hat, h, dy_hat)
+        return FormationState(heading, y_hat, add_scaled(state.dy_hat_o, h, ddy_hat_o))
     return FormationState(heading, known.y_0, state.dy_hat_o)
 
 
@@ -417,13 +417,13 @@ def reference(parameters: Parameters, state: FormationState, known: Known, t: fl
     d, dd, ddd = place(parameters, t)
     _, chi, dchi, _ = state.heading
     turning = ddchi(parameters.omega_chi, state.heading)
-    velocity = plus_scaled(dd, dchi, across(d))
-    faster = plus_two_scaled(ddd, 2 * dchi, across(dd), turning, across(d))
+    velocity = add_scaled(dd, dchi, across(d))
+    faster = add_two_scaled(ddd, 2 * dchi, across(dd), turning, across(d))
     level = (d[0], d[1], 0.0)
     wanted = Reference(
-        total(y_0, ahead(chi, d)),
-        total(dy_0, ahead(chi, velocity)),
-        total(ddy_0, ahead(chi, minus_scaled(faster, dchi * dchi, level))),
+        add(y_0, ahead(chi, d)),
+        add(dy_0, ahead(chi, velocity)),
+        add(ddy_0, ahead(chi, sub_scaled(faster, dchi * dchi, level))),
     )
     if not parameters.estimated:
         hold(parameters, wanted)

@@ -35,10 +35,10 @@ from auv_fmu.language.vectors import (
     Vector3,
     Vector5,
     Vector32,
-    difference,
+    add_scaled,
     distance,
     norm,
-    plus_scaled,
+    sub,
 )
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.control_point import ELL, Distance
@@ -176,7 +176,7 @@ def velocity(waypoints: Waypoints, k: int) -> Vector3:
     if not 0 < k < waypoints.n:
         return _AT_REST
     T = duration(waypoints, k)
-    x, y, z = difference(waypoint(waypoints, k), waypoint(waypoints, k - 1))
+    x, y, z = sub(waypoint(waypoints, k), waypoint(waypoints, k - 1))
     return x / T, y / T, z / T
 
 
@@ -243,14 +243,14 @@ def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
     T = waypoints.rounding
     k = corner.k if corner.k < waypoints.n else waypoints.n - 1
     v = velocity(waypoints, corner.k)
-    y_d, dy_d, ddy_d = plus_scaled(waypoint(waypoints, k), t - corner.t, v), v, _AT_REST
+    y_d, dy_d, ddy_d = add_scaled(waypoint(waypoints, k), t - corner.t, v), v, _AT_REST
     while corner.k < waypoints.n and corner.t - T / 2 < t:
         a = (t - corner.t) / T + 0.5
         v_next = velocity(waypoints, corner.k + 1)
-        jump = difference(v_next, v)
-        y_d = plus_scaled(y_d, T * a * a * a * (1.0 - a / 2), jump)
-        dy_d = plus_scaled(dy_d, a * a * (3.0 - 2 * a), jump)
-        ddy_d = plus_scaled(ddy_d, 6 * a * (1.0 - a) / T, jump)
+        jump = sub(v_next, v)
+        y_d = add_scaled(y_d, T * a * a * a * (1.0 - a / 2), jump)
+        dy_d = add_scaled(dy_d, a * a * (3.0 - 2 * a), jump)
+        ddy_d = add_scaled(ddy_d, 6 * a * (1.0 - a) / T, jump)
         corner = next_corner(waypoints, corner)
         v = v_next
     return Reference(y_d, dy_d, ddy_d)
@@ -287,7 +287,7 @@ def posture(y_d: Vector3, along: Vector3, ell: float) -> Vector5:
 
     """
     dx, dy, dz = along
-    x, y, z = plus_scaled(y_d, -ell / norm(along), along)
+    x, y, z = add_scaled(y_d, -ell / norm(along), along)
     return x, y, z, atan2(-dz, sqrt(dx * dx + dy * dy)), atan2(dy, dx)
 
 
@@ -374,7 +374,7 @@ def check(parameters: Parameters) -> None:
 def _check_leg(waypoints: Waypoints, k: int) -> None:
     """Refuse a leg, to waypoint k, that nothing can go along."""
     before, behind = waypoint(waypoints, k - 1), waypoint(waypoints, k)
-    x, y, z = difference(behind, before)
+    x, y, z = sub(behind, before)
     if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
         raise ImpossiblePath(
             f"waypoint {k + 1:d} has the time {waypoints.t[k]:g} s, and the one before it "
@@ -472,7 +472,7 @@ def _is_never_steep(early: Reference, late: Reference, duration: float, fastest:
 
     """
     a, d = early.dy_d, late.dy_d
-    b, c = plus_scaled(a, duration / 3, early.ddy_d), plus_scaled(d, -duration / 3, late.ddy_d)
+    b, c = add_scaled(a, duration / 3, early.ddy_d), add_scaled(d, -duration / 3, late.ddy_d)
     return (
         _steepness(a, a, fastest) <= 0.0
         and _steepness(a, b, fastest) <= 0.0

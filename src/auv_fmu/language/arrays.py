@@ -1,7 +1,6 @@
-"""Vectors and matrices of fixed size, for components of one's own, and what is computed with them.
+"""Vectors and matrices of fixed size, with operators: for components of one's own.
 
-The equations of the paper do without them: they write out the components of plain tuples, which is
-faster. Both classes are immutable, and their operators never change the order in which numbers are
+The equations of the paper do without them: they have :mod:`.vectors`, which is faster. Both classes are immutable, and their operators never change the order in which numbers are
 added up: a translation to C gives the same bits.
 """
 

@@ -1,6 +1,10 @@
-"""Names for the tuples that the equations pass around, and the little algebra of three-vectors.
+"""Names for the tuples that the equations pass around, and the algebra of three-vectors.
 
-Matrices of gains are diagonal: a diagonal matrix is given as its diagonal, a Vector3.
+The equations here use it, because Python takes half as long for functions of tuples as for the
+operators of :class:`.arrays.Vector`; those are for components of one's own, and for large systems.
+
+A function that gives a vector is named by a verb: `add`, `sub` and `scale` are a + b, a - b and k a;
+`_scaled` is of k b, `_diag` of D b. D is a diagonal matrix of gains, given as its diagonal.
 """
 
 from __future__ import annotations
@@ -25,43 +29,43 @@ Vector32 = tuple[
 ]  # fmt: skip
 
 
-def total(a: Vector3, b: Vector3) -> Vector3:
+def add(a: Vector3, b: Vector3) -> Vector3:
     """The vector a + b."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-def difference(a: Vector3, b: Vector3) -> Vector3:
+def sub(a: Vector3, b: Vector3) -> Vector3:
     """The vector a - b."""
     return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
-def scaled(k: float, a: Vector3) -> Vector3:
+def scale(k: float, a: Vector3) -> Vector3:
     """The vector k a."""
     return k * a[0], k * a[1], k * a[2]
 
 
-def plus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
+def add_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
     """The vector a + k b."""
     return a[0] + k * b[0], a[1] + k * b[1], a[2] + k * b[2]
 
 
-def plus_two_scaled(a: Vector3, k: float, b: Vector3, m: float, c: Vector3) -> Vector3:
+def add_two_scaled(a: Vector3, k: float, b: Vector3, m: float, c: Vector3) -> Vector3:
     """The vector a + k b + m c."""
     return a[0] + k * b[0] + m * c[0], a[1] + k * b[1] + m * c[1], a[2] + k * b[2] + m * c[2]
 
 
-def minus_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
+def sub_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
     """The vector a - k b."""
     return a[0] - k * b[0], a[1] - k * b[1], a[2] - k * b[2]
 
 
-def minus_times(a: Vector3, D: Vector3, b: Vector3) -> Vector3:
-    """The vector a - D b, with a diagonal matrix D."""
+def sub_diag(a: Vector3, D: Vector3, b: Vector3) -> Vector3:
+    """The vector a - D b."""
     return a[0] - D[0] * b[0], a[1] - D[1] * b[1], a[2] - D[2] * b[2]
 
 
-def minus_product(D: Vector3, a: Vector3) -> Vector3:
-    """The vector -D a, with a diagonal matrix D."""
+def neg_diag(D: Vector3, a: Vector3) -> Vector3:
+    """The vector -D a."""
     return -D[0] * a[0], -D[1] * a[1], -D[2] * a[2]
 
 

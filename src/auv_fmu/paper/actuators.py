@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.quantities import TAU
 from auv_fmu.language.variable import Variable
-from auv_fmu.language.vectors import Vector3, difference, scaled
+from auv_fmu.language.vectors import Vector3, scale, sub
 
 
 class Limits(NamedTuple):
@@ -119,5 +119,5 @@ def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
         mean_response(before[1], tau[1], T[1], h),
         mean_response(before[2], tau[2], T[2], h),
     )
-    middle = scaled(0.25, difference(difference(scaled(6.0, mean), first), last))
+    middle = scale(0.25, sub(sub(scale(6.0, mean), first), last))
     return Drive(first, middle, last, mean)

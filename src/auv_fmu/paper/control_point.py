@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Rotation, Vector3, Vector6, plus_scaled, scaled
+from auv_fmu.language.vectors import Rotation, Vector3, Vector6, add_scaled, scale
 from auv_fmu.paper.attitude import rotate, rotate_back
 
 #: How far ahead of the centre of mass the control point is, and its value in section 4.1 [m].
@@ -37,7 +37,7 @@ def control_point(position: Vector3, rotation: Rotation, ell: float) -> Vector3:
         Control point (x, y, z) [m], earth frame.
 
     """
-    return plus_scaled(position, ell, rotation[0])
+    return add_scaled(position, ell, rotation[0])
 
 
 def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vector3:
@@ -60,7 +60,7 @@ def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vecto
 def jacobian(rotation: Rotation, ell: float) -> tuple[Vector3, Vector3, Vector3]:
     """J(eta) of (11) as its columns, for (u, q, r)."""
     e1, e2, e3 = rotation
-    return e1, scaled(-ell, e3), scaled(ell, e2)
+    return e1, scale(-ell, e3), scale(ell, e2)
 
 
 def actuator_command(rotation: Rotation, force: Vector3, ell: float) -> Vector3:

@@ -19,7 +19,7 @@ from auv_fmu.language.quantities import (
     VELOCITY,
 )
 from auv_fmu.language.variable import Variable
-from auv_fmu.language.vectors import Rotation, Vector3, Vector5, plus_scaled
+from auv_fmu.language.vectors import Rotation, Vector3, Vector5, add_scaled
 from auv_fmu.paper.attitude import rotate, rotation_from_euler
 from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
 from auv_fmu.paper.vehicle import Vehicle, accelerations, euler_rates
@@ -119,7 +119,7 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
     rotation, (du, dv, dw, dq, dr) = moving
     dtheta, dpsi = euler_rates(theta, q, r)
     return PlannerState(
-        plus_scaled(position, h, rotate(rotation, (u, v, w))),
+        add_scaled(position, h, rotate(rotation, (u, v, w))),
         theta + h * dtheta,
         psi + h * dpsi,
         (u + h * du, v + h * dv, w + h * dw, q + h * dq, r + h * dr),

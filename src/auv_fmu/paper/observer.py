@@ -10,7 +10,7 @@ from __future__ import annotations
 from enum import IntEnum
 from math import expm1
 
-from auv_fmu.language.vectors import Vector3, plus_scaled, scaled
+from auv_fmu.language.vectors import Vector3, add_scaled, scale
 
 
 class Form(IntEnum):
@@ -53,7 +53,7 @@ def initial_dy_hat_o(s_z: Vector3, z: Vector3, lambda_: float, k_d: float) -> Ve
 
     With it the first velocity estimate (23) is zero.
     """
-    return scaled(-1.0, plus_scaled(scaled(lambda_, s_z), k_d, z))
+    return scale(-1.0, add_scaled(scale(lambda_, s_z), k_d, z))
 
 
 def rate(form: Form, ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -> Vector3:
@@ -70,5 +70,5 @@ def rate(form: Form, ddy_r: Vector3, s_z: Vector3, lambda_: float, k_d: float) -
 
     """
     if form == INTEGRAL:
-        return scaled(k_d * lambda_, s_z)
-    return plus_scaled(ddy_r, k_d * lambda_, s_z)
+        return scale(k_d * lambda_, s_z)
+    return add_scaled(ddy_r, k_d * lambda_, s_z)

@@ -14,16 +14,16 @@ from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
     Vector3,
     Vector4,
-    difference,
+    add,
+    add_scaled,
+    add_two_scaled,
     distance,
-    minus_product,
-    minus_scaled,
-    minus_times,
+    neg_diag,
     norm,
-    plus_scaled,
-    plus_two_scaled,
-    scaled,
-    total,
+    scale,
+    sub,
+    sub_diag,
+    sub_scaled,
 )
 from auv_fmu.paper import observer
 from auv_fmu.paper.adaptation import (
@@ -144,7 +144,7 @@ class Signals(NamedTuple):
 def initial_state(gains: Gains, y: Vector3) -> ControllerState:
     """The initial conditions below (24): y_hat(0) = y(0), and theta_hat(0) = theta_0."""
     y_hat = y
-    z = difference(y, y_hat)
+    z = sub(y, y_hat)
     dy_hat_o = observer.initial_dy_hat_o(saturation(gains.s, z), z, gains.lambda_, gains.k_d)
     return ControllerState(y_hat, dy_hat_o, gains.theta_0, 0.0)
 
@@ -199,24 +199,24 @@ def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: 
     y_hat, dy_hat_o, theta_hat, _ = state
     if gains.form == EXACT and h:
         k_d = observer.exact_gain(k_d, h)
-    e, z = difference(y, y_d), difference(y, y_hat)  # above (16)
-    e_z = difference(y_hat, y_d)  # e - z
+    e, z = sub(y, y_d), sub(y, y_hat)  # above (16)
+    e_z = sub(y_hat, y_d)  # e - z
     s_z, s_ez = saturation(s, z), saturation(s, e_z)
-    dy_r = minus_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
+    dy_r = sub_scaled(dy_d, lambda_, s_ez)  # (16): dy_d - Lambda s(e - z)
     if gains.form == INTEGRAL:
-        dy_hat_o = total(dy_r, dy_hat_o)  # (24) as printed: dy_r + k_d Lambda int s(z)
-    dy_hat = plus_two_scaled(dy_hat_o, lambda_, s_z, k_d, z)  # (23)
-    dy_o = minus_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
-    de = difference(dy_hat, dy_d)
-    ddy_r = minus_times(ddy_d, scaled(lambda_, slope(s, e_z, s_ez)), de)  # Remark 3
-    r_hat_sum = plus_two_scaled(de, lambda_, s_ez, lambda_, s_z)  # below (21)
+        dy_hat_o = add(dy_r, dy_hat_o)  # (24) as printed: dy_r + k_d Lambda int s(z)
+    dy_hat = add_two_scaled(dy_hat_o, lambda_, s_z, k_d, z)  # (23)
+    dy_o = sub_scaled(dy_hat, lambda_, s_z)  # (18): dy_hat - Lambda s(z)
+    de = sub(dy_hat, dy_d)
+    ddy_r = sub_diag(ddy_d, scale(lambda_, slope(s, e_z, s_ez)), de)  # Remark 3
+    r_hat_sum = add_two_scaled(de, lambda_, s_ez, lambda_, s_z)  # below (21)
     G = regressor(dy_r, ddy_r)  # below (20)
     rho_hat = bound(G, theta_hat)  # below (21)
     robust = robust_force(rho_hat, r_hat_sum, gains.eps_t)  # last term of (21)
-    s_dy = saturation(s, difference(dy_o, dy_r))
+    s_dy = saturation(s, sub(dy_o, dy_r))
     # Bracket of (21): F = -K_1 s(dy_o - dy_r) - K_2 s(e - z) - K_2 s(z) - robust
-    F = minus_times(minus_times(minus_product(gains.K1, s_dy), K2, s_ez), K2, s_z)
-    F = difference(F, robust)
+    F = sub_diag(sub_diag(neg_diag(gains.K1, s_dy), K2, s_ez), K2, s_z)
+    F = sub(F, robust)
     rotation = rotation_from_euler(0.0 if gains.printed_jacobian else phi, theta, psi)  # reading 3
     tau = actuator_command(rotation, F, gains.ell)  # (21), J^T F
     dtheta_hat = theta_hat_rate(
@@ -237,8 +237,8 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
 
     """
     return ControllerState(
-        plus_scaled(state.y_hat, h, signals.dy_hat),
-        plus_scaled(state.dy_hat_o, h, signals.ddy_hat_o),
+        add_scaled(state.y_hat, h, signals.dy_hat),
+        add_scaled(state.dy_hat_o, h, signals.ddy_hat_o),
         advance_4(state.theta_hat, signals.dtheta_hat, h),
         h,
     )

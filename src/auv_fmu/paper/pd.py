@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, VELOCITY, per_axis
 from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Vector3, Vector4, difference, minus_product, norm, plus_scaled
+from auv_fmu.language.vectors import Vector3, Vector4, add_scaled, neg_diag, norm, sub
 from auv_fmu.paper.adaptation import (
     Gamma,
     Layer,
@@ -81,11 +81,11 @@ def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> 
 
     """
     y, (phi, theta, psi), y_d, dy_d, ddy_d, dy = measurement
-    e = difference(y, y_d)
-    r = plus_scaled(difference(dy, dy_d), gains.lambda_, e)  # below (57): de + Lambda e
+    e = sub(y, y_d)
+    r = add_scaled(sub(dy, dy_d), gains.lambda_, e)  # below (57): de + Lambda e
     G = regressor(dy_d, ddy_d)  # below (57)
     rho_hat = bound(G, theta_hat)  # below (57)
-    F = difference(minus_product(gains.K1, r), robust_force(rho_hat, r, gains.eps_t))  # of (57)
+    F = sub(neg_diag(gains.K1, r), robust_force(rho_hat, r, gains.eps_t))  # of (57)
     rotation = rotation_from_euler(0.0 if gains.printed_jacobian else phi, theta, psi)
     tau = actuator_command(rotation, F, gains.ell)  # (57), J^T F
     dtheta_hat = theta_hat_rate(

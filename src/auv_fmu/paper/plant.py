@@ -20,9 +20,9 @@ from auv_fmu.language.vectors import (
     Vector3,
     Vector4,
     Vector6,
-    difference,
-    plus_scaled,
-    total,
+    add,
+    add_scaled,
+    sub,
 )
 from auv_fmu.paper.actuators import Drive, Limits, drive, given, limit_all
 from auv_fmu.paper.attitude import (
@@ -190,7 +190,7 @@ def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantStat
         water: velocity of the water from now on [m/s], earth frame.
 
     """
-    change = difference(state.water, water)
+    change = sub(state.water, water)
     c_x, c_y, c_z = change
     if not (c_x or c_y or c_z):
         return state
@@ -221,11 +221,11 @@ def carried(state: PlantState, dwater: Vector3, h: float) -> PlantState:
     if not (a_x or a_y or a_z):
         return state
     return PlantState(
-        plus_scaled(state.position, 0.5 * h * h, dwater),
+        add_scaled(state.position, 0.5 * h * h, dwater),
         state.quaternion,
         state.nu_r,
         state.tau,
-        plus_scaled(state.water, h, dwater),
+        add_scaled(state.water, h, dwater),
     )
 
 
@@ -296,7 +296,7 @@ def rates(
     velocity = rotate(rotation, (u, v, w))
     c_x, c_y, c_z = water
     if c_x or c_y or c_z:
-        velocity = total(velocity, water)
+        velocity = add(velocity, water)
     dnu = accelerations_6dof(vehicle, roll, nu_r, rotation, tau, tau_w)
     if roll.rolls:
         return Rates(velocity, quaternion_rates(quaternion, (p, q, r)), dnu)
@@ -321,7 +321,7 @@ def moved(
     """
     position, (a, b, c, d), (u, v, w, p, q, r), _, water = state
     _, (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
-    position = plus_scaled(position, h, rate.position)
+    position = add_scaled(position, h, rate.position)
     nu = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
     if roll.rolls:
         attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
@@ -425,7 +425,7 @@ def begin(parameters: Parameters, water: Vector3) -> PlantState:
 
 def flow(parameters: Parameters, water: Vector3) -> Vector3:
     """Velocity of the water: the parameter `current` and what is told beside it [m/s]."""
-    return total(parameters.current, water)
+    return add(parameters.current, water)
 
 
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
@@ -519,4 +519,4 @@ def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
         std: standard deviation of each axis [m]; not in the paper (reading 7).
 
     """
-    return plus_scaled(y, std, n)
+    return add_scaled(y, std, n)

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 from auv_fmu.language.linear_algebra import Matrix
 from auv_fmu.language.quantities import POSITION
 from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Vector3, Vector6, total
+from auv_fmu.language.vectors import Vector3, Vector6, add
 
 #: Mass of the water that a spheroid of 1.6 m by 0.19 m displaces [kg].
 DISPLACED = round(4.0 / 3.0 * pi * 1026.0 * 0.8 * 0.095 * 0.095, 12)
@@ -162,7 +162,7 @@ def coriolis(hull: Hull, mass: Inertia, nu_r: Vector6) -> Vector6:
     x, y, z = cross(hull.r_bg, momentum)
     turning = x + mass.i_x * p, y + mass.i_y * q, z + mass.i_y * r
     force = cross(rates, momentum)
-    moment = total(cross(velocity, momentum), cross(rates, turning))
+    moment = add(cross(velocity, momentum), cross(rates, turning))
     return (
         force[0],
         force[1] - mass.a_22 * w * p,

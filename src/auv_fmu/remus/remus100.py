@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 from auv_fmu.language.linear_algebra import Vector, solve
 from auv_fmu.language.quantities import ETA, NU, VELOCITY
 from auv_fmu.language.variable import Variable
-from auv_fmu.language.vectors import Vector3, Vector6, plus_scaled, total
+from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled
 from auv_fmu.paper.attitude import rotate, rotation_from_euler
 from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
 from auv_fmu.paper.plant import Localisation
@@ -188,8 +188,8 @@ def step(
     velocity = rotate(rotation_from_euler(phi, theta, psi), (u, v, w))
     turn = euler_rates(phi, theta, p, q, r)
     return RemusState(
-        plus_scaled(state.position, h, velocity),
-        plus_scaled(state.euler, h, turn),
+        add_scaled(state.position, h, velocity),
+        add_scaled(state.euler, h, turn),
         (u, v, w, p, q, r),
         limit_tail(parameters.tail, actuator),
         state.water,
@@ -214,11 +214,11 @@ def carried(state: RemusState, dwater: Vector3, h: float) -> RemusState:
     x, y, z = water_in_body(state.euler[2], dwater)
     u, v, w, p, q, r = state.nu
     return RemusState(
-        plus_scaled(state.position, 0.5 * h * h, dwater),
+        add_scaled(state.position, 0.5 * h * h, dwater),
         state.euler,
         (u + h * x, v + h * y, w + h * z, p, q, r),
         state.actuator,
-        plus_scaled(state.water, h, dwater),
+        add_scaled(state.water, h, dwater),
     )
 
 
@@ -250,7 +250,7 @@ def begin(parameters: Parameters, water: Vector3) -> RemusState:
 
     """
     x, y, z, phi, theta, psi = parameters.eta0
-    flow = total(parameters.current, water)
+    flow = add(parameters.current, water)
     state = RemusState((x, y, z), (phi, theta, psi), parameters.nu0, (0.0, 0.0, 0.0), flow)
     check_speed(state)
     return state
@@ -275,7 +275,7 @@ def advance(
         h: step [s].
 
     """
-    flow = total(parameters.current, water)
+    flow = add(parameters.current, water)
     state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
     check_speed(state)
     mass = inertia(parameters.hull)

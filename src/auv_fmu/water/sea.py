@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.quantities import ACCELERATION, VELOCITY
 from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Vector3, plus_scaled, total
+from auv_fmu.language.vectors import Vector3, add, add_scaled
 from auv_fmu.water import ocean_current, waves
 from auv_fmu.water.ocean_current import Current, Variation
 from auv_fmu.water.waves import Components, Spectrum, Waves
@@ -94,10 +94,10 @@ def water(
     current, depth = sea.current, sea.depth
     z = waves.within(position[2], depth)
     share = ocean_current.profile(current.root, z, depth)
-    velocity = total(moved.velocity, ocean_current.velocity(current, variation, share))
+    velocity = add(moved.velocity, ocean_current.velocity(current, variation, share))
     u, v, w = velocity
     # Above still water everything moves as on it.
     rise = w if position[2] >= 0.0 else 0.0
     shear = ocean_current.velocity(current, variation, ocean_current.slope(current.root, z, depth))
-    convective = plus_scaled(waves.along(moved.gradient, (u, v, rise)), rise, shear)
-    return WaterMotion(velocity, total(moved.acceleration, convective), moved.elevation)
+    convective = add_scaled(waves.along(moved.gradient, (u, v, rise)), rise, shear)
+    return WaterMotion(velocity, add(moved.acceleration, convective), moved.elevation)
