@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.discovery import components, ports_of
+from fmus.discovery import components
+from support.settings import ports_of
 
 ROOT = Path(__file__).parents[2]
 

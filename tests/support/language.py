@@ -36,7 +36,8 @@ from math import isnan
 from math import {", ".join(sorted(MATHEMATICS | CONSTANTS))}
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.linear_algebra import Matrix, Vector, interpolate, solve
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.linear_algebra import interpolate, solve
 from fmus.ports.port import Refusal
 
 """

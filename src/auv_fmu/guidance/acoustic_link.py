@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.linear_algebra import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.random_numbers import MESSAGE_LOSSES, start, uniform
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import Vector3, distance

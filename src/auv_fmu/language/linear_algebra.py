@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from auv_fmu.language.arrays import Matrix, Vector
 
-__all__ = ["Matrix", "Vector", "interpolate", "solve"]
-
 
 def interpolate(x: float, xs: Vector, ys: Vector) -> float:
     """The value at x of the line through points, as it is at its ends outside of them.

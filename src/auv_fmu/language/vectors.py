@@ -1,10 +1,10 @@
 """Names for the tuples that the equations pass around, and the algebra of three-vectors.
 
 The equations here use it, because Python takes half as long for functions of tuples as for the
-operators of :class:`.arrays.Vector`; those are for components of one's own, and for large systems.
+operators of :class:`.arrays.Vector`; those are for components of one's own and longer vectors.
 
-A function that gives a vector is named by a verb: `add`, `sub` and `scale` are a + b, a - b and k a;
-`_scaled` is of k b, `_diag` of D b. D is a diagonal matrix of gains, given as its diagonal.
+A function that gives a vector is named by a verb: `add` a + b, `sub` a - b, `scale` k a. `_scaled`
+means by k b, `_diag` by D b: D is a diagonal matrix of gains, given as its diagonal.
 """
 
 from __future__ import annotations

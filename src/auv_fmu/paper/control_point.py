@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Rotation, Vector3, Vector6, add_scaled, scale
+from auv_fmu.language.vectors import Rotation, Vector3, Vector6, add_scaled
 from auv_fmu.paper.attitude import rotate, rotate_back
 
 #: How far ahead of the centre of mass the control point is, and its value in section 4.1 [m].
@@ -55,12 +55,6 @@ def control_point_velocity(rotation: Rotation, nu: Vector6, ell: float) -> Vecto
     """
     u, v, w, _, q, r = nu
     return rotate(rotation, (u, v + ell * r, w - ell * q))
-
-
-def jacobian(rotation: Rotation, ell: float) -> tuple[Vector3, Vector3, Vector3]:
-    """J(eta) of (11) as its columns, for (u, q, r)."""
-    e1, e2, e3 = rotation
-    return e1, scale(-ell, e3), scale(ell, e2)
 
 
 def actuator_command(rotation: Rotation, force: Vector3, ell: float) -> Vector3:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import atan2, cos, log, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.linear_algebra import Matrix
+from auv_fmu.language.arrays import Matrix
 from auv_fmu.language.quantities import POSITION
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import Vector3, Vector6, add

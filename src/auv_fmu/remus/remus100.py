@@ -10,7 +10,8 @@ from __future__ import annotations
 from math import cos, exp, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.linear_algebra import Vector, solve
+from auv_fmu.language.arrays import Vector
+from auv_fmu.language.linear_algebra import solve
 from auv_fmu.language.quantities import ETA, NU, VELOCITY
 from auv_fmu.language.variable import Variable
 from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled

@@ -31,7 +31,7 @@ from enum import IntEnum
 from math import cos, exp, expm1, fmod, log, pi, sin, sqrt, tanh, tau
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.linear_algebra import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.random_numbers import (
     WAVE_DIRECTIONS,
     WAVE_FREQUENCIES,

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.language.linear_algebra import Matrix, Vector, interpolate, solve
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.linear_algebra import interpolate, solve
 
 XS, YS = Vector((-2.0, -0.5, 0.0, 1.0, 4.0)), Vector((3.0, -1.0, 0.0, 0.5, 0.25))
 

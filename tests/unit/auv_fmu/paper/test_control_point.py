@@ -12,9 +12,9 @@ from auv_fmu.paper.control_point import (
     actuator_command,
     control_point,
     control_point_velocity,
-    jacobian,
 )
 from auv_fmu.paper.plant import Parameters, advance, begin, outputs
+from support.control_point_model import jacobian
 from support.strategies import angles, forces, lengths, pitch_angles, speeds, vectors
 
 

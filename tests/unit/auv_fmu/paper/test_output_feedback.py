@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from auv_fmu.paper import output_feedback
 from auv_fmu.paper.attitude import rotation_from_euler
-from auv_fmu.paper.control_point import jacobian
 from auv_fmu.paper.observer import Form
 from auv_fmu.paper.output_feedback import ControllerState, Gains, Measurement
 from auv_fmu.paper.saturation import Saturation
+from support.control_point_model import jacobian
 from support.strategies import angles, speeds, vectors
 
 NUMPY = {

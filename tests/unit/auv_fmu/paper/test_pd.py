@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from auv_fmu.paper import pd
 from auv_fmu.paper.attitude import rotation_from_euler
-from auv_fmu.paper.control_point import jacobian
 from auv_fmu.paper.pd import PdGains, PdMeasurement
+from support.control_point_model import jacobian
 from support.strategies import angles, speeds, vectors
 
 three = vectors(speeds, 3)

@@ -24,7 +24,7 @@ from auv_fmu.water.ocean_current import Current
 from auv_fmu.water.sea import Sea
 from auv_fmu.water.waves import MOST as MOST_WAVES
 from auv_fmu.water.waves import Spectrum, Waves
-from fmus.discovery import ports_of, source_of
+from fmus.discovery import source_of
 from fmus.native.functions import function_in_c
 from fmus.native.program import Program
 from fmus.native.shapes import strip_sphinx_marks
@@ -45,7 +45,7 @@ from support.equations import (
     is_series,
     structure,
 )
-from support.settings import NAMES, behaviour_of, parameters_of
+from support.settings import NAMES, behaviour_of, parameters_of, ports_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
