@@ -12,7 +12,7 @@ room              what it states
 :mod:`.remus`     the REMUS 100, not in the paper
 :mod:`.water`     waves and currents of a sea, not in the paper
 :mod:`.guidance`  paths through waypoints, formations and their messages, not in the paper
-:mod:`.loop`      Fig. 2: all of it as one straight line
+:mod:`.loop`      Fig. 2 as one straight line, with all of these
 ================  ========================================================================
 
 Each imports only what stands above it in this table, and names its modules in one of its own.

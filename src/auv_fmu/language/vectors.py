@@ -1,7 +1,7 @@
 """Names for the tuples that the equations pass around, and the algebra of three-vectors.
 
-The equations here use it, because Python takes half as long for functions of tuples as for the
-operators of :class:`.arrays.Vector`; those are for components of one's own and longer vectors.
+The equations here use it, because Python runs it several times as fast as the operators of
+:class:`.arrays.Vector`; those are for components of one's own and longer vectors.
 
 A function that gives a vector is named by a verb: `add` a + b, `sub` a - b, `scale` k a. `_scaled`
 means by k b, `_diag` by D b: D is a diagonal matrix of gains, given as its diagonal.
