@@ -1,8 +1,8 @@
 """Vectors and matrices of fixed size, with operators: for components of one's own.
 
-The equations of the paper do without them: they have :mod:`.vectors`, for speed. Both classes
-are immutable, and their operators never change the order in which numbers are added up: a
-translation to C gives the same bits.
+The equations of the paper do without them: they have :mod:`.vectors`, for speed. Both classes are
+immutable, and their operators never change the order in which numbers are added up: a translation
+to C gives the same bits.
 """
 
 from __future__ import annotations

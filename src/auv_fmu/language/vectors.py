@@ -60,12 +60,12 @@ def sub_scaled(a: Vector3, k: float, b: Vector3) -> Vector3:
 
 
 def sub_diag(a: Vector3, D: Vector3, b: Vector3) -> Vector3:
-    """The vector a - D b."""
+    """The vector a - D b, with a diagonal matrix D."""
     return a[0] - D[0] * b[0], a[1] - D[1] * b[1], a[2] - D[2] * b[2]
 
 
 def neg_diag(D: Vector3, a: Vector3) -> Vector3:
-    """The vector -D a."""
+    """The vector -D a, with a diagonal matrix D."""
     return -D[0] * a[0], -D[1] * a[1], -D[2] * a[2]
 
 
