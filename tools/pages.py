@@ -26,12 +26,12 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from auv_fmu.control_point import ELL
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.control_point import ELL
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.gain_conditions import at_least, coupling
-from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
-from auv_fmu.vehicle import Vehicle
 from fmus.discovery import components, source_of
 from fmus.documentation import component_page
 from orchestrator.figures.run_figures import FIGURES

@@ -23,7 +23,7 @@ from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 from auv_fmu import Refusal
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.language import arrays, tree
 from fmus.language.mathematics import BY_FUNCTION, FUNCTIONS
 from fmus.language.tree import (

@@ -10,7 +10,7 @@ from enum import IntEnum
 from functools import cache
 from typing import Annotated, Any, Union, get_args, get_origin
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.ports.groups import hints_of, is_class, is_record
 
 #: How a text begins that says where it is about.

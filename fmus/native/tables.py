@@ -8,7 +8,7 @@ from enum import IntEnum
 from itertools import groupby
 from typing import Any
 
-from auv_fmu import euler
+from auv_fmu.paper import euler
 from fmus.language.types import Record, Type, type_of
 from fmus.native.emit import members, quoted
 from fmus.ports.definition import Definition
@@ -26,7 +26,7 @@ _HEAD = f"""\
 #include <float.h>
 #include <stddef.h>
 
-/* From auv_fmu/euler.py. */
+/* From auv_fmu/paper/euler.py. */
 static const double ROUNDING = {euler.ROUNDING!r};
 static const double LARGEST_STATE = {euler.LARGEST_STATE!r};
 static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};

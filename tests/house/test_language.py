@@ -16,9 +16,11 @@ ROOT = Path(__file__).parents[2]
 #: Where the package was installed: what stands outside the language is told by that place.
 PACKAGE = Path(str(auv_fmu.__file__)).parent
 #: What is declared with, and what the C kind has of its own.
-NO_EQUATIONS = ("arrays", "quantities", "variable")
+NO_EQUATIONS = ("arrays.py", "quantities.py", "variable.py", "proof/*.py")
 EQUATIONS = [
-    *sorted({*PACKAGE.glob("*.py")} - {PACKAGE / f"{name}.py" for name in NO_EQUATIONS}),
+    *sorted(
+        {*PACKAGE.rglob("*.py")} - {path for place in NO_EQUATIONS for path in PACKAGE.rglob(place)}
+    ),
     *(ROOT / f"{module.replace('.', '/')}.py" for module in components().values()),
 ]
 
@@ -52,7 +54,8 @@ def test_blocks_that_do_not_run_when_a_module_is_imported_are_skipped(tmp_path):
 def test_what_stands_outside_is_there():
     for name in OUTSIDE:
         module, function = name.split(".")
-        tree = ast.parse((ROOT / f"src/auv_fmu/{module}.py").read_text(encoding="utf-8"))
+        [path] = PACKAGE.rglob(f"{module}.py")
+        tree = ast.parse(path.read_text(encoding="utf-8"))
         assert function in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.compilers import SAME_NUMBERS
 from fmus.language.build import program_of
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
@@ -38,7 +38,8 @@ from math import isnan
 from math import {", ".join(sorted(FUNCTIONS.keys() | CONSTANTS))}
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, interpolate, solve
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.linear_algebra import interpolate, solve
 from fmus.ports.port import Refusal
 
 """

@@ -770,7 +770,7 @@ def test_classes_of_one_name_in_two_modules_are_refused(tmp_path, monkeypatch):
 
 def test_vectors_may_be_imported_by_another_name(tmp_path: Path):
     text = HEAD + (
-        "from auv_fmu.linear_algebra import Matrix as M, Vector as V\n\n\n"
+        "from auv_fmu.language.linear_algebra import Matrix as M, Vector as V\n\n\n"
         "def f(x: float) -> Annotated[V, 2]:\n"
         "    return M((x * j for j in range(2)) for _ in range(2)) @ V(k + x for k in range(2))\n"
     )

@@ -17,14 +17,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import acoustic_link, formation
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu.ocean_current import Current
-from auv_fmu.path_planner import MOST, Parameters, Waypoints
-from auv_fmu.sea import Sea
-from auv_fmu.waves import MOST as MOST_WAVES
-from auv_fmu.waves import Spectrum, Waves
-from fmus.discovery import ports_of, source_of
+from auv_fmu.guidance import acoustic_link, formation
+from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.water.ocean_current import Current
+from auv_fmu.water.sea import Sea
+from auv_fmu.water.waves import MOST as MOST_WAVES
+from auv_fmu.water.waves import Spectrum, Waves
+from fmus.discovery import source_of
 from fmus.native.functions import function_in_c
 from fmus.native.program import Program
 from fmus.native.shapes import strip_sphinx_marks
@@ -45,7 +45,7 @@ from support.equations import (
     is_series,
     structure,
 )
-from support.settings import NAMES, behaviour_of, parameters_of
+from support.settings import NAMES, behaviour_of, parameters_of, ports_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -96,7 +96,7 @@ def test_it_is_c_without_warnings(name, standard, tmp_path):
 def test_each_function_has_its_docstring_above_it(name):
     text, seen = translated(source_of(name).definition), 0
     component = Path(str(import_module(source_of(name).module).__file__))
-    for path in (component, *(ROOT / "src/auv_fmu").glob("*.py")):
+    for path in (component, *(ROOT / "src/auv_fmu").rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
                 continue
