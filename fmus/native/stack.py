@@ -8,6 +8,7 @@ Compilers keep no more than this, but for a tenth, and less if they optimise.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from operator import itemgetter
 
 from fmus.language import tree
 from fmus.language.tree import Call, Expression, Function, Make
@@ -26,7 +27,7 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """
     depths: dict[Function, int] = {}
     for function in functions:
-        own, deeper = _result(function.returns) + _passed(function), 0
+        own, deeper = 0, 0
         variables: dict[str, Type] = {}
         for one in tree.statements_in(function.body):
             if isinstance(one, tree.Reserve):
@@ -37,10 +38,10 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
                 own += _held(each)
                 calls = (part for part in tree.expressions_in(each) if isinstance(part, Call))
                 deeper = max([deeper, *(depths[call.function] for call in calls)])
-        depths[function] = own + sum(map(_result, variables.values())) + deeper
-    return max(
-        ((depth, one) for one, depth in depths.items()), key=lambda it: it[0], default=(0, None)
-    )
+        own += sum(map(_result, variables.values()))
+        depths[function] = _passed(function) + own + deeper
+    found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
+    return max(found, key=itemgetter(0), default=(0, None))
 
 
 def _result(type_: Type) -> int:
@@ -55,7 +56,7 @@ def _passed(function: Function) -> int:
 
 
 def _held(one: Expression, within: bool = False) -> int:
-    """The bytes of the structures that an expression makes."""
+    """The bytes of the structures that an expression makes, and that are returned to it."""
     is_made = isinstance(one, Make)
-    own = _result(one.type) if is_made and not within else 0
+    own = _result(one.type) if isinstance(one, Call) or (is_made and not within) else 0
     return own + sum(_held(part, is_made) for part in one.parts)

@@ -1,7 +1,4 @@
-"""Each part of Python's syntax is translated, or refused with its line: none is left out of the C.
-
-The translator alone is held to it, too: what `language.foreign` lets pass by mistake is no silence.
-"""
+"""Each part of Python's syntax is translated, or refused with its line: none is left out of the C."""
 
 from __future__ import annotations
 
@@ -12,9 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from fmus.native import functions
-from fmus.native.language import foreign
-from fmus.native.program import Untranslatable
+from fmus.language.build import Untranslatable
 from support.language import HEAD, Twins, c_text, module_of
 
 #: A function of which `?` is a part.
@@ -41,7 +36,7 @@ PARTS = {
     "If": "if x > 0.0: x = 2.0",
     "Import": "import math",
     "ImportFrom": "from math import sin",
-    "Match": "match x:\n        case _: x = 2.0",
+    "Match": "match int(x):\n        case 1 | 3: x = 2.0\n        case _: x = 4.0",
     "Nonlocal": "def g() -> None: nonlocal x",
     "Pass": "pass",
     "Raise": "raise Refusal('no')",
@@ -92,43 +87,36 @@ OPERATORS = sorted(
 #: Parts of Python that the language has.
 TRANSLATED = frozenset(
     (
-        "AnnAssign", "Assign", "Attribute", "AugAssign", "BinOp", "BoolOp", "Break", "Call",
+        "AnnAssign", "Assert", "Assign", "Attribute", "AugAssign", "BinOp", "BoolOp", "Break", "Call",
         "Compare", "Constant", "Continue", "For", "FunctionDef", "GeneratorExp", "If", "IfExp",
-        "Name", "Pass", "Raise", "Return", "Slice", "Starred", "Subscript", "Tuple", "UnaryOp",
+        "Match", "Name", "Pass", "Raise", "Return", "Slice", "Starred", "Subscript", "Tuple", "UnaryOp",
         "While",
     )
 )  # fmt: skip
 
 
-def said_of(text: str, folder: Path, monkeypatch: pytest.MonkeyPatch) -> set[str]:
-    """What the language and the translator alone say of a function; nothing: C does the same."""
-    path = folder / "own.py"
-    path.write_text(HEAD + text)
-    said = {line.replace(str(path), "own.py") for line in foreign(path)}
-    monkeypatch.setattr(functions, "_checked", lambda path: ast.parse(Path(path).read_text()))
+def said_of(text: str, folder: Path) -> list[str]:
+    """What is said of a function; nothing: C does the same."""
     try:
         module = module_of(HEAD + text, folder)
         c_text({"f": module.f})
     except Untranslatable as error:
-        return {*said, str(error).replace(str(path), "own.py")}
+        return [line.replace(str(folder / "own.py"), "own.py") for line in error.args]
     except SyntaxError as error:
-        return {*said, f"own.py:{error.lineno}: {error.msg}"}
+        return [f"own.py:{error.lineno}: {error.msg}"]
     twins = Twins(module, folder)
     for x in (-1.0, 0.5, 3.0):
         given = (x, 0.5, 2.0, -1.0)
         assert twins.c("f", given) == twins.python("f", given)
-    assert not said
-    return said
+    return []
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_kind_of_statement_and_expression_is_translated_or_refused(
-    tmp_path, monkeypatch, kind
-):
+def test_each_kind_of_statement_and_expression_is_translated_or_refused(tmp_path, kind):
     text = HOW.replace("?", PARTS[kind])
     tree = ast.parse(text)
     assert any(type(node).__name__ == kind for node in ast.walk(tree))
-    said = said_of(text, tmp_path, monkeypatch)
+    said = said_of(text, tmp_path)
     assert bool(said) == (kind not in TRANSLATED)
     first = HEAD.count("\n") + 1
     for line in said:
@@ -139,7 +127,7 @@ def test_each_kind_of_statement_and_expression_is_translated_or_refused(
 
 
 @pytest.mark.parametrize("kind", OPERATORS, ids=lambda kind: kind.__name__)
-def test_each_operator_is_translated_or_refused(tmp_path, monkeypatch, kind):
+def test_each_operator_is_translated_or_refused(tmp_path, kind):
     node = ast.parse("x + 2.0", mode="eval").body
     if issubclass(kind, ast.cmpop):
         node = ast.parse("2.0 if x < 2.0 else 3.0", mode="eval").body
@@ -151,10 +139,10 @@ def test_each_operator_is_translated_or_refused(tmp_path, monkeypatch, kind):
     else:
         node.op = kind()
     text = HOW.replace("?", f"x = {ast.unparse(node)}")
-    said = said_of(text, tmp_path, monkeypatch)
+    said = said_of(text, tmp_path)
     assert all(re.match(r"own\.py:\d+: ", line) and kind.__name__ not in line for line in said)
     known = (
-        ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.USub, ast.Not,
+        ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.USub, ast.UAdd, ast.Not,
         ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq,
     )  # fmt: skip
     assert bool(said) == (kind not in known)

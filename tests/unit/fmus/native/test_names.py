@@ -16,10 +16,9 @@ from hypothesis import strategies as st
 
 from fmus.compilers import SAME_NUMBERS, machines_compiler
 from fmus.discovery import source_of
-from fmus.native.functions import function_in_c
 from fmus.native.packaging import sources
-from fmus.native.program import Program
-from fmus.native.shapes import in_c
+from fmus.native.emit import Emitter
+from fmus.native.names import in_c
 
 ZIG = (sys.executable, "-m", "ziglang", "cc", "-target")
 COMMANDS = {
@@ -33,10 +32,10 @@ COMMANDS = {
 _USE = """
 static double use_{i}(double {name}, Error *error) {{
     const struct {{ double {name}; }} it_{i} = {{.{name} = {name}}};
-    const double y_{i} = ABS((int){name}) + SQRT({name}) + POW({name}, 2.0) + MOD({name}, 3.0);
+    const double y_{i} = int_abs((int){name}, error) + math_sqrt({name}, error) + py_pow({name}, 2.0, error);
     if (isfinite({name}) != 0 && isnan({name}) == 0 && isinf({name}) == 0) return INFINITY;
     for (int i_{i} = 0; i_{i} < 2; i_{i}++) raise_error(error, "%g", {name});
-    return y_{i} + it_{i}.{name} + fabs({name}) + INT_OF(trunc({name})) + ADD(1, PLACE(2, 3)) + NAN;
+    return y_{i} + it_{i}.{name} + fabs({name}) + int_of(trunc({name}), error) + place_in(2, 3, error) + NAN;
 }}
 """
 
@@ -68,9 +67,9 @@ def test_every_name_that_a_compiler_knows_can_be_a_variable_and_a_function(tmp_p
     text = run(command, tmp_path, "-E", "fmi2.c") + run(command, tmp_path, "-E", "-dM", "fmi2.c")
     words = sorted({*re.findall(r"\b[A-Za-z_]\w*", text)})
     assert {"size_t", "strlen", "math_errhandling", "EOF"} <= {*words}
-    program, own = Program(function_in_c), re.findall(r"\w+", files["equations.c"])
+    emitter, own = Emitter([]), re.findall(r"\w+", files["equations.c"])
     composed = [word for word in words if re.match("[A-Za-z]+_.", word)]
-    functions = [program.name(word, word) for word in composed if word not in own]
+    functions = [emitter._unused(word) for word in composed if word not in own]
     code = [f"static double {name}(double x) {{ return x; }}" for name in functions]
     names = [in_c(word) for word in words if not iskeyword(word)]
     code += [_USE.format(i=i, name=name) for i, name in enumerate(names)]
