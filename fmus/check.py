@@ -13,14 +13,17 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import redirect_stdout
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import FunctionType
 
 from fmus.compilers import Compiler, check_sources
 from fmus.discovery import Source, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from fmus.language.build import Program, Untranslatable
 from fmus.native.packaging import MAIN, fmu_entries
+from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
 from fmus.script import is_component, no_component, script_in, source_of_script, told
 
@@ -64,21 +67,22 @@ def _order(text: str) -> tuple[str, int]:
 
 
 def _mistakes(script: Path, folder: Path) -> Iterator[str]:
-    source = source_of_script(script)
+    source, program = source_of_script(script), Program()
     try:
-        definition = source.definition
+        module = import_module(source.module)
     except Exception as error:
         yield told(error, script)
         return
-    program = Program()
-    for hook in filter(None, definition.behaviour.hooks.values()):
-        program.add(hook)
+    for name in HOOKS:
+        hook = getattr(module, name, None)
+        if isinstance(hook, FunctionType):
+            program.add(hook)
     for mistake in program.mistakes:
         yield told(Untranslatable(mistake), script)
-    if program.mistakes:
-        return
     try:
-        write(source, folder)
+        source.definition  # noqa: B018
+        if not program.mistakes:
+            write(source, folder)
     except Exception as error:
         yield told(error, script)
 

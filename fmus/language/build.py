@@ -53,6 +53,7 @@ from fmus.language.types import (
     Type,
     check_int,
     check_value,
+    enumeration,
     has_no_size,
     has_only_floats,
     is_algebraic,
@@ -816,7 +817,8 @@ class _Builder:
         self._know(node.name, NOTHING)
 
     def _sizeless(self, node: ast.FunctionDef, name: str) -> Type:
-        raise _Outside(node, f"{name}, an argument of {node.name}, has no size")
+        what = "a Vector or Matrix has no size here: write Annotated[Vector, 3]"
+        raise _Outside(node, f"the argument {name} of {node.name}: {what}")
 
     def _captured(self, names: Sequence[str]) -> list[str]:
         """The variables among some names, and those that local functions among them capture."""
@@ -1278,7 +1280,7 @@ class _Builder:
             better = f"{text}.0" if text.removeprefix("-").isdecimal() else f"float({text})"
             raise _Outside(node, f"{text} is an int where a float is wanted: write {better}")
         if value.type == INT and getattr(wanted, "made", None):
-            what = f"an int where {wanted.word} is wanted: choose a member by if or match"
+            what = f"an int where {wanted.word} is wanted: write {wanted.made.__name__}(...)"
             raise _Outside(node, what)
         raise _Outside(node, f"{value.type.word} where {wanted.word} is wanted")
 
@@ -1690,6 +1692,8 @@ class _Builder:
                 return make(self, node)
         if is_record(called):
             return self._record(node, called)
+        if is_class(called, IntEnum):
+            return self._member(node, called)
         if isinstance(called, FunctionType) and _is_at_hand(
             called, self.path, self.scope["__name__"]
         ):
@@ -1751,10 +1755,12 @@ class _Builder:
 
     def _len(self, node: ast.Call) -> Expression:
         self._check_plain(node, "len", 1)
-        type_ = self.expression(node.args[0]).type
-        if not isinstance(type_, (Array, Record)):
+        value = self.expression(node.args[0])
+        if not isinstance(value.type, (Array, Record)):
             raise _Outside(node, "len of a number")
-        return int_of(len(parts_of(type_)))
+        if value.fails:
+            self._held(value, "all")
+        return int_of(len(parts_of(value.type)))
 
     def _min(self, node: ast.Call) -> Expression:
         return self._extreme(node, "min")
@@ -2067,6 +2073,23 @@ class _Builder:
         if len(values) != len(wanted):
             raise _Outside(node, f"{len(values)} values for {len(wanted)} fields")
         return Make(type_, [values[name] for name in wanted])
+
+    def _member(self, node: ast.Call, made: Any) -> Expression:
+        """The member of an enumeration that an int stands for."""
+        self._check_plain(node, made.__name__, 1)
+        given, type_ = self._integer(node.args[0], made.__name__), enumeration(made)
+
+        def body() -> Sequence[Statement]:
+            k = Local("k", INT)
+            known = self._is_one_of(k, [int_of(int(member)) for member in made])
+            parts = ["ValueError: ", (k, "d"), f" is not a valid {made.__qualname__}"]
+            return [
+                tree.If(Operation(tree.NOT, (known,), BOOL), [tree.Raise(parts)]),
+                tree.Return(Operation(tree.AS_INT, (k,), type_)),
+            ]
+
+        of = self.program.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
+        return Call(of, (_as_int(given),))
 
     def _default(self, module: str, name: str, field: str, value: Any, wanted: Type) -> Expression:
         if isinstance(wanted, (Array, Record)):

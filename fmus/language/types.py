@@ -133,7 +133,9 @@ def has_only_floats(type_: Type) -> bool:
     """Whether all numbers in it are floats."""
     if isinstance(type_, Array):
         return has_only_floats(type_.item)
-    return type_ == FLOAT if isinstance(type_, Scalar) else all(map(has_only_floats, parts_of(type_)))
+    return (
+        type_ == FLOAT if isinstance(type_, Scalar) else all(map(has_only_floats, parts_of(type_)))
+    )
 
 
 def vector(n: int) -> Array:
