@@ -485,6 +485,7 @@ class _Builder:
         #: Statements before the one on its way; None: part of it may not be computed.
         self._before: list[Statement] | None = None
         self._depth = self._parts = 0
+        self.has_mistakes = False
         self._counts: Counter[str] = Counter()
 
     # Functions
@@ -524,7 +525,7 @@ class _Builder:
             with self._noting():
                 self._returns = self._hinted(node, node.returns, f"the result of {node.name}")
         body = self._block(node.body)
-        if self.known is not None and self._gives:
+        if self.known is not None and self._gives and not self.has_mistakes:
             with self._noting():
                 raise _Outside(node, f"{node.name} may end without a return")
         self.made.returns = self._returns or UNKNOWN
@@ -1680,6 +1681,8 @@ class _Builder:
             if self.known is not None and local not in self.known:
                 raise _Outside(node, f"{local} may have no value here")
             return self._call_of(node, self.functions[local])
+        if not isinstance(node.func, (ast.Name, ast.Attribute)):
+            raise self._cannot(node, word_of(node.func))
         called = self._meant(node.func)
         if called is None and isinstance(node.func, ast.Attribute):
             return self._method(node, node.func)
@@ -2197,6 +2200,7 @@ class _Noting:
         if error is None:
             return False
         builder = self._builder
+        builder.has_mistakes = True
         if isinstance(error, _Outside):
             line = getattr(error.node, "lineno", getattr(self._node, "lineno", 0))
             builder.program.refuse(f"{builder.path}:{line}: ", str(error))

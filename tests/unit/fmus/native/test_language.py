@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from fmus.language.build import Untranslatable
+from fmus.language.words import INSTEAD
 from support.language import HEAD, Twins, c_text, module_of
 
 #: A function of which `?` is a part.
@@ -95,15 +96,23 @@ TRANSLATED = frozenset(
 )  # fmt: skip
 
 
-def said_of(text: str, folder: Path) -> list[str]:
-    """What is said of a function; nothing: C does the same."""
+def said_of_module(text: str, folder: Path) -> list[str]:
+    """What is said of the function f of a module."""
     try:
-        module = module_of(HEAD + text, folder)
+        module = module_of(text, folder)
         c_text({"f": module.f})
     except Untranslatable as error:
         return [line.replace(str(folder / "own.py"), "own.py") for line in error.args]
     except SyntaxError as error:
         return [f"own.py:{error.lineno}: {error.msg}"]
+    return []
+
+
+def said_of(text: str, folder: Path) -> list[str]:
+    """What is said of a function; nothing: C does the same."""
+    if said := said_of_module(HEAD + text, folder):
+        return said
+    module = module_of(HEAD + text, folder)
     twins = Twins(module, folder)
     for x in (-1.0, 0.5, 3.0):
         given = (x, 0.5, 2.0, -1.0)
@@ -152,3 +161,81 @@ def test_every_kind_of_this_python_has_an_example():
     assert set(KINDS) <= {*PARTS}
     if sys.version_info >= (3, 14):
         assert set(KINDS) == {*PARTS}
+
+
+@pytest.mark.parametrize(
+    ("line", "what"),
+    [
+        ("    return hypot(x, 1.0)", "the name hypot"),
+        ("    return sum((x, 1.0))", "the name sum"),
+        ("    return x**0.5", "** with other than a whole constant"),
+        ("    return x | 2", "the operator |"),
+        ("    return any([x > a for a in (1.0, 2.0)]) + x", "any of a list"),
+        ("    return [x][0]", "a list"),
+        ("    return {1: x}[1]", "a dict"),
+        ("    return (y := x)", ":="),
+        ("    return f\"{x}\"", "an f-string"),
+        ("    return x if x is x else 1.0", "a comparison other than of size"),
+        ("    return (lambda y: y)(x)", "lambda"),
+        ("    return 1j", "the constant 1j"),
+        ("    for k in range(3):\n        x += k\n    else:\n        x = 1.0", "else of a for"),
+        ("    try:\n        return x\n    finally:\n        pass", "try"),
+        ("    with x:\n        return x", "with"),
+        ("    x.y = 1.0\n    return x", "an assignment to a field"),
+        ("    x[0] = 1.0\n    return x", "an assignment to an element"),
+        ("    x[0, 1] = 1.0\n    return x", "an assignment to an element of a matrix"),
+        ("    global y\n    return x", "global"),
+        ("    raise ValueError", "a raise without a text"),
+        ("    while x > 1.0:\n        pass", "a while that changes nothing in its condition"),
+    ],
+)  # fmt: skip
+def test_what_is_outside_is_named_with_its_line_and_what_to_write(tmp_path, line, what):
+    head = "from math import hypot\n\n\ndef f(x: float) -> float:\n"
+    [said] = said_of_module(head + line + "\n", tmp_path)
+    place, _, said = said.removeprefix("own.py:").partition(": ")
+    better = f"; {INSTEAD[what]}" if what in INSTEAD else ""
+    assert said == f"{what} is not in the language of equations{better}"
+    assert int(place) in (5, 7, 8)
+
+
+def test_all_mistakes_of_all_functions_are_told_at_once_and_what_follows_from_them_is_not(tmp_path):
+    text = (
+        "def _twice(x, y: float) -> float:\n"
+        "    z = [x]\n"
+        "    return 2.0 * z[0] + y\n\n\n"
+        "def f(x: float) -> float:\n"
+        "    if x in (1.0, 2.0):\n"
+        "        a = {}\n"
+        "    total = 0\n"
+        "    for k in set((1, 2)):\n"
+        "        total += 0.5\n"
+        "    b = a + missing\n"
+        "    return _twice(x, 1) + b\n"
+    )
+    said = [line.split(";")[0] for line in said_of_module(text, tmp_path)]
+    outside = "is not in the language of equations"
+    assert said == [
+        "own.py:1: the argument x of _twice has no type",
+        f"own.py:2: a list {outside}",
+        f"own.py:7: a comparison other than of size {outside}",
+        f"own.py:8: a dict {outside}",
+        f"own.py:10: the name set {outside}",
+        "own.py:11: total is an int and gets a float: begin with a float, such as 0.0",
+        "own.py:12: a may have no value here",
+        "own.py:13: 1 is an int where a float is wanted: write 1.0",
+    ]
+
+
+def test_what_no_hook_calls_may_be_any_python(tmp_path):
+    text = "def plot(x):\n    with open(x) as file:\n        return [*file]\n\n\n"
+    assert said_of_module(text + "def f(x: float) -> float:\n    return x\n", tmp_path) == []
+
+
+def test_what_a_class_changes_of_a_tuple_is_refused(tmp_path):
+    text = (
+        "from typing import NamedTuple\n\n\nclass A(NamedTuple):\n    x: float\n\n"
+        "    def __getitem__(self, k):\n        return 2.0\n\n\n"
+        "def f(x: float) -> float:\n    return A(x)[0]\n"
+    )
+    [said] = said_of_module(text, tmp_path)
+    assert said == "own.py:4: __getitem__ in the class A: leave it out"
