@@ -27,7 +27,7 @@ FLOORS = {
         "studies", "paper", "commands",
     ),
     "fmus": (
-        "ports", "components", "kinds", "discovery", "documentation", "script", "compilers",
+        "ports", "language", "components", "kinds", "discovery", "documentation", "script", "compilers",
         "python", "trial", "native", "check", "build",
     ),
 }  # fmt: skip
