@@ -89,9 +89,9 @@ OPERATORS = sorted(
 TRANSLATED = frozenset(
     (
         "AnnAssign", "Assert", "Assign", "Attribute", "AugAssign", "BinOp", "BoolOp", "Break",
-        "Call", "Compare", "Constant", "Continue", "For", "FunctionDef", "GeneratorExp", "If", "IfExp",
-        "Match", "Name", "Pass", "Raise", "Return", "Slice", "Starred", "Subscript", "Tuple",
-        "UnaryOp", "While",
+        "Call", "Compare", "Constant", "Continue", "For", "FunctionDef", "GeneratorExp", "If",
+        "IfExp", "Match", "Name", "Pass", "Raise", "Return", "Slice", "Starred", "Subscript",
+        "Tuple", "UnaryOp", "While",
     )
 )  # fmt: skip
 
