@@ -157,7 +157,7 @@ def _check(network: Network) -> None:
         if layer.b.shape != layer.W.shape[:1]:
             raise InputError(f"layer {i} has {layer.W.shape[0]} neurons and {layer.b.size} biases")
         if not all(np.isfinite(array).all() for array in (layer.W, layer.b, layer.numbers)):
-            raise InputError(f"layer {i} has a weight that is not finite")
+            raise InputError(f"layer {i} has a number that is not finite")
     weights = sum(layer.W.size for layer in network.layers)
     if weights > MOST_WEIGHTS:
         raise InputError(f"it has {weights} weights; a component may have {MOST_WEIGHTS}")
@@ -275,6 +275,8 @@ def _write_scalers_out(graph: Any, make: Any) -> None:
             continue
         [value], [scaled] = node.input, node.output
         said = {a.name: make.get_attribute_value(a) for a in node.attribute}
+        for missing in {"offset", "scale"} - {*said}:
+            raise InputError(f"operator Scaler: it has no {missing}")
         for name, operator in (("offset", "Sub"), ("scale", "Mul")):
             changed = scaled if name == "scale" else f"{scaled}.{name}_done"
             constant = f"{scaled}.{name}"
@@ -328,8 +330,8 @@ class _Layers:
     ) -> None:
         self._layers: list[Dense] = []
         self._shapes = shapes
-        self._known = {name: _Value(_numbers(array)) for name, array in constants.items()}
-        self._known[inputs] = self._begun(shape)
+        self._constants = constants
+        self._known = {inputs: self._begun(shape)}
 
     def up_to(self, name: str) -> list[Dense]:
         """All layers up to a value."""
@@ -355,6 +357,8 @@ class _Layers:
 
         """
         [output, *_] = outputs
+        for one in {*inputs} & self._constants.keys():
+            self._known.setdefault(one, _Value(_numbers(self._constants[one])))
         if name == "Shape":
             value = self._shape(inputs[0], **attributes)
         elif name in _OF_ONNX or name in _BOUNDS:
@@ -471,14 +475,14 @@ class _Layers:
 
 
 #: What may be neither a constant nor affine.
-_PRODUCT = "it multiplies, divides or selects by what depends on the network's input"
+_PRODUCT = "it multiplies, divides or selects by what depends on the input"
 
 
 def _numbers(array: Any) -> Any:
     """Numbers of single precision in double precision; integers as they are."""
     array = np.asarray(array)
     if array.dtype.kind not in "biu" and array.dtype not in (np.float32, np.float64):
-        raise InputError(f"constants of the type {array.dtype} are not supported")
+        raise InputError(f"numbers of the type {array.dtype} are not supported")
     return array.astype(float) if array.dtype.kind == "f" else array
 
 
