@@ -46,7 +46,7 @@ MOST_WEIGHTS = 100_000
 #: More than the language of equations takes in a matrix.
 MOST_OF_A_LAYER = 65_536
 
-#: Inputs and neurons, of which each takes up to 8 numbers of the stack.
+#: Inputs and neurons: each takes up to 8 of the numbers that a call of C may hold.
 MOST_NEURONS = 4096
 
 #: The largest number of single precision, which stands for no bound.
@@ -67,7 +67,8 @@ _OF_ONNX: dict[str, tuple[str, dict[str, float]]] = {
 _BOUNDS = {"Max": "min", "Min": "max"}
 
 #: The types that it has numbers of, by its own numbers of them.
-_FLOATS = {1: np.float32, 11: np.float64}
+_FLOAT = 1
+_FLOATS = {_FLOAT: np.float32, 11: np.float64}
 _INTEGERS = {6: np.int32, 7: np.int64}
 
 #: Earlier ones have other operators by the same names; later ones are not known here.
@@ -219,13 +220,14 @@ def _from_onnx(path: Path) -> Network:
     given = [value for value in graph.input if value.name not in constants]
     for what, values in (("input", given), ("output", graph.output)):
         if len(values) != 1:
-            names = ", ".join(value.name for value in values)
+            names = ", ".join(value.name for value in values) or "none"
             raise InputError(
-                f"it has {len(values)} {what}s, {names}; one is wanted. "
-                "onnx.utils.extract_model cuts one out"
+                f"its {what}s are {names}; one is wanted: cut it out by onnx.utils.extract_model"
             )
     shape = _one_row(given[0])
-    _write_scalers_out(graph, onnx.helper)
+    nodes = [*_without_scalers(graph.node, onnx.helper)]
+    del graph.node[:]
+    graph.node.extend(nodes)
     # These refuse what the standard does not allow, such as shapes and types that do not fit.
     model = onnx.shape_inference.infer_shapes(
         model, check_type=True, strict_mode=True, data_prop=True
@@ -266,25 +268,19 @@ def _one_row(given: Any) -> tuple[int, ...]:
     return (1, *others)
 
 
-def _write_scalers_out(graph: Any, make: Any) -> None:
-    """Put Sub and Mul in place of the Scaler of scikit-learn."""
-    nodes = []
-    for node in graph.node:
+def _without_scalers(nodes: Sequence[Any], make: Any) -> Iterator[Any]:
+    """The same nodes, with Sub and Mul in place of the Scaler of scikit-learn."""
+    for node in nodes:
         if (node.domain, node.op_type) != ("ai.onnx.ml", "Scaler"):
-            nodes.append(node)
+            yield node
             continue
-        [value], [scaled] = node.input, node.output
-        said = {a.name: make.get_attribute_value(a) for a in node.attribute}
-        for missing in {"offset", "scale"} - {*said}:
-            raise InputError(f"operator Scaler: it has no {missing}")
-        for name, operator in (("offset", "Sub"), ("scale", "Mul")):
-            changed = scaled if name == "scale" else f"{scaled}.{name}_done"
-            constant = f"{scaled}.{name}"
-            nodes.append(make.make_node("Constant", [], [constant], value_floats=said[name]))
-            nodes.append(make.make_node(operator, [value, constant], [changed]))
-            value = changed
-    del graph.node[:]
-    graph.node.extend(nodes)
+        [scaled] = node.output
+        offset, scale, moved = (f"{scaled}.{name}" for name in ("offset", "scale", "moved"))
+        for said in node.attribute:
+            tensor = make.make_tensor("value", _FLOAT, [len(said.floats)], said.floats)
+            yield make.make_node("Constant", [], [f"{scaled}.{said.name}"], value=tensor)
+        yield make.make_node("Sub", [node.input[0], offset], [moved])
+        yield make.make_node("Mul", [moved, scale], [scaled])
 
 
 def _known_shape(value: Any) -> tuple[str, tuple[int, ...] | None]:
@@ -370,9 +366,9 @@ class _Layers:
             raise InputError("more than one output is not supported; export it for inference")
         else:
             value = self._computed(_OPERATORS[name], inputs, attributes)
-        shape = value.offset.shape
-        if shape != (standard := self._shapes.get(output) or shape):
-            raise InputError(f"its result has the shape {[*shape]}, and not {[*standard]}")
+        shape, standard = value.offset.shape, self._shapes.get(output)
+        if standard not in (None, shape):
+            raise InputError(f"its result has the shape {shape}, and not {standard}")
         self._known[output] = value
 
     def _shape(self, name: str, start: int = 0, end: int | None = None) -> _Value:
@@ -482,7 +478,7 @@ def _numbers(array: Any) -> Any:
     """Numbers of single precision in double precision; integers as they are."""
     array = np.asarray(array)
     if array.dtype.kind not in "biu" and array.dtype not in (np.float32, np.float64):
-        raise InputError(f"numbers of the type {array.dtype} are not supported")
+        raise InputError(f"numbers of the type {array.dtype} are not supported; export it in float")
     return array.astype(float) if array.dtype.kind == "f" else array
 
 
