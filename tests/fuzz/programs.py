@@ -114,7 +114,7 @@ DEEPER = {
         (I + I) | (I - I) | I * I | (I // I) | (I % I) | abs(I) | min(I, I) | max(I, I, 2) | -I | 5
         | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
         | int(B)
-        | Mode.HIGH | R.k | (I**2) | ((I % 7)**3) | (I**0) | PRIMES[SIZE]
+        | int(Mode.HIGH) | (I + Mode.LOW) | R.k | (I**2) | ((I % 7)**3) | (I**0) | PRIMES[SIZE]
     """,
     BOOL: """
         (F < F) | (F <= I) | (I > F) | (I >= I) | (F == F) | (I != I) | (B and B) | (B or B)

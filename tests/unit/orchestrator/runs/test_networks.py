@@ -15,7 +15,7 @@ import pytest
 
 from fmus.build import source_of_script
 from fmus.compilers import machines_compiler
-from fmus.native import shapes
+from fmus.language import types
 from fmus.native.translator import translated
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import networks
@@ -813,7 +813,7 @@ def test_any_name_of_a_file_gives_a_module(tmp_path: Path, name: str):
 
 
 def test_a_layer_has_as_many_weights_as_a_matrix_of_the_language():
-    assert networks.MOST_OF_A_LAYER == shapes._MOST_NUMBERS
+    assert networks.MOST_OF_A_LAYER == types._MOST_NUMBERS
 
 
 @pytest.mark.parametrize("sizes", [(1, 4095), (1, 2046, 1, 2048)])
