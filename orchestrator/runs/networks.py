@@ -35,6 +35,8 @@ _ACTIVATIONS = {
     "elu": "z if z > 0.0 else {} * expm1(z)",
     "leaky relu": "z if z > 0.0 else {} * z",
     "clip": "min(max(z, {}), {})",
+    "at least": "max(z, {})",
+    "at most": "min(z, {})",
 }
 
 #: Those without numbers, by the names in an .npz.
@@ -61,10 +63,9 @@ _OF_ONNX: dict[str, tuple[str, dict[str, float]]] = {
     "Elu": ("elu", {"alpha": 1.0}),
     "LeakyRelu": ("leaky relu", {"alpha": 0.01}),
     "Clip": ("clip", {"min": -_FLOAT_MAX, "max": _FLOAT_MAX}),
+    "Max": ("at least", {"bound": -_FLOAT_MAX}),
+    "Min": ("at most", {"bound": _FLOAT_MAX}),
 }
-
-#: Operators that are a Clip, too: which of its bounds they give.
-_BOUNDS = {"Max": "min", "Min": "max"}
 
 #: The types that it has numbers of, by its own numbers of them.
 _FLOAT = 1
@@ -87,6 +88,12 @@ class Dense(NamedTuple):
     b: Any  #: array of neurons
     activation: str
     numbers: Sequence[float] = ()  #: of the activation
+
+    @property
+    def is_activation(self) -> bool:
+        """Whether its sums are its inputs."""
+        n, m = self.W.shape
+        return n == m and np.array_equal(self.W, np.eye(n)) and not self.b.any()
 
 
 class Network(NamedTuple):
@@ -150,18 +157,16 @@ def _check(network: Network) -> None:
                 f"layer {i} gives {one.W.shape[0]} numbers, and layer {i + 1} takes "
                 f"{other.W.shape[1]}"
             )
-    for i, layer in enumerate(network.layers, start=1):
-        if layer.W.size > MOST_OF_A_LAYER:
-            raise InputError(
-                f"layer {i} has {layer.W.size} weights; a layer may have {MOST_OF_A_LAYER}"
-            )
+    sizes = [0 if layer.is_activation else layer.W.size for layer in network.layers]
+    for i, (layer, size) in enumerate(zip(network.layers, sizes, strict=True), start=1):
+        if size > MOST_OF_A_LAYER:
+            raise InputError(f"layer {i} has {size} weights; a layer may have {MOST_OF_A_LAYER}")
         if layer.b.shape != layer.W.shape[:1]:
             raise InputError(f"layer {i} has {layer.W.shape[0]} neurons and {layer.b.size} biases")
         if not all(np.isfinite(array).all() for array in (layer.W, layer.b, layer.numbers)):
             raise InputError(f"layer {i} has a number that is not finite")
-    weights = sum(layer.W.size for layer in network.layers)
-    if weights > MOST_WEIGHTS:
-        raise InputError(f"it has {weights} weights; a component may have {MOST_WEIGHTS}")
+    if sum(sizes) > MOST_WEIGHTS:
+        raise InputError(f"it has {sum(sizes)} weights; a component may have {MOST_WEIGHTS}")
     neurons = network.n_inputs + sum(len(layer.W) for layer in network.layers)
     if neurons > MOST_NEURONS:
         raise InputError(
@@ -332,7 +337,7 @@ class _Layers:
     def up_to(self, name: str) -> list[Dense]:
         """All layers up to a value."""
         rest = self._ended(self._variable(name), "none")
-        if not np.array_equal(rest.W, np.eye(rest.W.shape[1])) or rest.b.any():
+        if not rest.is_activation:
             return [*self._layers, rest]
         if not self._layers:
             raise InputError("it has no dense layers")
@@ -357,10 +362,10 @@ class _Layers:
             self._known.setdefault(one, _Value(_numbers(self._constants[one])))
         if name == "Shape":
             value = self._shape(inputs[0], **attributes)
-        elif name in _OF_ONNX or name in _BOUNDS:
+        elif name in _OF_ONNX:
             value = self._activated(name, inputs, attributes)
         elif name not in _OPERATORS:
-            supported = ", ".join((*_OPERATORS, *_OF_ONNX, *_BOUNDS, "Shape"))
+            supported = ", ".join((*_OPERATORS, *_OF_ONNX, "Shape"))
             raise InputError(f"not supported; layers may consist of {supported}")
         elif name == "BatchNormalization" and len(outputs) > 1:
             raise InputError("more than one output is not supported; export it for inference")
@@ -380,17 +385,19 @@ class _Layers:
 
     def _activated(self, name: str, inputs: Sequence[str], attributes: Mapping[str, Any]) -> _Value:
         """What an activation gives. Its numbers may be attributes, or inputs after the first."""
-        word, defaults = _OF_ONNX["Clip" if name in _BOUNDS else name]
-        places = [_BOUNDS[name]] if name in _BOUNDS else [*defaults]
-        if name in _BOUNDS:
+        word, defaults = _OF_ONNX[name]
+        if name in ("Max", "Min"):
+            # What depends on the input may stand anywhere.
             inputs = sorted(inputs, key=lambda one: not self._is_variable(one))
-        if len(inputs) > 1 + len(places):
+        if len(inputs) > 1 + len(defaults):
             raise InputError("more than two inputs are not supported")
         shapes = [self._known[one].offset.shape for one in inputs if one]
         if np.broadcast_shapes(*shapes) != shapes[0]:
             raise InputError("its inputs have shapes that do not fit")
         said = {
-            place: self._number(one) for place, one in zip(places, inputs[1:], strict=False) if one
+            place: self._number(one)
+            for place, one in zip(defaults, inputs[1:], strict=False)
+            if one
         }
         numbers = {**defaults, **attributes, **said}
         return self._closed(inputs[0], word, tuple(numbers.values()))
@@ -669,6 +676,8 @@ def _port(name: str, otherwise: str) -> str:
 
 
 def _constants(i: int, layer: Dense) -> Iterator[str]:
+    if layer.is_activation:
+        return
     rows = ",\n".join(_lines(row) for row in layer.W)
     yield f"W{i} = Matrix(\n    (\n{textwrap.indent(rows, ' ' * 8)},\n    )\n)  # fmt: skip"
     yield f"b{i} = Vector(\n{textwrap.indent(_lines(layer.b), ' ' * 4)}\n)  # fmt: skip"
@@ -707,10 +716,11 @@ def _forward(network: Network) -> str:
     ]
     given = "x"
     for i, layer in enumerate(network.layers, start=1):
-        lines.append(f"    z{i} = W{i} @ {given} + b{i}")
-        given = f"z{i}"
+        if not layer.is_activation:
+            lines.append(f"    z{i} = W{i} @ {given} + b{i}")
+            given = f"z{i}"
         if layer.activation != "none":
             text = _ACTIVATIONS[layer.activation].format(*map(repr, layer.numbers))
-            lines.append(f"    a{i} = Vector({text} for z in z{i})")
+            lines.append(f"    a{i} = Vector({text} for z in {given})")
             given = f"a{i}"
     return "\n".join([*lines, f"    return {given}"])
