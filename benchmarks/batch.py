@@ -3,7 +3,7 @@
 Every repetition makes the runs of Figs. 4 and 5 with either controller, one after the other in this
 process, and takes the processor's time:
 
-- by the straight line `auv_fmu.closed_loop`;
+- by the straight line `auv_fmu.loop.closed_loop`;
 - by the batch engine, with all indices.
 
 Printed are medians of the repetitions, ratios being taken within each repetition. Then runs of one
@@ -25,7 +25,7 @@ from time import process_time
 
 from measuring import options, python, resident, timed
 
-from auv_fmu.closed_loop import Setting, closed_loop
+from auv_fmu.loop.closed_loop import Setting, closed_loop
 from orchestrator.master.experiment import Experiment
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies.batch_engine import BatchEngine

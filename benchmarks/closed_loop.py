@@ -2,7 +2,7 @@
 
 Every repetition times, one after the other in this process:
 
-- the straight line `auv_fmu.closed_loop`, the same equations without FMI or master;
+- the straight line `auv_fmu.loop.closed_loop`, the same equations without FMI or master;
 - the loop of FMUs, with all checks of the components on;
 - the same FMUs when their components compute nothing, set on their loaded classes;
 - the master alone, with every FMI call replaced by nothing;
@@ -25,8 +25,8 @@ from unittest.mock import patch
 
 from measuring import options, python, steps_time, timed
 
-from auv_fmu.closed_loop import closed_loop
-from auv_fmu.euler import STEP
+from auv_fmu.loop.closed_loop import closed_loop
+from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
 from fmus.python.callbacks import STEPPING
 from fmus.python.component import Component

@@ -12,7 +12,7 @@ from statistics import median
 
 from measuring import options, python, steps_time, timed
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
 from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI, Experiment
 from orchestrator.master.fmi.isolated import Isolation

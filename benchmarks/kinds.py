@@ -1,7 +1,7 @@
 """What the two kinds of FMUs cost in each host: `python benchmarks/kinds.py`.
 
-Every repetition times Fig. 4, one after the other: the straight line `auv_fmu.closed_loop`; our
-master on FMUs of the Python kind, on their twins in C, and on these in the compiled loop, every
+Every repetition times Fig. 4, one after the other: the straight line `auv_fmu.loop.closed_loop`;
+our master on FMUs of the Python kind, on their twins in C, and on these in the compiled loop, every
 port recorded; a program in C on the twins, every port recorded, too; libcosim and ecos on either
 kind, which step in Jacobi order, alone and with every output read by their Python interfaces, and
 our compiled loop in that order. What comes before the first
@@ -27,8 +27,8 @@ import fmpy
 from fmpy.fmi2 import FMU2Slave
 from measuring import options, python, steps_time, timed
 
-from auv_fmu.closed_loop import closed_loop
-from auv_fmu.euler import STEP
+from auv_fmu.loop.closed_loop import closed_loop
+from auv_fmu.paper.euler import STEP
 from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts.comparison import HOSTS, compare
 from orchestrator.master.experiment import Experiment

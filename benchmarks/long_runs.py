@@ -19,7 +19,7 @@ from typing import Any
 
 from measuring import python, resident
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
 from orchestrator.figures.visible import VisibleRows

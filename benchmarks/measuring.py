@@ -14,7 +14,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from orchestrator.master.experiment import Experiment, Order
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import PYTHON_LOOP, Stepping

@@ -23,7 +23,7 @@ from time import perf_counter, process_time
 import measuring
 import numpy as np
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
 from orchestrator.exchange.hosts.comparison import compare
 from orchestrator.master.loop import LoopName

@@ -1,9 +1,9 @@
 """List all that is wrong with a component of the user's own: `python -m fmus.check SCRIPT`.
 
-A line for each mistake: what is outside the language of equations, what is wrong with its
-declaration, and what has no counterpart in C, each with its file and line. If there is none, the
-FMUs of both kinds are written, the native one without libraries, and the compiler reads its C. It
-runs in a separate process, because it imports the component.
+A line for each mistake, with its file and line: what is wrong with its declaration, and what is
+outside the language of equations. If there is none, the FMUs of both kinds are written, the native
+one without libraries, and the compiler reads its C. It runs in a separate process, because it
+imports the component.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from contextlib import redirect_stdout
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from types import FunctionType
 
 from fmus.compilers import Compiler, check_sources
-from fmus.discovery import Source, lies_in, write_archive
+from fmus.discovery import Source, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
-from fmus.native.functions import function_in_c
-from fmus.native.language import foreign
+from fmus.language.build import Program, Untranslatable
 from fmus.native.packaging import MAIN, fmu_entries
-from fmus.native.program import Program, Untranslatable
+from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
-from fmus.script import is_component, no_component, script_in, shown, source_of_script, told
+from fmus.script import is_component, no_component, script_in, source_of_script, told
 
 #: Where a line says that it is about.
 _PLACE = re.compile(r"^(.+?:\d+): ")
@@ -67,27 +67,22 @@ def _order(text: str) -> tuple[str, int]:
 
 
 def _mistakes(script: Path, folder: Path) -> Iterator[str]:
-    source = source_of_script(script)
+    source, program = source_of_script(script), Program()
     try:
-        import_module(source.module)
-    except Exception as error:
-        yield from _foreign(script, script)
-        yield told(error, script)
-        return
-    for file in _files_of(script):
-        yield from _foreign(file, script)
-    try:
-        definition = source.definition
+        module = import_module(source.module)
     except Exception as error:
         yield told(error, script)
         return
-    for hook in filter(None, definition.behaviour.hooks.values()):
-        try:
-            Program(function_in_c).function(hook)
-        except (Untranslatable, TypeError) as error:
-            yield told(error, script)
+    for name in HOOKS:
+        hook = getattr(module, name, None)
+        if isinstance(hook, FunctionType):
+            program.add(hook)
+    for mistake in program.mistakes:
+        yield told(Untranslatable(mistake), script)
     try:
-        write(source, folder)
+        source.definition  # noqa: B018
+        if not program.mistakes:
+            write(source, folder)
     except Exception as error:
         yield told(error, script)
 
@@ -108,24 +103,6 @@ def write(source: Source, folder: Path) -> None:
         check_sources(source.name, texts, MAIN[fmi])
         write_archive(folder / f"{NATIVE}-{fmi}.fmu", entries)
     PythonKind("plain").write(source, folder / f"{PYTHON}.fmu")
-
-
-def _files_of(script: Path) -> list[Path]:
-    """The script of a component, and the modules beside it that it has imported."""
-    root = script.resolve().parent
-    beside = {
-        Path(file)
-        for name, module in [*sys.modules.items()]
-        if (file := getattr(module, "__file__", None)) and lies_in(root, Path(file), name)
-    }
-    return [script, *sorted(beside - {script.resolve()})]
-
-
-def _foreign(file: Path, script: Path) -> list[str]:
-    """What is outside the language in a file, which is named as the user would."""
-    return [
-        text.replace(str(file), shown(str(file.resolve()), script), 1) for text in foreign(file)
-    ]
 
 
 def main() -> int:

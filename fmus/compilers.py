@@ -19,18 +19,13 @@ from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from fmus.kinds import TARGETS, Platform, this_machine
+from fmus.language.mathematics import ROUNDED
 
 #: C compilers: the first one that there is, is taken.
 COMPILERS = ("cc", "gcc", "clang")
 
-#: Functions of the C library that compilers round better than it does where they know the argument.
-_ROUNDED = (
-    "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "cos", "cosh", "exp", "expm1",
-    "log", "log10", "log1p", "log2", "pow", "sin", "sinh", "tan", "tanh",
-)  # fmt: skip
-
 #: What would change numbers: contracted operations, and functions that the compiler computes.
-SAME_NUMBERS = ("-ffp-contract=off", *(f"-fno-builtin-{name}" for name in _ROUNDED))
+SAME_NUMBERS = ("-ffp-contract=off", *(f"-fno-builtin-{name}" for name in ROUNDED))
 
 #: How sources are compiled.
 FLAGS = (

@@ -7,7 +7,7 @@ import json
 import os
 import uuid
 import zipfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import distribution
 from importlib.util import find_spec
@@ -18,7 +18,6 @@ from xml.etree import ElementTree
 
 from fmus.kinds import CONTAINED
 from fmus.ports.definition import Definition, define
-from fmus.ports.port import Port
 
 #: The folder of a component that holds its reference results.
 REFERENCE = "reference"
@@ -98,11 +97,6 @@ def source_of(name: str) -> Source:
     """What a component of the bundle is made from."""
     module = components()[name]
     return Source(name, module, package_folder(module.rpartition(".")[0]))
-
-
-def ports_of(name: str) -> Sequence[Port]:
-    """The ports of a component of the bundle, all but `fault`."""
-    return source_of(name).definition.ports
 
 
 def related_files(source: Source) -> dict[str, bytes]:

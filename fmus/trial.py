@@ -20,7 +20,7 @@ from math import isfinite
 from types import ModuleType
 from typing import Any, Union
 
-from auv_fmu.quantities import group_name
+from auv_fmu.language.quantities import group_name
 from fmus.discovery import name_of
 from fmus.ports.port import Port
 from fmus.python.slave import slave_of

@@ -14,12 +14,13 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from auv_fmu import closed_loop, motion_planner, plant
-from auv_fmu.attitude import normalised, rotation_from_quaternion
-from auv_fmu.blocks import Scene
-from auv_fmu.closed_loop import Setting, Vehicles, blocks_of
-from auv_fmu.euler import STEP
-from auv_fmu.output_feedback import ControllerState
+from auv_fmu.loop import closed_loop
+from auv_fmu.loop.blocks import Scene
+from auv_fmu.loop.closed_loop import Setting, Vehicles, blocks_of
+from auv_fmu.paper import motion_planner, plant
+from auv_fmu.paper.attitude import normalised, rotation_from_quaternion
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.output_feedback import ControllerState
 from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until

@@ -16,7 +16,7 @@ from time import process_time
 
 from scipy.optimize import differential_evolution
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from orchestrator.runs.loading import load
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point

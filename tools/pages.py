@@ -18,6 +18,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+import textwrap
 from collections.abc import Iterable, Mapping
 from functools import cache
 from math import cbrt, radians, sqrt, tan
@@ -26,14 +27,15 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
-from auv_fmu.control_point import ELL
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.control_point import ELL
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, ball, theorem
 from auv_fmu.proof.gain_conditions import at_least, coupling
-from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
-from auv_fmu.vehicle import Vehicle
 from fmus.discovery import components, source_of
 from fmus.documentation import component_page
+from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
 from orchestrator.formats.schema import TomlTable, entries
@@ -59,6 +61,7 @@ def files() -> dict[Path, str]:
     """The text of every file that this writes, as it is to be."""
     filled = {
         "explanation/paper.md": paper(),
+        "explanation/language.md": {"mathematics": mathematics()},
         "gallery.md": gallery(),
         "reference/command-line.md": {"commands": command_line()},
         "reference/components/README.md": {"components": bundle()},
@@ -118,6 +121,12 @@ def scenarios() -> dict[str, str]:
         "wires": _table("inputs", "are fed by", rows=wires),
         "figures": _table("`figure`", "as drawn for", rows=figures),
     }
+
+
+def mathematics() -> str:
+    """The functions and constants of docs/explanation/language.md."""
+    *names, last = (f"`{name}`" for name in (*FUNCTIONS, *sorted(CONSTANTS)))
+    return textwrap.fill(f"{', '.join(names)} and {last}.", 98)
 
 
 def bundle() -> str:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.hull import inertia
-from auv_fmu.remus100 import Parameters, RemusState, accelerations, tail_forces
+from auv_fmu.remus.hull import inertia
+from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_forces
 from orchestrator import simulate
 from orchestrator.vehicle.signals import AllocatedLoop, tracking_error
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import Variable, __author__, __citation__, __license__, __version__, acoustic_link
-from auv_fmu.acoustic_link import LinkState, Parameters
-from auv_fmu.quantities import EULER, POSITION
-from auv_fmu.vectors import Vector3
+from auv_fmu import Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.guidance import acoustic_link
+from auv_fmu.guidance.acoustic_link import LinkState, Parameters
+from auv_fmu.language.quantities import EULER, POSITION
+from auv_fmu.language.vectors import Vector3
 
 
 class Inputs(NamedTuple):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from auv_fmu import __author__, __license__, __version__
-from auv_fmu.allocation import Allocated, Parameters, Wanted, evaluate
-from auv_fmu.tail import __citation__
+from auv_fmu.remus.allocation import Allocated, Parameters, Wanted, evaluate
+from auv_fmu.remus.tail import __citation__
 
 SAMPLED = True
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import Refusal, Variable, __author__, __citation__, __license__, __version__, plant
-from auv_fmu.attitude import rotation_from_quaternion
-from auv_fmu.euler import STEP
-from auv_fmu.plant import Parameters, PlantOutputs, PlantState
-from auv_fmu.quantities import ACCELERATION, ETA, NU, POSITION, TAU, TAU_W, VELOCITY
-from auv_fmu.vectors import Rotation, Vector3, Vector6
+from auv_fmu import Refusal, Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.language.quantities import ACCELERATION, ETA, NU, POSITION, TAU, TAU_W, VELOCITY
+from auv_fmu.language.vectors import Rotation, Vector3, Vector6
+from auv_fmu.paper import plant
+from auv_fmu.paper.attitude import rotation_from_quaternion
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.plant import Parameters, PlantOutputs, PlantState
 
 H_MAX = STEP
 

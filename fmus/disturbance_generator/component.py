@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable, __author__, __citation__, __license__, __version__
-from auv_fmu.disturbance import Disturbance, disturbance
-from auv_fmu.quantities import NU, TAU_W
-from auv_fmu.vectors import Vector6
+from auv_fmu.language.quantities import NU, TAU_W
+from auv_fmu.language.vectors import Vector6
+from auv_fmu.paper.disturbance import Disturbance, disturbance
 
 
 class Inputs(NamedTuple):

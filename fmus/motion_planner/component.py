@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import Variable, __author__, __citation__, __license__, __version__, motion_planner
-from auv_fmu.euler import STEP
-from auv_fmu.motion_planner import Motion, Parameters, PlannerState, Reference
-from auv_fmu.quantities import ETA_WITHOUT_ROLL
-from auv_fmu.vectors import Vector5
+from auv_fmu import Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.language.quantities import ETA_WITHOUT_ROLL
+from auv_fmu.language.vectors import Vector5
+from auv_fmu.paper import motion_planner
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.motion_planner import Motion, Parameters, PlannerState, Reference
 
 H_MAX = STEP
 

@@ -12,7 +12,7 @@ from fmus import documentation
 from fmus.compilers import Compiler, library
 from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
-from fmus.native.shapes import RUNTIME
+from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
 from fmus.ports import description, description_fmi3

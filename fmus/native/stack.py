@@ -1,4 +1,4 @@
-"""How much of a thread's stack a translation takes, read from its C text.
+"""How much of a thread's stack the equations take.
 
 Structures are passed and returned by value, so a function that adds large vectors keeps each sum on
 the stack. Nothing calls itself, and all sizes are fixed: what lies there at most can be added up.
@@ -7,84 +7,56 @@ Compilers keep no more than this, but for a tenth, and less if they optimise.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from functools import cache
-from typing import NamedTuple
+from collections.abc import Iterable
+from operator import itemgetter
+
+from fmus.language import tree
+from fmus.language.tree import Call, Expression, Function, Make
+from fmus.language.types import Scalar, Type, count
 
 #: Bytes that a number takes, alone in a structure.
 NUMBER = 8
 
-_TYPE = re.compile(r"typedef (?:struct|union) \{\n((?: .*\n)*)\} (\w+);|typedef (\w+) (\w+);")
-_MEMBER = re.compile(r"(\w+) \*?\w+(?:\[(\d+)\])?;")
-_FUNCTION = re.compile(r"^static ([\w ]+?) \*?(\w+)\(([^{;]*?)\) \{\n(.*?)^\}", re.M | re.S)
-_WORD = re.compile(r"[A-Za-z_]\w*")
 
-
-class _Frame(NamedTuple):
-    """What a function keeps on the stack: bytes of its own, and for each call of another one."""
-
-    own: int
-    calls: Mapping[str, int]
-
-
-def deepest(text: str) -> tuple[int, str]:
-    """The most bytes that lie on the stack in a call from outside, and in the call of what.
+def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
+    """The most bytes that lie on the stack in a call from outside, and the call of what.
 
     Args:
-        text: of a translation.
+        functions: each after those that it calls.
 
     """
-    # What looks like a type or a call in a comment or a text is none.
-    text = re.sub(r'/\*.*?\*/|"(?:\\.|[^"\\])*"', "", text, flags=re.S)
-    sizes = _sizes(text)
-    found = {name: (returns, given, body) for returns, name, given, body in _FUNCTION.findall(text)}
-    results = {name: sizes.get(returns, 0) for name, (returns, _, _) in found.items()}
-    passed = {name: _declared(given, sizes) for name, (_, given, _) in found.items()}
-    frames: dict[str, _Frame] = {}
-    for name, (_, _, body) in found.items():
-        words = [(word[0], body[word.end() :]) for word in _WORD.finditer(body)]
-        calls = [word for word, after in words if word in found and after.startswith("(")]
-        local = sum(_local(after, sizes[word]) for word, after in words if word in sizes)
-        own = local + sum(results[call] for call in calls)
-        frames[name] = _Frame(own, {call: passed[call] for call in calls})
-
-    @cache
-    def depth(name: str) -> int:
-        own, calls = frames[name]
-        return own + max((given + depth(call) for call, given in calls.items()), default=0)
-
-    return max(((depth(name), name) for name in frames), default=(0, ""))
+    depths: dict[Function, int] = {}
+    for function in functions:
+        own, deeper = 0, 0
+        variables: dict[str, Type] = {}
+        for one in tree.statements_in(function.body):
+            if isinstance(one, tree.Reserve):
+                variables[one.name] = one.type
+            elif isinstance(one, tree.Store):
+                variables |= {name: value.type for name, value in one.values}
+            for each in tree.expressions_of(one):
+                own += _held(each)
+                calls = (part for part in tree.expressions_in(each) if isinstance(part, Call))
+                deeper = max([deeper, *(depths[call.function] for call in calls)])
+        own += sum(map(_result, variables.values()))
+        depths[function] = _passed(function) + own + deeper
+    found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
+    return max(found, key=itemgetter(0), default=(0, None))
 
 
-def _sizes(text: str) -> dict[str, int]:
-    """The bytes of all structures, by their names."""
-    sizes: dict[str, int] = {}
-    for members, name, known, alias in _TYPE.findall(text):
-        if name:
-            parts = _MEMBER.findall(members)
-            sizes[name] = sum(sizes.get(kind, NUMBER) * int(n or 1) for kind, n in parts)
-        elif known in sizes:
-            sizes[alias] = sizes[known]
-    return sizes
+def _result(type_: Type) -> int:
+    """The bytes of a structure; a number lies in a register."""
+    return 0 if isinstance(type_, Scalar) else NUMBER * count(type_)
 
 
-def _declared(given: str, sizes: Mapping[str, int]) -> int:
+def _passed(function: Function) -> int:
     """The bytes of the arguments that a function takes by value."""
-    parts = [part.split() for part in given.split(",")]
-    return sum(sizes.get(part[-2], 0) for part in parts if len(part) > 1 and "*" not in part[-1])
+    given = function.arguments.items()
+    return sum(_result(type_) for name, type_ in given if name != function.by_address)
 
 
-def _local(after: str, size: int) -> int:
-    """The bytes of what begins with the name of a structure: variables, or a value that is made."""
-    if after.startswith("){"):
-        return size
-    if not after.startswith(" ") or after.startswith(" *"):
-        return 0
-    names, depth = 1, 0
-    for character in after:
-        depth += (character in "({[") - (character in ")}]")
-        if character == ";" and depth == 0:
-            break
-        names += character == "," and depth == 0
-    return names * size
+def _held(one: Expression, within: bool = False) -> int:
+    """The bytes of the structures that an expression makes, and that are returned to it."""
+    is_made = isinstance(one, Make)
+    own = _result(one.type) if isinstance(one, Call) or (is_made and not within) else 0
+    return own + sum(_held(part, is_made) for part in one.parts)

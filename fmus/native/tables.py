@@ -8,12 +8,12 @@ from enum import IntEnum
 from itertools import groupby
 from typing import Any
 
-from auv_fmu import euler
-from fmus.native.layout import quoted
-from fmus.native.shapes import Shape, Structure, shape_of
+from auv_fmu.paper import euler
+from fmus.language.types import Record, Type, type_of
+from fmus.native.emit import members, quoted
 from fmus.ports.definition import Definition
 from fmus.ports.description_fmi3 import variables_of
-from fmus.ports.groups import hints_of, is_class, reals_first, scalars_of
+from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, Port
 
 _HEAD = f"""\
@@ -26,7 +26,7 @@ _HEAD = f"""\
 #include <float.h>
 #include <stddef.h>
 
-/* From auv_fmu/euler.py. */
+/* From auv_fmu/paper/euler.py. */
 static const double ROUNDING = {euler.ROUNDING!r};
 static const double LARGEST_STATE = {euler.LARGEST_STATE!r};
 static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
@@ -42,7 +42,7 @@ def tables(definition: Definition, arrays: bool = False) -> str:
     """The file ports.h of a component; some of its ports may be elements of arrays."""
     ports = (*definition.ports, FAULT)
     places = {FAULT.name: "0", H_MAX: "PARAMETER_AT(h_max)"}
-    parameters = shape_of(definition.behaviour.parameters)
+    parameters = type_of(definition.behaviour.parameters)
     for name, path in definition.parameters.paths.items():
         places[name] = f"PARAMETER_AT(model{_member(parameters, path)})"
     values = {
@@ -75,13 +75,15 @@ def _arrays(ports: Sequence[Port]) -> Iterator[str]:
     yield f"#define ARRAYS\nstatic const size_t elements[] = {{{', '.join(map(str, sizes))}}};\n"
 
 
-def _member(shape: Shape, path: Sequence[str | int]) -> str:
-    """Where a number lies in a structure; a tuple of Python is one with an array `v`."""
+def _member(type_: Type, path: Sequence[str | int]) -> str:
+    """Where a number lies in a structure."""
     text = ""
     for step in path:
-        assert isinstance(shape, Structure)
-        place = [*hints_of(shape.made)].index(step) if isinstance(step, str) else step
-        suffix, shape = shape.parts[place]
+        place = step
+        if isinstance(place, str):
+            assert isinstance(type_, Record)
+            place = [name for name, _ in type_.fields].index(place)
+        suffix, type_ = members(type_)[place]
         text += suffix
     return text
 

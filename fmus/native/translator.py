@@ -1,18 +1,33 @@
-"""The equations of a component in C, translated, with the glue by which the runtime calls them."""
+"""The equations of a component in C, with the glue by which the runtime calls them.
+
+The runtime has inputs, outputs and states as arrays of doubles, whatever they are. Where all their
+numbers are floats, a structure of the equations is such an array already. Where some are not,
+functions that are written here go over it number by number: ints of 32 bits are exact in doubles.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache
 from string import Formatter
 from textwrap import wrap
 
-from fmus.native.flat import Passage, count, passage
-from fmus.native.functions import function_in_c
-from fmus.native.layout import LINE_WIDTH, laid_out, quoted
-from fmus.native.program import Function, Program, Untranslatable
-from fmus.native.shapes import Shape, Structure, closed, in_c
+from fmus.language.build import Program, Untranslatable
+from fmus.language.tree import Function
+from fmus.language.types import (
+    FLOAT,
+    Array,
+    Scalar,
+    Type,
+    count,
+    has_only_floats,
+    scalars_in,
+    type_of,
+)
+from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, members, quoted
+from fmus.native.names import in_c
 from fmus.native.stack import NUMBER, deepest
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
@@ -61,32 +76,36 @@ def translated(definition: Definition) -> str:
         Untranslatable: its text is outside the language of equations.
 
     """
-    program = Program(function_in_c)
-    glue = _glue(program, definition.behaviour)
-    citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
-    sections = [
-        _HEAD.format(title=closed(definition.summary), citation=closed(citation)),
-        *program.structures.values(),
-        *program.constants.values(),
-        *(function.text for function in program.functions.values()),
-        glue,
-    ]
-    text = "\n\n".join(sections) + "\n"
-    bytes_on_stack, name = deepest(text)
-    if bytes_on_stack > _MOST_ON_STACK:
+    said = definition.behaviour
+    program = Program()
+    for hook in filter(None, said.hooks.values()):
+        program.add(hook)
+    groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
+    for group in groups:
+        try:
+            type_of(group)
+        except TypeError as error:
+            program.refuse("", str(error))
+    program.check()
+    bytes_on_stack, deep = deepest(program.functions.values())
+    if deep and bytes_on_stack > _MOST_ON_STACK:
         raise Untranslatable(
-            f"{name.removeprefix('model_')} and the functions that it calls hold "
+            f"{deep.name} and the functions that it calls hold "
             f"{bytes_on_stack // NUMBER} numbers at once; C takes at most "
             f"{_MOST_ON_STACK // NUMBER}, which lie on a thread's stack"
         )
-    return text
+    emitter = Emitter(program.functions.values())
+    glue = _glue(emitter, program, said)
+    citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
+    head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
+    return "\n\n".join([head, emitter.text(), glue]) + "\n"
 
 
-def _glue(program: Program, said: Behaviour) -> str:
+def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     """The functions `model_...`, in which the component finds all hooks, also those it has not."""
     functions = {name: program.function(hook) for name, hook in said.hooks.items() if hook}
     passages = {
-        what: passage(program, what, program.shape(hint), what == "state")
+        what: _passage(emitter, what, type_of(hint))
         for what, hint in (
             ("inputs", said.inputs), ("outputs", said.outputs), ("state", said.state),
         )
@@ -98,7 +117,7 @@ def _glue(program: Program, said: Behaviour) -> str:
         "derived": "*derived",
     }
     calls = {
-        name: function.call([given.get(argument, argument) for argument in function.arguments])
+        name: emitter.call(function, [given.get(name, name) for name in function.arguments])
         for name, function in functions.items()
     }
 
@@ -110,7 +129,9 @@ def _glue(program: Program, said: Behaviour) -> str:
     seed = [f"return (unsigned int){calls.get('seed', 0)};"]
     credible = [f"return {calls.get('credible', 1)};"]
     derive = [f"*derived = {calls['derive']};"] if said.derived else []
-    measure = _measured(said, passages["outputs"], functions["measured"]) if said.noisy else []
+    measure = (
+        _measured(emitter, said, passages["outputs"], functions["measured"]) if said.noisy else []
+    )
     parts = [
         _constants(said),
         _defined("void check", f"{_P}, {_E}", _statement(calls, "check")),
@@ -140,7 +161,7 @@ def _glue(program: Program, said: Behaviour) -> str:
         for name, function in zip((form.gather, form.scatter), form.functions)
         if re.search(rf"\b{name}\(", text)
     ]
-    head = ["/* What the component calls. */", _types(program, said, passages), *moving]
+    head = ["/* What the component calls. */", _types(emitter, said, passages), *moving]
     return "\n\n".join([*head, text])
 
 
@@ -169,28 +190,30 @@ def _directives(text: str) -> str:
     )
 
 
-def _types(program: Program, said: Behaviour, passages: dict[str, Passage]) -> str:
+def _types(emitter: Emitter, said: Behaviour, passages: dict[str, _Passage]) -> str:
     defined = {
-        "model_parameters": program.shape(said.parameters).name,
+        "model_parameters": emitter.type(type_of(said.parameters)),
         **{f"model_{what}": passage.declaration for what, passage in passages.items()},
-        "model_derived": program.shape(said.derived or Nothing).name,
+        "model_derived": emitter.type(type_of(said.derived or Nothing)),
     }
     hints = {"INPUTS": said.inputs, "OUTPUTS": said.outputs, "STATE": said.state}
-    counts = [f"MODEL_{what} = {count(program.shape(hint))}" for what, hint in hints.items()]
+    counts = [f"MODEL_{what} = {count(type_of(hint))}" for what, hint in hints.items()]
     types = "".join(f"typedef {text} {name};\n" for name, text in defined.items())
     return f"{types}\nenum {{ {', '.join(counts)} }};"
 
 
-def _measured(said: Behaviour, outputs: Passage, function: Function) -> list[str]:
+def _measured(
+    emitter: Emitter, said: Behaviour, outputs: _Passage, function: Function
+) -> list[str]:
     """What gives a group of outputs its noise."""
-    shape = function.arguments["n"]
-    n = _drawn(shape, map("draws[{}]".format, range(said.draws)))
-    if isinstance(shape, Structure):
-        n = f"({shape.name}){n}"
+    type_ = function.arguments["n"]
+    n = _drawn(type_, map("draws[{}]".format, range(said.draws)))
+    if not isinstance(type_, Scalar):
+        n = f"({emitter.type(type_)}){n}"
     where = "groups." if outputs.gather else "outputs->"
     group = f"{where}{in_c(said.noisy)}"
     given = {"parameters": "*parameters", "n": n, said.noisy: group}
-    change = f"{group} = {function.call([given[name] for name in function.arguments])};"
+    change = f"{group} = {emitter.call(function, [given[name] for name in function.arguments])};"
     if not outputs.gather:
         return [change]
     return [
@@ -200,12 +223,12 @@ def _measured(said: Behaviour, outputs: Passage, function: Function) -> list[str
     ]
 
 
-def _drawn(shape: Shape, draws: Iterator[str]) -> str:
-    """The next numbers in a shape, as an initializer."""
-    if not isinstance(shape, Structure):
+def _drawn(type_: Type, draws: Iterator[str]) -> str:
+    """The next numbers in a value of a type, as an initializer."""
+    if isinstance(type_, Scalar):
         return next(draws)
-    parts = ", ".join(_drawn(part, draws) for _, part in shape.parts)
-    return f"{{{{{parts}}}}}" if shape.is_array else f"{{{parts}}}"
+    parts = ", ".join(_drawn(part, draws) for _, part in members(type_))
+    return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts}}}"
 
 
 def _defined(name: str, arguments: str, body: list[str]) -> str:
@@ -214,5 +237,87 @@ def _defined(name: str, arguments: str, body: list[str]) -> str:
     text = " ".join(body)
     names = [argument.rstrip("[]").split()[-1].lstrip("*") for argument in arguments.split(", ")]
     unused = [f"(void){n};" for n in names if not re.search(rf"\b{n}\b", text)]
-    lines = [line for part in (*unused, *body) for line in laid_out(part, "    ")]
-    return "\n".join([*laid_out(f"static {returns} model_{name}({arguments}) {{", ""), *lines, "}"])
+    lines = [line for part in (*unused, *body) for line in lines_of(part, "    ")]
+    return "\n".join([*lines_of(f"static {returns} model_{name}({arguments}) {{", ""), *lines, "}"])
+
+
+@dataclass
+class _Passage:
+    """How one of them passes between the runtime and the equations.
+
+    Attributes:
+        type: of the equations, in C.
+        declaration: of the type in the runtime.
+        gather, scatter: names of the functions between the two forms; empty: both are the same.
+        functions: their texts.
+
+    """
+
+    type: str
+    declaration: str
+    gather: str = ""
+    scatter: str = ""
+    functions: Sequence[str] = ()
+
+    def got(self, pointer: str) -> str:
+        """The structure of the equations, from where the runtime has it."""
+        return f"{self.gather}({pointer}->v)" if self.gather else f"*{pointer}"
+
+    def put(self, pointer: str, value: str) -> str:
+        """The statement that hands a structure over to the runtime."""
+        if self.scatter:
+            return f"{self.scatter}({value}, {pointer}->v);"
+        return f"*{pointer} = {value};"
+
+
+def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
+    """How inputs, outputs or a state pass; ports have their Reals first, a state has none first."""
+    name = emitter.type(type_)
+    if has_only_floats(type_):
+        return _Passage(name, name)
+    scalars = [*scalars_in(type_)]
+    n = len(scalars)
+    places = [*range(n)]
+    if what != "state":
+        order = sorted(places, key=lambda i: scalars[i] != FLOAT)
+        places = [order.index(number) for number in range(n)]
+    gather, scatter = f"model_{what}_of", f"model_put_{what}"
+    gathered = "\n".join(_moves(type_, "it", places, "{member} = {cast}from[{place}];"))
+    scattered = "\n".join(_moves(type_, "it", places, "to[{place}] = {member};"))
+    functions = (
+        f"static {name} {gather}(const double from[]) {{\n"
+        f"    {name} it;\n{gathered}\n    return it;\n}}",
+        f"static void {scatter}({name} it, double to[]) {{\n{scattered}\n}}",
+    )
+    return _Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
+
+
+def _moves(
+    type_: Type, member: str, places: Sequence[int], text: str, depth: int = 0, place: str = ""
+) -> Iterator[str]:
+    """A statement for each number, in loops over arrays of numbers that are alike."""
+    indent = "    " * (depth + 1)
+    if isinstance(type_, Scalar):
+        cast = "" if type_ == FLOAT else "(int)"
+        yield indent + text.format(member=member, place=place or places[0], cast=cast)
+        return
+    if _is_even(type_):
+        assert isinstance(type_, Array)
+        letter, step = f"i{depth}", count(type_.item)
+        before = place or (str(places[0]) if places[0] else "")
+        further = f"{step} * {letter}" if step > 1 else letter
+        yield f"{indent}for (int {letter} = 0; {letter} < {type_.n}; {letter}++) {{"
+        at = f"{before} + {further}" if before else further
+        yield from _moves(type_.item, f"{member}.v[{letter}]", places, text, depth + 1, at)
+        yield f"{indent}}}"
+        return
+    for suffix, part in members(type_):
+        n = count(part)
+        if n:
+            yield from _moves(part, f"{member}{suffix}", places[:n], text, depth)
+        places = places[n:]
+
+
+def _is_even(type_: Type) -> bool:
+    """Whether a type is a number, or an array of what is even."""
+    return isinstance(type_, Scalar) or (isinstance(type_, Array) and _is_even(type_.item))

@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import (
-    Refusal,
-    Variable,
-    __author__,
-    __citation__,
-    __license__,
-    __version__,
-    output_feedback,
-)
-from auv_fmu.adaptation import Estimate
-from auv_fmu.euler import STEP
-from auv_fmu.observer import EXACT
-from auv_fmu.output_feedback import ControllerState, Gains, Measurement, Signals
-from auv_fmu.quantities import POSITION, TAU, VELOCITY
-from auv_fmu.vectors import Vector3
+from auv_fmu import Refusal, Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.language.quantities import POSITION, TAU, VELOCITY
+from auv_fmu.language.vectors import Vector3
+from auv_fmu.paper import output_feedback
+from auv_fmu.paper.adaptation import Estimate
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.observer import EXACT
+from auv_fmu.paper.output_feedback import ControllerState, Gains, Measurement, Signals
 
 SAMPLED = True
 

@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import (
-    Refusal,
-    Variable,
-    __author__,
-    __citation__,
-    __license__,
-    __version__,
-    path_planner,
-)
-from auv_fmu.motion_planner import Reference
-from auv_fmu.path_planner import Parameters, PathState
-from auv_fmu.quantities import ETA_WITHOUT_ROLL
-from auv_fmu.vectors import Vector5
+from auv_fmu import Refusal, Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.guidance import path_planner
+from auv_fmu.guidance.path_planner import Parameters, PathState
+from auv_fmu.language.quantities import ETA_WITHOUT_ROLL
+from auv_fmu.language.vectors import Vector5
+from auv_fmu.paper.motion_planner import Reference
 
 
 class Outputs(NamedTuple):

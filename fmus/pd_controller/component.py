@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import Variable, __author__, __citation__, __license__, __version__, pd
-from auv_fmu.adaptation import Estimate
-from auv_fmu.euler import STEP
-from auv_fmu.pd import PdGains, PdMeasurement, PdSignals
-from auv_fmu.quantities import POSITION, TAU
-from auv_fmu.vectors import Vector3, Vector4
+from auv_fmu import Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.language.quantities import POSITION, TAU
+from auv_fmu.language.vectors import Vector3, Vector4
+from auv_fmu.paper import pd
+from auv_fmu.paper.adaptation import Estimate
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.pd import PdGains, PdMeasurement, PdSignals
 
 SAMPLED = True
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from difflib import get_close_matches
 from inspect import signature
 from math import isfinite
 from string import Formatter
@@ -315,10 +316,8 @@ def _hooks(module: ModuleType) -> dict[str, FunctionType]:
     for name, value in said.items():
         if name in HOOKS and not isinstance(value, FunctionType):
             raise Misdeclared(f"{where}.{name} is no function, but has the name of a hook", name)
-    if unused := _without_use(module):
-        others = f"{', '.join(HOOKS)}, and no function here calls it"
-        alike = f"; nor {', '.join(unused[1:])}" if len(unused) > 1 else ""
-        raise Misdeclared(f"{where}.{unused[0]} is not one of the hooks {others}{alike}", unused[0])
+    for name, hook in _misspelt(module):
+        raise Misdeclared(f"{where}.{name} is called by no function here; is it {hook}?", name)
     return {name: said[name] for name in HOOKS if name in said}
 
 
@@ -374,15 +373,16 @@ def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) ->
         raise Misdeclared(f"{where}.{name} {why}", name, argument)
 
 
-def _without_use(module: ModuleType) -> list[str]:
-    """Functions that nothing calls: perhaps hooks whose names are misspelt."""
+def _misspelt(module: ModuleType) -> Iterator[tuple[str, str]]:
+    """Functions that nothing calls and that have nearly the name of a hook, with that name."""
     own = {
         name: value
         for name, value in vars(module).items()
         if isinstance(value, FunctionType) and value.__module__ == module.__name__
     }
     used = {name for function in own.values() for name in _names_in(function.__code__)}
-    return [name for name in own if name not in {*HOOKS, *used} and not name.startswith("_")]
+    for name in own.keys() - HOOKS.keys() - used:
+        yield from ((name, hook) for hook in get_close_matches(name, HOOKS, 1, 0.75))
 
 
 def _names_in(code: CodeType) -> Iterator[str]:

@@ -14,7 +14,7 @@ from operator import attrgetter, itemgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
-from auv_fmu.quantities import member_of
+from auv_fmu.language.quantities import member_of
 from fmus.ports.definition import Definition
 from fmus.ports.description import (
     CAPABILITIES,

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu.variable import Refusal, Variable
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.variable import Refusal, Variable
 from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
 from fmus.ports.port import Array, Misdeclared, Port
 

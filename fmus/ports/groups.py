@@ -18,8 +18,8 @@ from typing import (
     get_type_hints,
 )
 
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu.quantities import group_name
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.quantities import group_name
 from fmus.ports.port import Misdeclared, Port, Value, is_int32
 
 T = TypeVar("T")

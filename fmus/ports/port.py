@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, Union
 
-from auv_fmu.variable import POSITIVE, Refusal
+from auv_fmu.language.variable import POSITIVE, Refusal
 
 Value = Union[float, int, bool]
 

@@ -17,7 +17,7 @@ from typing import Any, ClassVar
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from auv_fmu.variable import Refusal
+from auv_fmu.language.variable import Refusal
 from fmus.ports.port import FAULT, Port, Value
 from fmus.python.loading import ANSWER, MISSING, has_loader, place
 from fmus.python.noise import Noise

@@ -21,7 +21,8 @@ from xml.etree.ElementTree import Element
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import __version__
-from auv_fmu.euler import (
+from auv_fmu.language.variable import Refusal
+from auv_fmu.paper.euler import (
     LARGEST_STATE,
     MOST_INTERNAL_STEPS,
     end_of_step,
@@ -29,7 +30,6 @@ from auv_fmu.euler import (
     latest_end,
     longest_step,
 )
-from auv_fmu.variable import Refusal
 from fmus.ports.definition import Definition
 from fmus.ports.description import complete
 from fmus.ports.port import H_MAX, Value

@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 from typing import Any
 
-from auv_fmu.variable import Refusal
+from auv_fmu.language.variable import Refusal
 
 #: No normal number that is drawn is larger: it is made of 53 bits.
 LARGEST_DRAW = 9.0

@@ -30,7 +30,7 @@ from typing import Any
 from pythonfmu import DefaultExperiment
 from pythonfmu.enums import Fmi2Status
 
-from auv_fmu.euler import LARGEST_STATE
+from auv_fmu.paper.euler import LARGEST_STATE
 from fmus.ports.behaviour import HOOKS, Behaviour
 from fmus.ports.definition import Definition, define
 from fmus.ports.groups import (

@@ -16,7 +16,7 @@ from math import hypot, inf
 from types import GenericAlias
 from typing import Any, Callable, TypedDict
 
-from auv_fmu.variable import Refusal
+from auv_fmu.language.variable import Refusal
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import class_of, is_class, parts_of, whole
 from fmus.ports.port import Value, is_int32

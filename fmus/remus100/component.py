@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import Refusal, Variable, __author__, __license__, __version__, plant, remus100
-from auv_fmu.euler import STEP
-from auv_fmu.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
-from auv_fmu.remus100 import Parameters, RemusState
-from auv_fmu.tail import ACTUATOR, __citation__
-from auv_fmu.vectors import Vector3, Vector6
+from auv_fmu import Refusal, Variable, __author__, __license__, __version__
+from auv_fmu.language.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
+from auv_fmu.language.vectors import Vector3, Vector6
+from auv_fmu.paper import plant
+from auv_fmu.paper.euler import STEP
+from auv_fmu.remus import remus100
+from auv_fmu.remus.remus100 import Parameters, RemusState
+from auv_fmu.remus.tail import ACTUATOR, __citation__
 
 H_MAX = STEP
 

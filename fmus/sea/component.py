@@ -5,22 +5,14 @@ from __future__ import annotations
 from math import fmod
 from typing import Annotated, NamedTuple
 
-from auv_fmu import (
-    Refusal,
-    Variable,
-    __author__,
-    __citation__,
-    __license__,
-    __version__,
-    ocean_current,
-    sea,
-)
-from auv_fmu.ocean_current import Variation
-from auv_fmu.quantities import POSITION
-from auv_fmu.random_numbers import MODULUS
-from auv_fmu.sea import Sea, WaterMotion
-from auv_fmu.vectors import Vector3
-from auv_fmu.waves import Components
+from auv_fmu import Refusal, Variable, __author__, __citation__, __license__, __version__
+from auv_fmu.language.quantities import POSITION
+from auv_fmu.language.random_numbers import MODULUS
+from auv_fmu.language.vectors import Vector3
+from auv_fmu.water import ocean_current, sea
+from auv_fmu.water.ocean_current import Variation
+from auv_fmu.water.sea import Sea, WaterMotion
+from auv_fmu.water.waves import Components
 
 
 class Inputs(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import to_rgb
 
-from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.paper.attitude import rotation_from_euler
 from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, reference_colours, vehicle_colours
 from orchestrator.figures.visible import moving_mean

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.paper.attitude import rotation_from_euler
 from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
 from orchestrator.figures.page_series import numbers, times
 from orchestrator.figures.style import (

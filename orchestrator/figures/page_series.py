@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.quantities import TAU, THETA
+from auv_fmu.language.quantities import TAU, THETA
 from orchestrator.figures.style import (
     COLOURS,
     REFERENCE,

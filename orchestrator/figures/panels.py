@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.quantities import TAU
+from auv_fmu.language.quantities import TAU
 from orchestrator.figures.event_marks import mark_events
 from orchestrator.figures.style import (
     COLOURS,

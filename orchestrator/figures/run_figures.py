@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from auv_fmu.quantities import NU, THETA
+from auv_fmu.language.quantities import NU, THETA
 from orchestrator.figures import fleet_panels
 from orchestrator.figures.panels import (
     COMMANDS,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from fmpy.model_description import ModelVariable
 
-from auv_fmu.quantities import POSITION, TAU, THETA, VELOCITY, Members
+from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY, Members
 from fmus.discovery import components
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours

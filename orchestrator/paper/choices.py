@@ -15,10 +15,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.disturbance import Disturbance
-from auv_fmu.euler import STEP
-from auv_fmu.motion_planner import TAU_D
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.paper.disturbance import Disturbance
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.motion_planner import TAU_D
+from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.master.experiment import JACOBI, OrderName
 from orchestrator.paper.measures import (
     EFFORT_PD,

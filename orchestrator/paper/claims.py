@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.control_point import ELL
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.control_point import ELL
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import theorem
-from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
-from auv_fmu.vehicle import Vehicle
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.measures import (
     EFFORT_PD,

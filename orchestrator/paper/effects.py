@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullLocator
 from numpy.typing import ArrayLike
 
-from auv_fmu.euler import STEP
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.output_feedback import Gains
 from orchestrator.figures.drawing import name_runs, overlay, save, styled
 from orchestrator.figures.panels import draw_commands
 from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn

@@ -17,7 +17,7 @@ from urllib.parse import unquote
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-from auv_fmu.quantities import TAU
+from auv_fmu.language.quantities import TAU
 from orchestrator.figures.style import printed_unit
 
 _TEMPLATE = Path(__file__).with_name("report.html")

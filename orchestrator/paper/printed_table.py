@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import workers
 from orchestrator.paper.choices import (

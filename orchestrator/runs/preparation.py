@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-from auv_fmu.euler import STEP
+from auv_fmu.paper.euler import STEP
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.master.experiment import (
     FEEDTHROUGH,

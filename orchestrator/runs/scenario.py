@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from auv_fmu import path_planner
-from auv_fmu.actuators import Limits
-from auv_fmu.path_planner import MOST, Parameters, Waypoints
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.guidance import path_planner
+from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.paper.actuators import Limits
+from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.formats.tables import read_columns, read_rows, records
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text

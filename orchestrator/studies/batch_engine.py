@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu import closed_loop
-from auv_fmu.closed_loop import Moment, Setting, blocks_of, splits
-from auv_fmu.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
+from auv_fmu.loop import closed_loop
+from auv_fmu.loop.closed_loop import Moment, Setting, blocks_of, splits
+from auv_fmu.paper.euler import LARGEST_STATE, MOST_INTERNAL_STEPS
 from fmus.kinds import AUTO
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError

@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.observer import Form, exact_gain
+from auv_fmu.paper.observer import Form, exact_gain
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
-from auv_fmu.vehicle import Vehicle
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.quantities import POSITION, TAU, THETA, Members, member_name
+from auv_fmu.language.quantities import POSITION, TAU, THETA, Members, member_name
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName

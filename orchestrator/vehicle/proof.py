@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.control_point import ELL as CONTROL_POINT
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import ELL as CONTROL_POINT
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.gain_conditions import observer_rate
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
-from auv_fmu.vehicle import Vehicle
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.files import CsvLines
 from orchestrator.master.observers.observer import Ending, Header, every

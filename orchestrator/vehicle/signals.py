@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from auv_fmu import quantities
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.control_point import control_point
-from auv_fmu.quantities import member_name
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.language import quantities
+from auv_fmu.language.quantities import member_name
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import control_point
+from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.machine.errors import InputError
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching

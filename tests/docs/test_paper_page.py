@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import motion_planner, output_feedback, plant
-from auv_fmu.closed_loop import PAPER, LongestSteps, closed_loop
-from auv_fmu.output_feedback import Gains, Measurement
-from auv_fmu.pd import PdGains
+from auv_fmu.loop.closed_loop import PAPER, LongestSteps, closed_loop
+from auv_fmu.paper import motion_planner, output_feedback, plant
+from auv_fmu.paper.output_feedback import Gains, Measurement
+from auv_fmu.paper.pd import PdGains
+from auv_fmu.paper.vehicle import Vehicle, accelerations
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from auv_fmu.vehicle import Vehicle, accelerations
 from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
 from orchestrator.paper.page import errata, readings
 from orchestrator.runs.wiring import closed_loop as loop_of

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from auv_fmu.control_point import ELL
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.control_point import ELL
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import theorem
-from auv_fmu.saturation import MAXIMUM_SLOPE, Saturation
-from auv_fmu.vehicle import Vehicle
 from orchestrator import simulate
 from orchestrator.paper.measures import (
     EFFORT_PD,

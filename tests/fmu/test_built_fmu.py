@@ -197,7 +197,7 @@ def sources(tmp_path: Path) -> Path:
 
 
 def test_two_versions_of_the_bundle_run_their_own_code_in_one_process(dist, tmp_path, sources):
-    disturbance = sources / "auv_fmu" / "disturbance.py"
+    disturbance = sources / "auv_fmu/paper/disturbance.py"
     text = disturbance.read_text()
     assert "A_f * sign(u)" in text
     disturbance.write_text(text.replace("A_f * sign(u)", "4.0 * A_f * sign(u)"))

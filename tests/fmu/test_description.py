@@ -16,8 +16,8 @@ from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 from lxml import etree
 
-from auv_fmu.quantities import group_name
-from fmus.discovery import components, package_folder, ports_of, source_of
+from auv_fmu.language.quantities import group_name
+from fmus.discovery import components, package_folder, source_of
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import (
@@ -27,6 +27,7 @@ from fmus.ports.description_fmi3 import (
 )
 from fmus.ports.port import TIME
 from support.raw import Library, Status, instance
+from support.settings import ports_of
 
 GUID = "{00000000-0000-0000-0000-000000000000}"
 

@@ -13,7 +13,7 @@ import pytest
 
 from fmus.compilers import machines_compiler
 from fmus.discovery import components
-from fmus.native.program import Untranslatable
+from fmus.language.build import Untranslatable
 from fmus.native.translator import translated
 from fmus.script import source_of_script
 from orchestrator.runs.own_components import build_own

@@ -12,7 +12,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.native.shapes import RUNTIME
+from fmus.native.names import RUNTIME
 from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import has_call

@@ -8,8 +8,8 @@ import fmpy
 import numpy as np
 import pytest
 
-from auv_fmu.ocean_current import begin
-from auv_fmu.sea import Sea, regular_waves, water
+from auv_fmu.water.ocean_current import begin
+from auv_fmu.water.sea import Sea, regular_waves, water
 from fmus.compilers import machines_compiler
 from fmus.kinds import KINDS
 from orchestrator.runs.own_components import build_own

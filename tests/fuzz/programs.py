@@ -167,11 +167,11 @@ DEEPER = {
         (I + I) | (I - I) | I * I | (I // I) | (I % I) | abs(I) | min(I, I) | max(I, I, 2) | -I | 5
         | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
         | int(B)
-        | Mode.HIGH | R.k | (I**2) | ((I % 7)**3) | (I**0) | PRIMES[SIZE]
+        | int(Mode.HIGH) | (I + Mode.LOW) | R.k | (I**2) | ((I % 7)**3) | (I**0) | PRIMES[SIZE]
         | (+I) | sum(k * I for k in range(3)) | sum(a > F for a in V) | sum(B for _ in PRIMES)
         | sum(1 for a in V if a > F and B) | sum(k for k in PRIMES if k > I)
         | sum(I for k, a in enumerate(W) if k * a > F) | max(k * I for k in PRIMES)
-        | min(k - I for k in range(SIZE + 1)) | E | (E + I) | P[I % 2].k | len(PRIMES)
+        | min(k - I for k in range(SIZE + 1)) | int(E) | (E + I) | P[I % 2].k | len(PRIMES)
         | (I, I)[SIZE - 1] | (2147483647 - I) | (-2147483647 - I)
     """,
     BOOL: """
@@ -221,10 +221,10 @@ DEEPER = {
         | (Record(F, V) if B else R) | (R if Record(F, V).x > F else Record(F, V, I, B))
         | Record(F, (V if (F, F)[0] > F else XS[:3]), on=(B if B else $r.on))
         | Record(*(F, V), k=I) | Record(F, *(V, I), bias=F) | $r._replace(v=V, mode=E) | P[I % 2]
-        | (P if B else P)[SIZE - 1] | (R, R)[I % 2] | Record(*$r) | Record(F, V, E, B, turned(E))
+        | (P if B else P)[SIZE - 1] | (R, R)[I % 2] | Record(*$r) | Record(F, V, int(E), B, turned(E))
     """,
     MODE: """
-        R.mode | (E if B else E) | turned(E) | turned(E, F) | turned(x=F, mode=E) | (E, E)[I % 2]
+        R.mode | Mode(I) | Mode((0, 1, 7)[I % 3]) | (E if B else E) | turned(E) | turned(E, F) | turned(x=F, mode=E) | (E, E)[I % 2]
         | P[I % 2].mode
     """,
     PAIR: "(R, R) | (P if B else P) | (R, P[1]) | (P[I % 2], $r._replace(x=F)) | (P[1], P[0])",

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from math import hypot, inf, isfinite
 from typing import Any
 
-from auv_fmu.attitude import rotation_from_quaternion
-from auv_fmu.variable import Refusal
+from auv_fmu.language.variable import Refusal
+from auv_fmu.paper.attitude import rotation_from_quaternion
 from fmus.ports.groups import filled, reals_first
 from support import states
 from support.raw import Description, Variable

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import auv_fmu
-from fmus.discovery import ports_of
+from support.settings import ports_of
 
 TESTS = Path(__file__).parents[1]
 PAGE = (TESTS.parent / "docs" / "reference" / "equations.md").read_text(encoding="utf-8")

@@ -14,12 +14,14 @@ from pathlib import Path
 
 import pytest
 
-from fmus.discovery import components, ports_of
+from fmus.discovery import components
+from support.settings import ports_of
 
 ROOT = Path(__file__).parents[2]
 
 #: Rooms, each of which may import those before it.
 FLOORS = {
+    "auv_fmu": ("language", "paper", "proof", "remus", "water", "guidance", "loop"),
     "orchestrator": (
         "machine", "system", "formats", "master", "vehicle", "figures", "runs", "live", "exchange",
         "studies", "paper", "commands",
@@ -118,9 +120,26 @@ def test_imports_run_downwards(package):
             continue
         own = floors.index(room(package, name))
         for imported in imports(path):
-            if imported[0] == package and len(imported) > 1:
+            # What is no room is a name of the package's own face.
+            if imported[0] == package and room(package, imported[1:]) in floors:
                 other = floors.index(room(package, imported[1:]))
                 assert other <= own, f"{path} imports {'.'.join(imported)}, which is above it"
+
+
+@pytest.mark.parametrize("package", ["auv_fmu", "orchestrator"])
+def test_package_names_its_rooms_from_the_lowest_on(package):
+    assert tuple(named_in(package)) == FLOORS[package]
+
+
+@pytest.mark.parametrize("room", FLOORS["auv_fmu"])
+def test_room_names_its_modules(room):
+    listed = {name[1] for _, name in modules("auv_fmu") if name[:1] == (room,) and name[1:]}
+    assert sorted(named_in(f"auv_fmu.{room}")) == sorted(listed)
+
+
+def named_in(package: str) -> list[str]:
+    """The modules in the table of a package's docstring."""
+    return re.findall(r"^:mod:`\.(\w+)`", str(import_module(package).__doc__), re.MULTILINE)
 
 
 def test_the_general_half_imports_neither_the_mathematics_nor_the_components():

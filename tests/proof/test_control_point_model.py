@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.control_point import control_point_velocity
-from auv_fmu.vehicle import Vehicle, accelerations, euler_rates
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import control_point_velocity
+from auv_fmu.paper.vehicle import Vehicle, accelerations, euler_rates
 from support.control_point_model import (
     C_2,
     D_2,

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from auv_fmu import formation
-from auv_fmu.formation import Estimator, FormationState, Heading, Parameters
+from auv_fmu.guidance import formation
+from auv_fmu.guidance.formation import Estimator, FormationState, Heading, Parameters
 from support import formation_bounds
 from support.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAIN, Messages
 from support.formations import follow, known, tables

@@ -1,4 +1,4 @@
-"""The model the proof works on: (4) to (8), (14), (15), and error dynamics, in matrices.
+"""The model the proof works on: (4) to (8), (11), (14), (15), and error dynamics, in matrices.
 
 The controller needs none of these matrices. They are here to check properties of the paper and
 the conditions of its theorems, and never run inside an FMU, so they are numpy arrays.
@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.control_point import jacobian
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.language.vectors import Rotation, Vector3, scale
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.vehicle import Vehicle
 
 Matrix = np.ndarray[Any, Any]
 
@@ -87,6 +87,12 @@ class ActuatedDynamics:
         """
         m11_u = self.vehicle.m11 * v[0]
         return np.array([[0.0, 0.0, m11_u], [0.0, -m11_u, 0.0]])
+
+
+def jacobian(rotation: Rotation, ell: float) -> tuple[Vector3, Vector3, Vector3]:
+    """J(eta) of (11) as its columns, for (u, q, r)."""
+    e1, e2, e3 = rotation
+    return e1, scale(-ell, e3), scale(ell, e2)
 
 
 def J(theta: float, psi: float, ell: float) -> Matrix:

@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from math import exp, hypot, inf, sqrt, tanh
 from typing import NamedTuple
 
-from auv_fmu.formation import (
+from auv_fmu.guidance.formation import (
     MOST,
     PEAK_ACCELERATION,
     PEAK_SPEED,
@@ -25,7 +25,7 @@ from auv_fmu.formation import (
     Parameters,
     offset,
 )
-from auv_fmu.vectors import distance, norm
+from auv_fmu.language.vectors import distance, norm
 
 _GOLDEN = (1.0 + sqrt(5.0)) / 2
 _EXTREMES = (5.0 - sqrt(13.0)) / 2, (5.0 + sqrt(13.0)) / 2

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from hypothesis import strategies as st
 
-from auv_fmu import formation
-from auv_fmu.formation import Estimator, Known, Parameters, Shape, Stages
+from auv_fmu.guidance import formation
+from auv_fmu.guidance.formation import Estimator, Known, Parameters, Shape, Stages
 
 ORIGIN = (0.0, 0.0, 0.0)
 FOUR = (0.0,) * 4

@@ -14,12 +14,14 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
 
-from auv_fmu.arrays import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from fmus.compilers import SAME_NUMBERS
-from fmus.native.functions import function_in_c
-from fmus.native.language import CONSTANTS, MATHEMATICS
-from fmus.native.program import Function, Program
-from fmus.native.shapes import DOUBLE, RUNTIME, Shape, Structure, in_c, shape_of
+from fmus.language.build import program_of
+from fmus.language.mathematics import CONSTANTS, FUNCTIONS
+from fmus.language.tree import Function
+from fmus.language.types import FLOAT, INT, Array, Record, Scalar, Type, parts_of, type_of
+from fmus.native.emit import Emitter, members
+from fmus.native.names import RUNTIME, in_c
 from fmus.ports.groups import hints_of
 from fmus.ports.port import Refusal
 
@@ -33,10 +35,11 @@ from __future__ import annotations
 import math
 from enum import IntEnum
 from math import isnan
-from math import {", ".join(sorted(MATHEMATICS | CONSTANTS))}
+from math import {", ".join(sorted(FUNCTIONS.keys() | CONSTANTS))}
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector, interpolate, solve
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.linear_algebra import interpolate, solve
 from fmus.ports.port import Refusal
 
 """
@@ -124,7 +127,7 @@ class Twins:
     def c(self, name: str, numbers: Sequence[float]) -> Answer:
         """What C gives."""
         function = self.functions[name]
-        n = len(_leaves(shape_of(hints_of(function)["return"]), ""))
+        n = len(_leaves(type_of(hints_of(function)["return"]), ""))
         given, taken = (c_double * max(len(numbers), 1))(*numbers), (c_double * max(n, 1))()
         why = create_string_buffer(_WHY)
         call = getattr(self._library, f"call_{name}")
@@ -136,31 +139,24 @@ class Twins:
 
 def c_text(functions: dict[str, FunctionType]) -> str:
     """Functions in C, with a function `call_...` for each that takes and gives plain numbers."""
-    program = Program(function_in_c)
+    program = program_of(*functions.values())
+    emitter = Emitter(program.functions.values())
     made = {name: program.function(function) for name, function in functions.items()}
-    return "\n\n".join(
-        [
-            _INCLUDES,
-            *program.structures.values(),
-            *program.constants.values(),
-            *(function.text for function in program.functions.values()),
-            *(_shim(name, function) for name, function in made.items()),
-        ]
-    ) + "\n"  # fmt: skip
+    shims = [_shim(emitter, name, function) for name, function in made.items()]
+    return "\n\n".join([_INCLUDES, emitter.text(), *shims]) + "\n"
 
 
-def _shim(name: str, function: Function) -> str:
-    assert function.returns is not None
+def _shim(emitter: Emitter, name: str, function: Function) -> str:
     lines, place = ["Error error[1] = {{0}};"], 0
-    for argument, shape in function.arguments.items():
+    for argument, type_ in function.arguments.items():
         argument = in_c(argument)
-        lines.append(f"{shape.name} given_{argument};")
-        for leaf, part in _leaves(shape, f"given_{argument}"):
-            cast = "" if part == DOUBLE else f"({part.name})"
+        lines.append(f"{emitter.type(type_)} given_{argument};")
+        for leaf, part in _leaves(type_, f"given_{argument}"):
+            cast = "" if part == FLOAT else "(int)"
             lines.append(f"{leaf} = {cast}in[{place}];")
             place += 1
-    call = function.call([f"given_{in_c(argument)}" for argument in function.arguments])
-    lines.append(f"const {function.returns.name} result = {call};")
+    call = emitter.call(function, [f"given_{in_c(argument)}" for argument in function.arguments])
+    lines.append(f"const {emitter.type(function.returns)} result = {call};".replace("\x02", " "))
     leaves = _leaves(function.returns, "result")
     lines += [f"out[{i}] = {leaf};" for i, (leaf, _) in enumerate(leaves)]
     lines += [f"memcpy(why, error->why.text, {_WHY});", "(void)in; return error->raised;"]
@@ -169,32 +165,27 @@ def _shim(name: str, function: Function) -> str:
     return f"{head};\n{head} {{\n{body}\n}}"
 
 
-def _leaves(shape: Shape, name: str) -> list[tuple[str, Shape]]:
-    """The numbers in something of a shape, and their types."""
-    if not isinstance(shape, Structure):
-        return [(name, shape)]
-    return [leaf for suffix, part in shape.parts for leaf in _leaves(part, name + suffix)]
+def _leaves(type_: Type, name: str) -> list[tuple[str, Scalar]]:
+    """The numbers in something of a type, and their types."""
+    if isinstance(type_, Scalar):
+        return [(name, type_)]
+    return [leaf for suffix, part in members(type_) for leaf in _leaves(part, name + suffix)]
 
 
 def _made(hint: Any, values: Any) -> Any:
     """A value of a type from the next numbers."""
-    shape = shape_of(hint)
-    if not isinstance(shape, Structure):
+    type_ = type_of(hint)
+    if isinstance(type_, Scalar):
         plain = hint if isinstance(hint, type) else float
         number = next(values)
         return int(number) if issubclass(plain, IntEnum) else plain(number)
-    if shape.made is Vector:
-        return Vector([next(values) for _ in shape.parts])
-    if shape.made is Matrix:
-        return Matrix([_made_row(part, values) for _, part in shape.parts])
-    if shape.made:
-        return shape.made(*(_made(part, values) for part in hints_of(shape.made).values()))
+    if isinstance(type_, Array) and type_.made is Vector:
+        return Vector([next(values) for _ in range(type_.n)])
+    if isinstance(type_, Array) and type_.made is Matrix:
+        return Matrix([[next(values) for _ in parts_of(part)] for part in parts_of(type_)])
+    if isinstance(type_, Record) and type_.made:
+        return type_.made(*(_made(part, values) for part in hints_of(type_.made).values()))
     return tuple(_made(part, values) for part in hint.__args__)
-
-
-def _made_row(shape: Shape, values: Any) -> list[float]:
-    assert isinstance(shape, Structure)
-    return [next(values) for _ in shape.parts]
 
 
 def _flat(value: Any) -> list[float]:
@@ -207,4 +198,5 @@ def sizes_of(function: FunctionType) -> list[Any]:
     """The types of all numbers that a function takes."""
     hints = hints_of(function)
     hints.pop("return")
-    return [part for hint in hints.values() for _, part in _leaves(shape_of(hint), "")]
+    found = [part for hint in hints.values() for _, part in _leaves(type_of(hint), "")]
+    return [INT if part.made else part for part in found]

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
-from fmus.discovery import ports_of
 from fmus.ports.groups import hints_of, parts_of, reals_first
 from fmus.ports.port import Port
-from support.settings import behaviour_of
+from support.settings import behaviour_of, ports_of
 from support.status_table import MODES
 
 CHECKSUM = "checksum"

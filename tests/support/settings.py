@@ -1,16 +1,26 @@
-"""What tests know of each component: from its ports and its behaviour, or from its trials.toml."""
+"""What tests know of each component: from its ports and its behaviour, or from settings.toml."""
 
 from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
 
-from fmus.discovery import components, ports_of, source_of
+from fmus.discovery import components, source_of
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import ParameterSet
+from fmus.ports.port import Port
 from support.tiers import slow
+
+SETTINGS = Path(__file__).with_suffix(".toml")
+
+
+def ports_of(name: str) -> Sequence[Port]:
+    """The ports of a component of the bundle, all but `fault`."""
+    return source_of(name).definition.ports
+
 
 #: Names of all components, and of those with inputs.
 NAMES = [*components()]
@@ -51,11 +61,10 @@ class Trials(NamedTuple):
 
 @cache
 def trials_of(name: str) -> Trials:
-    """How a component is tried; one without a trials.toml, and an FMU of others, as any may be."""
+    """How a component is tried; one not in settings.toml, and an FMU of others, as any may be."""
     if name not in components():
         return Trials()
-    path = source_of(name).folder / "trials.toml"
-    said: dict[str, Any] = tomllib.loads(path.read_text()) if path.is_file() else {}
+    said: dict[str, Any] = tomllib.loads(SETTINGS.read_text()).get(name, {})
     settings = {key: Setting(**said.pop(key)) for key in ("overflow", "no_start") if key in said}
     return Trials(**said, **settings)
 

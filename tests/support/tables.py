@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.quantities import ETA, NU, TAU
+from auv_fmu.language.quantities import ETA, NU, TAU
 from orchestrator.master.experiment import FEEDTHROUGH, Experiment, Order
 from orchestrator.master.observers.observer import Header
 from orchestrator.master.observers.table import Table

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from auv_fmu.closed_loop import Instant, Setting
-from auv_fmu.closed_loop import closed_loop as straight_line
-from auv_fmu.output_feedback import ControllerState
+from auv_fmu.loop.closed_loop import Instant, Setting
+from auv_fmu.loop.closed_loop import closed_loop as straight_line
+from auv_fmu.paper.output_feedback import ControllerState
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
 from orchestrator.runs.loading import load, load_scenario
@@ -414,7 +414,7 @@ def test_other_systems_are_refused_by_what_differs(tmp_path):
 def test_another_process_finds_the_kernel_compiled():
     """It loads in a fraction of a second what has taken several to compile."""
     text = (
-        "from auv_fmu.closed_loop import PAPER, blocks_of\n"
+        "from auv_fmu.loop.closed_loop import PAPER, blocks_of\n"
         "from orchestrator.studies.batch.compilation import compile_run\n"
         "from orchestrator.studies.batch_engine import BatchEngine\n"
         "from orchestrator.studies.engine import Point\n"

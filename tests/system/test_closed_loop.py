@@ -7,14 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from auv_fmu import motion_planner, plant
-from auv_fmu.blocks import measurement
-from auv_fmu.closed_loop import PAPER, Instant, Setting, closed_loop
-from auv_fmu.disturbance import Disturbance
-from auv_fmu.observer import Form
-from auv_fmu.output_feedback import Gains
-from auv_fmu.plant import RollAxis
-from auv_fmu.saturation import Saturation
+from auv_fmu.loop.blocks import measurement
+from auv_fmu.loop.closed_loop import PAPER, Instant, Setting, closed_loop
+from auv_fmu.paper import motion_planner, plant
+from auv_fmu.paper.disturbance import Disturbance
+from auv_fmu.paper.observer import Form
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.plant import RollAxis
+from auv_fmu.paper.saturation import Saturation
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System

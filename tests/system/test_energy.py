@@ -11,10 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import hull, plant, remus100
-from auv_fmu.attitude import rotation_from_euler, rotation_from_quaternion
-from auv_fmu.plant import Integrator, Parameters, RollAxis
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.paper import plant
+from auv_fmu.paper.attitude import rotation_from_euler, rotation_from_quaternion
+from auv_fmu.paper.plant import Integrator, Parameters, RollAxis
+from auv_fmu.paper.vehicle import Vehicle
+from auv_fmu.remus import hull, remus100
 from support.strategies import angles, pitch_angles, speeds, vectors
 
 NONE_3, NONE_6 = (0.0,) * 3, (0.0,) * 6

@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from auv_fmu import closed_loop as line
-from auv_fmu import plant
-from auv_fmu.closed_loop import PAPER, Setting, blocks_of
-from auv_fmu.disturbance import disturbance
+from auv_fmu.loop import closed_loop as line
+from auv_fmu.loop.closed_loop import PAPER, Setting, blocks_of
+from auv_fmu.paper import plant
+from auv_fmu.paper.disturbance import disturbance
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
@@ -64,7 +64,7 @@ class Span:
 
 
 def straight(delayed: bool) -> Iterator[dict[str, Any]]:
-    """The loop of `auv_fmu.closed_loop`, written out once more, with what EVENTS say."""
+    """The loop of `auv_fmu.loop.closed_loop`, written out once more, with what EVENTS say."""
     setting: Setting = PAPER
     blocks = blocks_of(setting)
     law = blocks.controller

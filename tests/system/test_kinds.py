@@ -175,7 +175,7 @@ def test_constant_that_is_changed_in_one_equation_changes_both_kinds(dist, nativ
         [folder] = package.__path__
         ignored = shutil.ignore_patterns("dist", "*.pyc")
         shutil.copytree(folder, packages / package.__name__, ignore=ignored)
-    equations = packages / "auv_fmu" / "disturbance.py"
+    equations = packages / "auv_fmu/paper/disturbance.py"
     text = equations.read_text()
     assert text.count("A_f * sign(u)") == 1
     equations.write_text(text.replace("A_f * sign(u)", "1.0000001 * A_f * sign(u)"))

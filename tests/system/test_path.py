@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from auv_fmu import path_planner
-from auv_fmu.path_planner import Waypoints
+from auv_fmu.guidance import path_planner
+from auv_fmu.guidance.path_planner import Waypoints
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import impossible_paths, read_scenario

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from auv_fmu import sea
-from auv_fmu.ocean_current import Variation
-from auv_fmu.sea import Sea
+from auv_fmu.water import sea
+from auv_fmu.water.ocean_current import Variation
+from auv_fmu.water.sea import Sea
 from orchestrator import read
 from orchestrator.commands.main import main
 from orchestrator.runs.scenario import read_scenario

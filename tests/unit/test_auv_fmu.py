@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 import auv_fmu
-from auv_fmu import control_point, euler, formation, plant
-from auv_fmu.observer import EULER
-from auv_fmu.saturation import Saturation
-from auv_fmu.waves import Spectrum
+from auv_fmu.guidance import formation
+from auv_fmu.paper import control_point, euler, plant
+from auv_fmu.paper.observer import EULER
+from auv_fmu.paper.saturation import Saturation
+from auv_fmu.water.waves import Spectrum
 
 TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {

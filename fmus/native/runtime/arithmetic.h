@@ -1,8 +1,7 @@
 /* Python's arithmetic.
  *
  * Where Python raises, the equations go on with what C gives, and the first error is noted: nothing
- * that is computed after it is used. The upper-case names stand where Python has the operator or
- * the function of the same name, in functions that have an `error`.
+ * that is computed after it is used. Functions of math that raise stand beside the equations.
  */
 #ifndef ARITHMETIC_H
 #define ARITHMETIC_H
@@ -41,29 +40,9 @@ static void raise_error(Error *error, string format, ...) {
 
 static void raise_domain_error(Error *error) { raise_error(error, "ValueError: math domain error"); }
 
-static inline double quotient(double a, double b, Error *error) {
+static inline double py_div(double a, double b, Error *error) {
     if (b == 0.0) raise_error(error, "ZeroDivisionError: float division by zero");
     return a / b;
-}
-
-static inline double square_root(double x, Error *error) {
-    if (x < 0.0) raise_domain_error(error);
-    return sqrt(x);
-}
-
-static inline double cosine(double x, Error *error) {
-    if (isinf(x)) raise_domain_error(error);
-    return cos(x);
-}
-
-static inline double sine(double x, Error *error) {
-    if (isinf(x)) raise_domain_error(error);
-    return sin(x);
-}
-
-static inline double arcsine(double x, Error *error) {
-    if (x < -1.0 || x > 1.0) raise_domain_error(error);
-    return asin(x);
 }
 
 /* A result that is infinite for a finite argument is out of range. */
@@ -72,61 +51,7 @@ static inline double bounded_result(double x, double y, Error *error) {
     return y;
 }
 
-static inline double exponential(double x, Error *error) { return bounded_result(x, exp(x), error); }
-
-static inline double exponential_m1(double x, Error *error) {
-    return bounded_result(x, expm1(x), error);
-}
-
-static inline double logarithm(double x, Error *error) {
-    if (x <= 0.0) raise_domain_error(error);
-    return log(x);
-}
-
-static inline double logarithm_1p(double x, Error *error) {
-    if (x <= -1.0) raise_domain_error(error);
-    return log1p(x);
-}
-
-static inline double tangent(double x, Error *error) {
-    if (isinf(x)) raise_domain_error(error);
-    return tan(x);
-}
-
-static inline double arccosine(double x, Error *error) {
-    if (x < -1.0 || x > 1.0) raise_domain_error(error);
-    return acos(x);
-}
-
-static inline double hyperbolic_cosine(double x, Error *error) {
-    return bounded_result(x, cosh(x), error);
-}
-
-static inline double hyperbolic_sine(double x, Error *error) {
-    return bounded_result(x, sinh(x), error);
-}
-
-static inline double inverse_cosh(double x, Error *error) {
-    if (x < 1.0) raise_domain_error(error);
-    return acosh(x);
-}
-
-static inline double inverse_tanh(double x, Error *error) {
-    if (x <= -1.0 || x >= 1.0) raise_domain_error(error);
-    return atanh(x);
-}
-
-static inline double logarithm_2(double x, Error *error) {
-    if (x <= 0.0) raise_domain_error(error);
-    return log2(x);
-}
-
-static inline double logarithm_10(double x, Error *error) {
-    if (x <= 0.0) raise_domain_error(error);
-    return log10(x);
-}
-
-static inline double power(double x, double y, Error *error) {
+static inline double math_pow(double x, double y, Error *error) {
     double z = pow(x, y);
     if (isfinite(x) && isfinite(y) && !isfinite(z)) {
         if (isnan(z) || x == 0.0) raise_domain_error(error);
@@ -136,7 +61,7 @@ static inline double power(double x, double y, Error *error) {
 }
 
 /* Python's x ** y for a whole y; for another one Python's result may be complex. */
-static inline double raised_to(double x, double y, Error *error) {
+static inline double py_pow(double x, double y, Error *error) {
     double z = pow(x, y);
     if (x == 0.0 && y < 0.0)
         raise_error(error, "ZeroDivisionError: 0.0 cannot be raised to a negative power");
@@ -145,14 +70,14 @@ static inline double raised_to(double x, double y, Error *error) {
     return z;
 }
 
-static inline double remainder_of(double x, double y, Error *error) {
+static inline double math_fmod(double x, double y, Error *error) {
     double z = isinf(y) && !isinf(x) ? x : fmod(x, y);
     if (isnan(z) && !isnan(x) && !isnan(y)) raise_domain_error(error);
     return z;
 }
 
 /* Python's x % y: it has the sign of y. */
-static inline double modulo(double x, double y, Error *error) {
+static inline double py_mod(double x, double y, Error *error) {
     double z;
     if (y == 0.0) {
         raise_error(error, "ZeroDivisionError: float modulo");
@@ -164,7 +89,7 @@ static inline double modulo(double x, double y, Error *error) {
 }
 
 /* Python's x // y. */
-static inline double floor_quotient(double x, double y, Error *error) {
+static inline double py_floordiv(double x, double y, Error *error) {
     double z, n, whole;
     if (y == 0.0) {
         raise_error(error, "ZeroDivisionError: float floor division by zero");
@@ -187,7 +112,7 @@ static inline int integer(long long k, Error *error) {
 }
 
 /* A float without a fraction as an integer. */
-static inline int integer_of(double x, Error *error) {
+static inline int int_of(double x, Error *error) {
     if (x >= INT_MIN && x <= INT_MAX) return (int)x;
     raise_error(error, isnan(x)   ? "ValueError: cannot convert float NaN to integer"
                        : isinf(x) ? "OverflowError: cannot convert float infinity to integer"
@@ -195,22 +120,28 @@ static inline int integer_of(double x, Error *error) {
     return 0;
 }
 
+static inline int int_add(int a, int b, Error *error) { return integer((long long)a + b, error); }
+static inline int int_sub(int a, int b, Error *error) { return integer((long long)a - b, error); }
+static inline int int_mul(int a, int b, Error *error) { return integer((long long)a * b, error); }
+static inline int int_neg(int k, Error *error) { return integer(-(long long)k, error); }
+
 static inline long long magnitude(long long k) { return k < 0 ? -k : k; }
+static inline int int_abs(int k, Error *error) { return integer(magnitude(k), error); }
 
 /* Python's k ** n for n >= 0. */
-static inline int integer_power(int k, int n, Error *error) {
+static inline int int_pow(int k, int n, Error *error) {
     long long z = 1;
     if (magnitude(k) < 2 && n > 2) n = 2 - n % 2; /* only whether it is odd matters */
     for (; n > 0 && magnitude(z) <= INT_MAX; n--) z *= k;
     return integer(n > 0 ? LLONG_MAX : z, error);
 }
 
-static inline double integer_quotient(int a, int b, Error *error) {
+static inline double int_div(int a, int b, Error *error) {
     if (b == 0) raise_error(error, "ZeroDivisionError: division by zero");
     return (double)a / b;
 }
 
-static inline int floor_integer_quotient(int a, int b, Error *error) {
+static inline int int_floordiv(int a, int b, Error *error) {
     long long n;
     if (b == 0) {
         raise_error(error, "ZeroDivisionError: integer division or modulo by zero");
@@ -220,7 +151,7 @@ static inline int floor_integer_quotient(int a, int b, Error *error) {
     return integer(n * b != a && (a < 0) != (b < 0) ? n - 1 : n, error);
 }
 
-static inline int integer_modulo(int a, int b, Error *error) {
+static inline int int_mod(int a, int b, Error *error) {
     long long z;
     if (b == 0) {
         raise_error(error, "ZeroDivisionError: integer modulo by zero");
@@ -233,8 +164,8 @@ static inline int integer_modulo(int a, int b, Error *error) {
 /* The smaller and the larger: the first one, unless the second is beyond it. */
 static inline double smaller(double a, double b) { return b < a ? b : a; }
 static inline double larger(double a, double b) { return b > a ? b : a; }
-static inline int smaller_integer(int a, int b) { return b < a ? b : a; }
-static inline int larger_integer(int a, int b) { return b > a ? b : a; }
+static inline int smaller_int(int a, int b) { return b < a ? b : a; }
+static inline int larger_int(int a, int b) { return b > a ? b : a; }
 
 /* To the nearest integer, and from the middle to the even one. */
 static inline double nearest(double x) {
@@ -249,39 +180,5 @@ static inline int place_in(int i, int n, Error *error) {
     raise_error(error, "IndexError: tuple index out of range");
     return 0;
 }
-
-#define PLACE(i, n) place_in(i, n, error)
-#define DIV(a, b) quotient(a, b, error)
-#define SQRT(x) square_root(x, error)
-#define COS(x) cosine(x, error)
-#define SIN(x) sine(x, error)
-#define ASIN(x) arcsine(x, error)
-#define EXP(x) exponential(x, error)
-#define EXPM1(x) exponential_m1(x, error)
-#define LOG(x) logarithm(x, error)
-#define LOG1P(x) logarithm_1p(x, error)
-#define LOG2(x) logarithm_2(x, error)
-#define LOG10(x) logarithm_10(x, error)
-#define TAN(x) tangent(x, error)
-#define ACOS(x) arccosine(x, error)
-#define COSH(x) hyperbolic_cosine(x, error)
-#define SINH(x) hyperbolic_sine(x, error)
-#define ACOSH(x) inverse_cosh(x, error)
-#define ATANH(x) inverse_tanh(x, error)
-#define POW(x, y) power(x, y, error)
-#define RAISED(x, y) raised_to(x, y, error)
-#define FMOD(x, y) remainder_of(x, y, error)
-#define MOD(a, b) modulo(a, b, error)
-#define FLOORDIV(a, b) floor_quotient(a, b, error)
-#define ADD(a, b) integer((long long)(a) + (b), error)
-#define SUB(a, b) integer((long long)(a) - (b), error)
-#define MUL(a, b) integer((long long)(a) * (b), error)
-#define NEG(k) integer(-(long long)(k), error)
-#define ABS(k) integer(magnitude(k), error)
-#define INT_POW(k, n) integer_power(k, n, error)
-#define INT_OF(x) integer_of(x, error)
-#define INT_DIV(a, b) integer_quotient(a, b, error)
-#define INT_FLOORDIV(a, b) floor_integer_quotient(a, b, error)
-#define INT_MOD(a, b) integer_modulo(a, b, error)
 
 #endif

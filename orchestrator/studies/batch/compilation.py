@@ -27,11 +27,11 @@ from numba.core import serialize
 from numba.core.compiler import CompileResult
 from numba.extending import intrinsic, overload
 
-from auv_fmu import path_planner
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu.blocks import Blocks, SeaWaves
-from auv_fmu.closed_loop import Moment, Setting
-from auv_fmu.linear_algebra import solve
+from auv_fmu.guidance import path_planner
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.linear_algebra import solve
+from auv_fmu.loop.blocks import Blocks, SeaWaves
+from auv_fmu.loop.closed_loop import Moment, Setting
 from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.studies.batch import kernel
 from orchestrator.studies.batch.support import digest

@@ -12,14 +12,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu import closed_loop
-from auv_fmu.actuators import Limits
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.blocks import Blocks
-from auv_fmu.closed_loop import PAPER, Instant, Moment, Setting, Splits, blocks_of
-from auv_fmu.control_point import control_point
-from auv_fmu.euler import LARGEST_STATE
-from auv_fmu.vectors import Vector3, Vector4, difference, norm
+from auv_fmu.language.vectors import Vector3, Vector4, norm, sub
+from auv_fmu.loop import closed_loop
+from auv_fmu.loop.blocks import Blocks
+from auv_fmu.loop.closed_loop import PAPER, Instant, Moment, Setting, Splits, blocks_of
+from auv_fmu.paper.actuators import Limits
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import control_point
+from auv_fmu.paper.euler import LARGEST_STATE
 from orchestrator.vehicle.indices import REACHED
 from orchestrator.vehicle.signals import AXES, DIRECTIONS, Loop
 
@@ -195,7 +195,7 @@ def row_of(setting: Setting, moment: Moment) -> RowSignals:
     return RowSignals(
         moment.t,
         cos(theta),
-        difference(y, moment.scene.reference.y_d),
+        sub(y, moment.scene.reference.y_d),
         seen.dy,
         sqrt(v * v + w * w),
     )
@@ -221,7 +221,7 @@ def signals_of(setting: Setting, instant: Instant, moment: Moment, before: Vecto
         instant.command,
         blocks.vehicle.acting(setting.plant, moment.vehicles.plant, instant.tau),
         before,
-        difference(velocity, scene.plant.dy),
+        sub(velocity, scene.plant.dy),
         theta_hat,
     )
 

@@ -7,11 +7,11 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from auv_fmu import blocks
-from auv_fmu.blocks import SeaWaves
-from auv_fmu.closed_loop import LongestSteps, Setting
-from auv_fmu.sea import Sea
-from auv_fmu.variable import Refusal
+from auv_fmu.language.variable import Refusal
+from auv_fmu.loop import blocks
+from auv_fmu.loop.blocks import SeaWaves
+from auv_fmu.loop.closed_loop import LongestSteps, Setting
+from auv_fmu.water.sea import Sea
 from fmus.discovery import source_of
 from fmus.ports.port import H_MAX, Port
 from orchestrator.machine.errors import InputError

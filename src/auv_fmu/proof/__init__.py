@@ -8,6 +8,6 @@ module                      what it states
 :mod:`.lyapunov`            (17), (19), (34), (55): composite errors, Lyapunov function
 ==========================  ==========================================================
 
-Nothing here runs inside an FMU. The model that it works on, (4) to (8), (14), (15), (20), (25) and
-(28), is in the tests, which hold it against the equations: `support.control_point_model`.
+Nothing here runs inside an FMU. The model that it works on, (4) to (8), (11), (14), (15), (20),
+(25) and (28), is in the tests, which hold it against the equations: `support.control_point_model`.
 """

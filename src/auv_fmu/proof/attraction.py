@@ -9,7 +9,8 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import NamedTuple
 
-from auv_fmu.output_feedback import Gains
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import (
     Bounds,
     Condition,
@@ -19,7 +20,6 @@ from auv_fmu.proof.gain_conditions import (
     conditions,
     coupling,
 )
-from auv_fmu.vehicle import Vehicle
 
 
 class Alphas(NamedTuple):

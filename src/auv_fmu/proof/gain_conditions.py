@@ -21,9 +21,9 @@ from __future__ import annotations
 from math import hypot, sqrt
 from typing import NamedTuple
 
-from auv_fmu.adaptation import NU
-from auv_fmu.vectors import Vector3
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.language.vectors import Vector3
+from auv_fmu.paper.adaptation import NU
+from auv_fmu.paper.vehicle import Vehicle
 
 # Zetas
 

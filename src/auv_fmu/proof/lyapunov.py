@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from auv_fmu.control_point import actuated_velocity
-from auv_fmu.saturation import Saturation, integral, saturation
-from auv_fmu.vectors import Rotation, Vector3, difference, minus_scaled
-from auv_fmu.vehicle import Vehicle
+from auv_fmu.language.vectors import Rotation, Vector3, sub, sub_scaled
+from auv_fmu.paper.control_point import actuated_velocity
+from auv_fmu.paper.saturation import Saturation, integral, saturation
+from auv_fmu.paper.vehicle import Vehicle
 
 
 class Errors(NamedTuple):
@@ -38,9 +38,9 @@ def composite_errors(
         s: saturation function.
 
     """
-    dy_r = minus_scaled(dy_d, lambda_, saturation(s, e_z))  # (16)
-    dy_o = minus_scaled(dy_hat, lambda_, saturation(s, z))  # (18)
-    return difference(dy, dy_r), difference(dy, dy_o)
+    dy_r = sub_scaled(dy_d, lambda_, saturation(s, e_z))  # (16)
+    dy_o = sub_scaled(dy_hat, lambda_, saturation(s, z))  # (18)
+    return sub(dy, dy_r), sub(dy, dy_o)
 
 
 def potential(e: Vector3, z: Vector3, K2: Vector3, s: Saturation) -> float:

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import motion_planner
-from auv_fmu.blocks import helix_begin, helix_step
-from auv_fmu.output_feedback import Gains
+from auv_fmu.loop.blocks import helix_begin, helix_step
+from auv_fmu.paper import motion_planner
+from auv_fmu.paper.output_feedback import Gains
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import alpha_1_at_most, alphas, ball, reach, stretch, theorem
 from auv_fmu.proof.gain_conditions import Bounds, Zetas, bounds, conditions, coupling
-from auv_fmu.vehicle import Vehicle
 from support.strategies import speeds, vectors
 
 ELL = 0.35

@@ -8,10 +8,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from auv_fmu import output_feedback
-from auv_fmu.adaptation import robust_force
-from auv_fmu.attitude import rotation_from_euler
-from auv_fmu.output_feedback import ControllerState, Gains, Measurement
+from auv_fmu.paper import output_feedback
+from auv_fmu.paper.adaptation import robust_force
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.output_feedback import ControllerState, Gains, Measurement
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import (
     Bounds,
     Zetas,
@@ -22,7 +23,6 @@ from auv_fmu.proof.gain_conditions import (
     observer_rate,
     robust_rate,
 )
-from auv_fmu.vehicle import Vehicle
 from support.control_point_model import C_2, D_2, M_2, chi_1, chi_2
 from support.strategies import angles, lengths, pitch_angles
 

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.adaptation import robust_force
-from auv_fmu.attitude import rotation_from_euler
+from auv_fmu.paper.adaptation import robust_force
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.saturation import Saturation, saturation
+from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import bounds
 from auv_fmu.proof.lyapunov import Errors, composite_errors, kinetic, lyapunov
-from auv_fmu.saturation import Saturation, saturation
-from auv_fmu.vehicle import Vehicle
 from support.control_point_model import M_2
 from support.strategies import angles, lengths, pitch_angles, speeds, vectors
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from pythonfmu.enums import Fmi2Status
 
-from auv_fmu import Refusal, plant
-from auv_fmu.plant import Parameters, RollAxis
+from auv_fmu import Refusal
+from auv_fmu.paper import plant
+from auv_fmu.paper.plant import Parameters, RollAxis
 from fmus.auv_plant.component import check_state
 from support.instances import ClassInstance
 

@@ -379,7 +379,7 @@ def start() -> State:
 
 
 def update(state: State, inputs: Inputs) -> State:
-    return State((state.mode + inputs.k) % 6, min(state.mode, inputs.k > 0))
+    return State(Mode((state.mode + inputs.k) % 6), min(state.mode, inputs.k > 0))
 
 
 def outputs(state: State) -> Outputs:
@@ -408,7 +408,7 @@ def test_an_int_may_be_a_member_or_a_truth_value_but_a_member_no_other_int(tmp_p
             assert host.get("Integer", [1])[1] == slave.get_integer([1])
             steps = slave.do_step(t, 1.0), host.step(t, 1.0) == Status.OK
             assert steps == ((False, False) if k == 1 else (True, True))
-        texts = {"step refused at t = 2 s: 5 is not of type Mode"}
+        texts = {"step refused at t = 2 s: ValueError: 5 is not a valid Mode"}
         assert {*messages_of(slave)} == {said.text for said in host.messages} == texts
 
 

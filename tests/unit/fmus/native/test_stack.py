@@ -1,49 +1,34 @@
-"""The stack that a translation takes, counted by hand; runs are in tests/fmu/test_stack.py."""
+"""The stack that equations take, counted by hand; runs are in tests/fmu/test_stack.py."""
 
 from __future__ import annotations
 
-import re
+from pathlib import Path
 
-from fmus.discovery import components, source_of
+from fmus.language.build import program_of
 from fmus.native.stack import deepest
-from fmus.native.translator import translated
+from support.language import HEAD, module_of
 
-TEXT = """\
-typedef struct {
-    double v[100]; /* Vector9 v[10]; */
-} Vector100;
+TEXT = """
+M = Matrix((0.0 for _ in range(100)) for _ in range(10))
 
-typedef struct {
-    Vector100 v[10];
-} Matrix10x100;
 
-typedef Vector100 model_inputs;
+def own_sum(a: Annotated[Vector, 100], b: Annotated[Vector, 100]) -> Annotated[Vector, 100]:
+    c, d = a, b
+    return c
 
-static Vector100 own_sum(Vector100 a, Vector100 b) {
-    const Vector100 c = a, d = b;
-    return c;
-}
 
-static double own_last(const Matrix10x100 *M, Vector100 x) {
-    return own_first((Vector100){{0.0, 1.0}});
-}
-
-static void model_start(const model_inputs *inputs, double t) {
-    const Vector100 x = own_sum(own_sum(*inputs, *inputs), *inputs);
-    own_last(&M, x);
-}
+def start(x: Annotated[Vector, 100]) -> Annotated[Vector, 10]:
+    y = own_sum(own_sum(x, x), x)
+    return M @ y
 """
 
 
-def test_depth_is_that_of_the_calls_within_each_other():
-    """What start holds: x and two sums; what a call of own_sum does: arguments, c and d."""
-    assert deepest(TEXT) == (800 * (3 + 2 + 2), "model_start")
+def test_depth_is_that_of_the_calls_within_each_other(tmp_path):
+    """What start holds: x, y, its result, two sums and a product; own_sum: two arguments, c and d.
 
-
-def test_structures_and_functions_of_components_are_all_found():
-    """A type or a head that is written in another way would count for nothing."""
-    for name in components():
-        text = re.sub(r"/\*.*?\*/", "", translated(source_of(name).definition), flags=re.S)
-        heads = re.findall(r"^static (?!const)[^=;]*?\{$", text, re.M | re.S)
-        assert len(re.findall(r"^\}$", text, re.M)) == len(heads)
-        assert deepest(text)[0] > 0
+    The matrix is not copied.
+    """
+    module = module_of(HEAD + TEXT, tmp_path, "deep")
+    size, function = deepest(program_of(module.start).functions.values())
+    assert function is not None and function.name == "start"
+    assert size == 8 * (100 + 100 + 10 + 2 * 100 + 10 + 2 * 100 + 2 * 100)

@@ -17,17 +17,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import acoustic_link, formation
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu.ocean_current import Current
-from auv_fmu.path_planner import MOST, Parameters, Waypoints
-from auv_fmu.sea import Sea
-from auv_fmu.waves import MOST as MOST_WAVES
-from auv_fmu.waves import Spectrum, Waves
-from fmus.discovery import ports_of, source_of
-from fmus.native.functions import function_in_c
-from fmus.native.program import Program
-from fmus.native.shapes import strip_sphinx_marks
+from auv_fmu.guidance import acoustic_link, formation
+from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.water.ocean_current import Current
+from auv_fmu.water.sea import Sea
+from auv_fmu.water.waves import MOST as MOST_WAVES
+from auv_fmu.water.waves import Spectrum, Waves
+from fmus.discovery import source_of
+from fmus.language.types import type_of
+from fmus.native.emit import Emitter, strip_sphinx_marks
 from fmus.native.tables import tables
 from fmus.native.translator import _drawn, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
@@ -45,7 +44,7 @@ from support.equations import (
     is_series,
     structure,
 )
-from support.settings import NAMES, behaviour_of, parameters_of
+from support.settings import NAMES, behaviour_of, parameters_of, ports_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -96,7 +95,7 @@ def test_it_is_c_without_warnings(name, standard, tmp_path):
 def test_each_function_has_its_docstring_above_it(name):
     text, seen = translated(source_of(name).definition), 0
     component = Path(str(import_module(source_of(name).module).__file__))
-    for path in (component, *(ROOT / "src/auv_fmu").glob("*.py")):
+    for path in (component, *(ROOT / "src/auv_fmu").rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if not isinstance(node, ast.FunctionDef) or node.name.startswith("_"):
                 continue
@@ -135,10 +134,9 @@ def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
     head += "class A(NamedTuple):\n    x: float\n\n"
     (package / "behaviour.py").write_text(head + text)
     code = (
-        "from fmus.native.functions import function_in_c\n"
-        "from fmus.native.program import Program\n"
+        "from fmus.language.build import program_of\n"
         "from own.behaviour import begin\n"
-        "Program(function_in_c).function(begin)"
+        "program_of(begin)"
     )
     process = subprocess.run(
         [sys.executable, "-c", code],
@@ -160,10 +158,10 @@ def test_names_are_given_other_values_one_by_one(tmp_path: Path):
         "    x, y = atan2(z, 1.0), atan2(z, 2.0)\n    return x + y\n"
     )
     code = (
-        "from fmus.native.functions import function_in_c\n"
-        "from fmus.native.program import Program\n"
+        "from fmus.language.build import program_of\n"
+        "from fmus.native.emit import Emitter\n"
         "from own.behaviour import turned\n"
-        "print(Program(function_in_c).function(turned).text)\n"
+        "print(Emitter(program_of(turned).functions.values()).text())\n"
     )
     process = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
@@ -443,22 +441,22 @@ def drawn_type(random: Random, depth: int = 0) -> Any:
 
 
 def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
-    program, lines, calls = Program(function_in_c), [], []
+    emitter, lines, calls = Emitter([]), [], []
     for i in range(60):
         hint = drawn_type(Random(i))
-        shape, n = program.shape(hint), count_values(hint)
-        text = _drawn(shape, map("draws[{}]".format, range(n)))
-        lines += [f"static {shape.name} f{i}(const double draws[]) {{",
-                  f"    const {shape.name} it = {text};", "    return it;", "}"]  # fmt: skip
+        name, n = emitter.type(type_of(hint)), count_values(hint)
+        text = _drawn(type_of(hint), map("draws[{}]".format, range(n)))
+        lines += [f"static {name} f{i}(const double draws[]) {{",
+                  f"    const {name} it = {text};", "    return it;", "}"]  # fmt: skip
         calls.append(
-            f"    const {shape.name} x{i} = f{i}(numbers);\n"
+            f"    const {name} x{i} = f{i}(numbers);\n"
             f"    if (sizeof x{i} != {n} * sizeof(double)) return {i + 1};\n"
             f"    if (memcmp(&x{i}, numbers, sizeof x{i}) != 0) return {i + 1};"
         )
     numbers = ", ".join(map(str, range(1, 500)))
     main = ["int main(void) {", f"    const double numbers[] = {{{numbers}}};", *calls]
     main += ["    return 0;", "}"]
-    structures = "\n".join(program.structures.values())
+    structures = "\n".join(emitter.structures.values())
     source = tmp_path / "drawn.c"
     source.write_text("\n".join(['#include "arithmetic.h"', structures, *lines, *main]))
     subprocess.run(["cc", *FLAGS, "-I", str(RUNTIME), "-o", tmp_path / "drawn", source], check=True)

@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import Refusal, output_feedback
-from auv_fmu.observer import Form
-from auv_fmu.output_feedback import ControllerState, Gains, Measurement
+from auv_fmu import Refusal
+from auv_fmu.paper import output_feedback
+from auv_fmu.paper.observer import Form
+from auv_fmu.paper.output_feedback import ControllerState, Gains, Measurement
 from fmus.observer_controller import component
 from support.instances import ClassInstance
 from support.strategies import speeds, vectors

@@ -6,8 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu import Refusal, path_planner
-from auv_fmu.path_planner import Parameters, Waypoints
+from auv_fmu import Refusal
+from auv_fmu.guidance import path_planner
+from auv_fmu.guidance.path_planner import Parameters, Waypoints
 from fmus.path_planner.component import check_state, start, update
 
 paths = st.builds(

@@ -158,7 +158,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import Annotated, NamedTuple
 
-from auv_fmu.linear_algebra import Matrix, Vector
+from auv_fmu.language.arrays import Matrix, Vector
 
 
 class Mode(IntEnum):

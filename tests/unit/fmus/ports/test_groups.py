@@ -9,7 +9,7 @@ from typing import Annotated, Any, NamedTuple
 import pytest
 
 from auv_fmu import Matrix, Variable, Vector
-from auv_fmu.quantities import NU, POSITION, TAU, per_axis
+from auv_fmu.language.quantities import NU, POSITION, TAU, per_axis
 from fmus.ports.fields import declared
 from fmus.ports.groups import (
     SCOPE,

@@ -9,7 +9,7 @@ from math import inf, nan
 import pytest
 
 from auv_fmu import Refusal
-from auv_fmu.quantities import (
+from auv_fmu.language.quantities import (
     ETA_WITHOUT_ROLL,
     TAU,
     THETA,

@@ -7,10 +7,9 @@ from math import inf, isfinite, nan, radians
 import pytest
 from pythonfmu.enums import Fmi2Status
 
-from fmus.discovery import ports_of
 from fmus.ports.port import H_MAX
 from support.instances import ClassInstance, answers_of, component, messages_of
-from support.settings import NAMES, WITH_INPUTS
+from support.settings import NAMES, WITH_INPUTS, ports_of
 
 WITH_STEP_LIMIT = [name for name in NAMES if H_MAX in {port.name for port in ports_of(name)}]
 

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from auv_fmu.variable import Refusal
+from auv_fmu.language.variable import Refusal
 from fmus.python.noise import Noise, check_draws
 
 

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pythonfmu.enums import Fmi2Status
 
-from auv_fmu.arrays import Matrix, Vector
-from auv_fmu.variable import Refusal
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.variable import Refusal
 from fmus.python.state import Snapshot, measuring, restored
 from support.instances import ClassInstance
 from support.settings import NAMES, WITH_INPUTS

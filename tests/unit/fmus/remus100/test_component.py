@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 from pythonfmu.enums import Fmi2Status
 
-from auv_fmu import Refusal, remus100
-from auv_fmu.remus100 import Parameters, TooFast
+from auv_fmu import Refusal
+from auv_fmu.remus import remus100
+from auv_fmu.remus.remus100 import Parameters, TooFast
 from fmus.remus100.component import check_state
 from support.instances import ClassInstance
 

@@ -8,7 +8,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from auv_fmu.vehicle import Vehicle, accelerations
+from auv_fmu.paper.vehicle import Vehicle, accelerations
 from orchestrator.master.observers.table import Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim

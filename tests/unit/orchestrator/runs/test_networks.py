@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from fmus.compilers import machines_compiler
-from fmus.native import shapes
+from fmus.language import types
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import networks
 from orchestrator.runs.networks import ACTIVATIONS, Dense, Network, component_text, read_network
@@ -394,7 +394,7 @@ def test_any_name_of_a_file_gives_a_module(tmp_path: Path, name: str):
 
 
 def test_a_layer_has_as_many_weights_as_a_matrix_of_the_language():
-    assert networks.MOST_OF_A_LAYER == shapes._MOST_NUMBERS
+    assert networks.MOST_OF_A_LAYER == types._MOST_NUMBERS
 
 
 def changed(**others: Any) -> dict[str, Any]:

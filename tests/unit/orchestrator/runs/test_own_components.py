@@ -15,7 +15,6 @@ from fmpy.validation import validate_fmu
 
 from fmus.compilers import machines_compiler
 from fmus.kinds import NATIVE, PYTHON
-from fmus.native.language import foreign
 from orchestrator.commands.main import main
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import own_components
@@ -51,10 +50,6 @@ def test_its_tests_pass(made: Path):
         cwd=made.parent, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert process.returncode == 0, process.stdout
-
-
-def test_it_is_in_the_language(made: Path):
-    assert foreign(made) == []
 
 
 def test_no_line_is_longer_than_those_of_the_house(made: Path):

@@ -20,8 +20,8 @@ from __future__ import annotations
 
 from math import tanh
 
-from auv_fmu import vectors
-from auv_fmu.vectors import Vector3
+from auv_fmu.language import vectors
+from auv_fmu.language.vectors import Vector3
 
 
 class TooLong(ArithmeticError):

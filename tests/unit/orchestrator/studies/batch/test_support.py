@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from auv_fmu import allocation, remus100
-from auv_fmu.closed_loop import PAPER
-from auv_fmu.saturation import Saturation
-from auv_fmu.sea import Sea, regular_waves
-from auv_fmu.tail import Tail
-from auv_fmu.waves import Spectrum, Waves
+from auv_fmu.loop.closed_loop import PAPER
+from auv_fmu.paper.saturation import Saturation
+from auv_fmu.remus import allocation, remus100
+from auv_fmu.remus.tail import Tail
+from auv_fmu.water.sea import Sea, regular_waves
+from auv_fmu.water.waves import Spectrum, Waves
 from orchestrator.machine.errors import InputError
 from orchestrator.studies.batch.support import setting_of
 from orchestrator.system.names import port_name

@@ -1,0 +1,2255 @@
+"""The language of equations: what a function of Python is as a tree, or why it is none.
+
+This is its definition: what has no tree is refused, with its line and, where there is one, a better
+way to write it. A mistake ends its statement only, so one pass finds those of all functions.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import math
+import operator
+import sys
+import tokenize
+from collections import Counter
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from enum import IntEnum
+from functools import cache
+from importlib.util import resolve_name
+from pathlib import Path
+from types import BuiltinFunctionType, FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+from auv_fmu import Refusal
+from auv_fmu.language.arrays import Matrix, Vector
+from fmus.language import arrays, tree
+from fmus.language.mathematics import BY_FUNCTION, FUNCTIONS
+from fmus.language.tree import (
+    Call,
+    Choice,
+    Expression,
+    Field,
+    Function,
+    Item,
+    Local,
+    Make,
+    Number,
+    Operation,
+    Statement,
+    int_of,
+)
+from fmus.language.types import (
+    BOOL,
+    FLOAT,
+    INT,
+    NOTHING,
+    PLACED,
+    TEXT,
+    UNKNOWN,
+    Array,
+    Record,
+    Type,
+    check_int,
+    check_value,
+    enumeration,
+    has_no_size,
+    has_only_floats,
+    is_algebraic,
+    is_number,
+    is_whole,
+    matrix,
+    parts_of,
+    sizes,
+    tuple_of,
+    type_of,
+    type_of_value,
+    vector,
+)
+from fmus.language.words import advice, word_of
+from fmus.ports.behaviour import NUMBER_FORMAT
+from fmus.ports.groups import hints_of, is_class, is_record
+
+#: Compilers take brackets within brackets, but not any number of them.
+_DEEPEST = 200
+
+#: Packages whose functions all equations share.
+_SHARED = frozenset(("auv_fmu", "fmus"))
+
+#: Exceptions that may be raised, and classes made from them.
+_EXCEPTIONS = (Refusal, ArithmeticError, AssertionError, RuntimeError, ValueError)
+
+_ARITHMETIC: Mapping[type, tuple[tree.Operator, tree.Operator]] = {
+    ast.Add: (tree.ADD, tree.INT_ADD),
+    ast.Sub: (tree.SUBTRACT, tree.INT_SUBTRACT),
+    ast.Mult: (tree.MULTIPLY, tree.INT_MULTIPLY),
+    ast.Div: (tree.DIVIDE, tree.INT_DIVIDE),
+    ast.FloorDiv: (tree.FLOOR_DIVIDE, tree.INT_FLOOR_DIVIDE),
+    ast.Mod: (tree.MODULO, tree.INT_MODULO),
+}
+
+_COMPARISONS: Mapping[type, tree.Operator] = {
+    ast.Lt: tree.LESS, ast.LtE: tree.LESS_EQUAL, ast.Gt: tree.GREATER,
+    ast.GtE: tree.GREATER_EQUAL, ast.Eq: tree.EQUAL, ast.NotEq: tree.NOT_EQUAL,
+}  # fmt: skip
+
+
+def _power_of(base: Any, exponent: Any) -> Any:
+    """A power of an int that is no larger than sizes can be."""
+    if not (isinstance(base, int) and exponent in range(32)) or abs(base) > 2**31:
+        raise OverflowError
+    return base ** int(exponent)
+
+
+#: Operators between constants.
+_FOLDED: Mapping[type, Callable[[float, float], float]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
+    ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: _power_of,
+}  # fmt: skip
+
+#: Makes a value one that can be read in each turn of a loop: the value, its text, and a word for it.
+_Hold = Callable[[Expression, ast.expr, str], Expression]
+
+
+class Untranslatable(Exception):
+    """Some of a program is outside the language; each argument is a mistake, with its place."""
+
+    def __str__(self) -> str:
+        """The first mistake, and how many there are besides."""
+        first, *others = map(str, self.args)
+        return f"{first} (and {len(others)} more: see auv-fmu check)" if others else first
+
+
+class _Outside(Exception):
+    """Something is outside the language: where, and why."""
+
+    def __init__(self, node: ast.AST, what: str) -> None:
+        super().__init__(what)
+        self.node = node
+
+
+class _Follows(Exception):
+    """Something follows from what has been refused already."""
+
+
+def program_of(*functions: FunctionType) -> Program:
+    """The program of some functions and all that they call.
+
+    Raises:
+        Untranslatable: some of it is outside the language.
+
+    """
+    program = Program()
+    for function in functions:
+        program.add(function)
+    program.check()
+    return program
+
+
+class Program:
+    """Functions as trees.
+
+    Attributes:
+        functions: by what they were made from, each after those that it calls.
+
+    """
+
+    def __init__(self) -> None:
+        """Begin with nothing."""
+        self.functions: dict[Hashable, Function] = {}
+        self._begun: set[Hashable] = set()
+        self._mistakes: dict[str, str] = {}
+
+    @property
+    def mistakes(self) -> list[str]:
+        """All that is wrong with it: a line each, in the order of files and lines."""
+        return sorted((f"{place}{what}" for place, what in self._mistakes.items()), key=_place)
+
+    def check(self) -> None:
+        """Refuse a program with mistakes.
+
+        Raises:
+            Untranslatable: there are some.
+
+        """
+        if self._mistakes:
+            raise Untranslatable(*self.mistakes)
+
+    def refuse(self, place: str, what: str) -> None:
+        """Note a mistake; a line has one, as others follow from it."""
+        found = PLACED.match(what)
+        if found:
+            place, what = found[0], what[found.end() :]
+        self._mistakes.setdefault(place, what)
+
+    def add(self, function: FunctionType) -> None:
+        """Take a function, and all that it calls."""
+        try:
+            self.function(function)
+        except TypeError as error:
+            self.refuse("", str(error))
+
+    def function(self, function: FunctionType, types: Sequence[Type] = ()) -> Function:
+        """A function as a tree.
+
+        Args:
+            function: of Python, made by `def` in a module.
+            types: of its arguments, of which some may be vectors of any size.
+
+        Raises:
+            TypeError: it is none, or calls itself.
+
+        """
+        hints = hints_of(function)
+        hints.pop("return", None)
+        unsized = any(map(has_no_size, hints.values()))
+        key = (function, *types) if unsized else function
+        if key in self.functions:
+            return self.functions[key]
+        if key in self._begun:
+            raise TypeError(f"{function.__name__} calls itself")
+        self._begun.add(key)
+        path = str(inspect.getsourcefile(function))
+        node = _definition(path, function.__code__.co_firstlineno)
+        if node is None:
+            line = function.__code__.co_firstlineno
+            raise TypeError(f"{path}:{line}: {function.__name__} is not made by def in a module")
+        made = Function(function.__module__, function.__name__, {}, sizes=types if unsized else ())
+        builder = _Builder(self, path, function.__globals__, made, node)
+        given = dict(zip((argument.arg for argument in _arguments(node)), types))
+        builder.build(lambda name: given[name] if unsized else UNKNOWN)
+        self.functions[key] = made
+        return made
+
+    def helper(
+        self,
+        name: str,
+        types: Sequence[Type],
+        arguments: Mapping[str, Type],
+        returns: Type,
+        body: Callable[[], Sequence[Statement]],
+    ) -> Function:
+        """A function of an operator, made once for some types."""
+        key = (name, *types)
+        if key not in self.functions:
+            made = Function("", name, dict(arguments), returns, sizes=types)
+            made.end(body())
+            self.functions[key] = made
+        return self.functions[key]
+
+
+def _place(line: str) -> tuple[str, int]:
+    """The file and the line that a mistake is in."""
+    found = PLACED.match(line)
+    file, _, number = found[0][:-2].rpartition(":") if found else ("", "", "0")
+    return file, int(number)
+
+
+@cache
+def _module(path: str) -> ast.Module:
+    return ast.parse(Path(path).read_bytes())
+
+
+def _definition(path: str, line: int) -> ast.FunctionDef | None:
+    """The function that begins at a line of a module."""
+    found = (n for n in _module(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line)
+    return next(found, None)
+
+
+@cache
+def _comments(path: str) -> dict[int, str]:
+    """The comments of a file after code, by line."""
+    with tokenize.open(path) as file:
+        return {
+            token.start[0]: token.string.lstrip("#: ")
+            for token in tokenize.generate_tokens(file.readline)
+            if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
+        }
+
+
+@cache
+def _origins(module: ModuleType) -> Mapping[str, str]:
+    """Where the names come from that a module imports."""
+    imports = [
+        n for n in ast.parse(inspect.getsource(module)).body if isinstance(n, ast.ImportFrom)
+    ]
+    return {
+        alias.asname or alias.name: resolve_name(
+            f"{'.' * node.level}{node.module or ''}", module.__package__
+        )
+        for node in imports
+        for alias in node.names
+    }
+
+
+def _home(module: ModuleType, name: str) -> str:
+    """The module that a constant was defined in, seen from one that uses it."""
+    try:
+        origin = _origins(module).get(name)
+    except (OSError, TypeError, ImportError):
+        return module.__name__
+    if origin is None or origin == "math":
+        return origin or module.__name__
+    found = sys.modules.get(origin)
+    return _home(found, name) if found else origin
+
+
+def _is_at_hand(function: FunctionType, path: str, module: str) -> bool:
+    """Whether a function stands in this product, or beside the module that uses it."""
+    if function.__module__.partition(".")[0] in _SHARED:
+        return True
+    root = Path(path).resolve().parents[module.count(".")]
+    file = Path(str(inspect.getsourcefile(function))).resolve()
+    return root in file.parents and "site-packages" not in file.relative_to(root).parts
+
+
+# Which names a piece of a program gives a value, and which it uses
+
+
+def _stored(*nodes: ast.AST) -> list[str]:
+    """Names that are given a value, but not in functions and expressions of their own."""
+    found: list[str] = []
+    for node in nodes:
+        if isinstance(node, ast.FunctionDef):
+            found.append(node.name)
+        elif isinstance(node, ast.Name):
+            found += [node.id] if isinstance(node.ctx, ast.Store) else []
+        elif not isinstance(node, ast.GeneratorExp):
+            found += _stored(*ast.iter_child_nodes(node))
+    return found
+
+
+def _names(node: ast.AST) -> set[str]:
+    return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
+
+
+def _free(*nodes: ast.AST) -> list[str]:
+    """Names that are used in code and belong to what is around it, in the order of their use."""
+    found: list[str] = []
+    for node in nodes:
+        if isinstance(node, ast.Name):
+            found += [node.id] if isinstance(node.ctx, ast.Load) else []
+        elif isinstance(node, ast.FunctionDef):
+            own = {argument.arg for argument in _arguments(node)} | {*_stored(*node.body)}
+            found += [name for name in _free(*node.body) if name not in own]
+        elif isinstance(node, ast.GeneratorExp):
+            first, *others = node.generators
+            own = {name for one in node.generators for name in _names(one.target)}
+            inner = _free(
+                node.elt, *(i for one in node.generators for i in one.ifs),
+                *(one.iter for one in others),
+            )  # fmt: skip
+            found += [*_free(first.iter), *(name for name in inner if name not in own)]
+        elif isinstance(node, ast.AnnAssign):
+            found += _free(*filter(None, [node.value]))
+        else:
+            found += _free(*ast.iter_child_nodes(node))
+    return found
+
+
+def _arguments(node: ast.FunctionDef) -> list[ast.arg]:
+    return [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+
+
+def _is_text(node: ast.stmt) -> bool:
+    """Whether a statement is a text, as docstrings are."""
+    value = node.value if isinstance(node, ast.Expr) else None
+    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+
+
+def _leaves(body: Sequence[ast.stmt]) -> bool:
+    """Whether a loop may be left by `break`."""
+    return any(
+        isinstance(node, ast.Break)
+        or (isinstance(node, (ast.If, ast.Match)) and _leaves(_inside(node)))
+        for node in body
+    )
+
+
+def _inside(node: ast.If | ast.Match) -> list[ast.stmt]:
+    if isinstance(node, ast.If):
+        return [*node.body, *node.orelse]
+    return [statement for case in node.cases for statement in case.body]
+
+
+def _constant(node: ast.expr) -> Any:
+    """A number or a text that is written out; None: it is computed."""
+    try:
+        return ast.literal_eval(node)
+    except ValueError:
+        return None
+
+
+class _Loop(NamedTuple):
+    """What a loop goes over.
+
+    Attributes:
+        start, stop, step: of its counter.
+        turns: how often it runs; None: that is not known before.
+        bound: names that get a value in each turn, and the value.
+        is_wide: whether the counter may pass the largest int.
+
+    """
+
+    start: Expression
+    stop: Expression
+    step: int
+    turns: int | None
+    bound: Sequence[tuple[str, Expression]]
+    is_wide: bool = False
+
+    def made(self, counter: Local, body: Sequence[Statement] = ()) -> tree.For:
+        """It as a statement."""
+        return tree.For(
+            counter.name, self.start, self.stop, self.step, self.turns, body, self.is_wide
+        )
+
+
+class _Turns:
+    """A loop on its way: its counter, and whether the value of its name is used after it."""
+
+    def __init__(self, loop: tree.For, counter: Local) -> None:
+        self.loop, self.counter = loop, counter
+        self.escapes = False
+
+
+#: Names that have a value here, with its type, and the loops whose name it is.
+_Known = dict[str, "tuple[Type, frozenset[_Turns]]"]
+
+#: Of a value that is no loop's.
+_PLAIN: frozenset[_Turns] = frozenset()
+
+
+class _Callable(NamedTuple):
+    """A function, and how it is called.
+
+    Attributes:
+        function: as a tree; it gets what it captures after its arguments.
+        names: of its arguments.
+        positional: how many of them may be given by their place.
+        defaults: values of some of them.
+        captured: names in the function around it.
+
+    """
+
+    function: Function
+    names: Sequence[str]
+    positional: int
+    defaults: Mapping[str, Expression]
+    captured: Sequence[str] = ()
+
+
+class _Builder:
+    """Makes the tree of one function.
+
+    Attributes:
+        made: the function.
+        names: of its arguments and variables.
+        known: those that have a value here; None: here no step of the program comes.
+        functions: local functions by their names.
+
+    """
+
+    def __init__(
+        self,
+        program: Program,
+        path: str,
+        scope: dict[str, Any],
+        made: Function,
+        node: ast.FunctionDef | None = None,
+    ) -> None:
+        """Begin with nothing.
+
+        Args:
+            program: that the function belongs to.
+            path: of its module.
+            scope: of its module.
+            made: the function.
+            node: its text; None: it is made of an expression.
+
+        """
+        self.made, self.program, self.path, self.scope = made, program, path, scope
+        self.node = node
+        self.names: set[str] = set()
+        self.known: _Known | None = {}
+        self.functions: dict[str, _Callable] = {}
+        #: Variables in the tree, by their names and types.
+        self._variables: dict[tuple[str, Type], str] = {}
+        self._taken: set[str] = set()
+        #: Loops around the statement, and those whose counter could be their variable.
+        self._loops: list[_Turns] = []
+        self._counted: list[_Turns] = []
+        #: Variables of the function around this one that only functions called here need.
+        self._closure: dict[str, Expression] = {}
+        #: Statements before the one on its way; None: part of it may not be computed.
+        self._before: list[Statement] | None = None
+        self._depth = self._parts = 0
+        self.has_mistakes = False
+        self._counts: Counter[str] = Counter()
+
+    # Functions
+
+    def build(
+        self, unsized: Callable[[str], Type], captured: Mapping[str, Type] | None = None
+    ) -> None:
+        """Build the tree of a function of Python.
+
+        Args:
+            unsized: gives the type of an argument of any size.
+            captured: variables of the function around it, which are further arguments.
+
+        """
+        node = self.node
+        assert node is not None
+        self.made.doc = ast.get_docstring(node) or ""
+        arguments = _arguments(node)
+        self.names = {*(argument.arg for argument in arguments), *_stored(*node.body)}
+        self._taken |= {*self.names, *_names(node)}
+        self._counts = Counter(_stored(*node.body))
+        with self._noting():
+            self._check_head(node)
+        for argument in arguments:
+            self.made.arguments[argument.arg] = UNKNOWN
+            with self._noting():
+                what = f"the argument {argument.arg} of {node.name}"
+                type_ = self._hinted(argument, argument.annotation, what)
+                self.made.arguments[argument.arg] = type_ or unsized(argument.arg)
+        self.made.arguments |= captured or {}
+        self.names |= self.made.arguments.keys()
+        self._start(self.made.arguments)
+        self._gives = not (isinstance(node.returns, ast.Constant) and node.returns.value is None)
+        self._returns: Type | None = NOTHING
+        if self._gives:
+            self._returns = UNKNOWN
+            with self._noting():
+                self._returns = self._hinted(node, node.returns, f"the result of {node.name}")
+        body = self._block(node.body)
+        if self.known is not None and self._gives and not self.has_mistakes:
+            with self._noting():
+                raise _Outside(node, f"{node.name} may end without a return")
+        self.made.returns = self._returns or UNKNOWN
+        self._end(body)
+
+    def _start(self, arguments: Mapping[str, Type]) -> None:
+        """Know the arguments, and the local functions of the function around this one."""
+        self.known = {name: (type_, _PLAIN) for name, type_ in arguments.items()}
+        self.known |= dict.fromkeys(self.functions, (NOTHING, _PLAIN))
+        self._variables |= {(name, type_): name for name, type_ in arguments.items()}
+        self._taken |= arguments.keys()
+
+    def _end(self, body: Sequence[Statement]) -> None:
+        """Give the function its body; the name of a loop that is not needed after it counts."""
+        for turns in self._counted:
+            first, *others = turns.loop.body
+            assert isinstance(first, tree.Store)
+            if not turns.escapes:
+                turns.loop.counter = turns.counter.name = first.values[0][0]
+                turns.loop.body = others
+        self.made.end(body)
+
+    def _check_head(self, node: ast.FunctionDef) -> None:
+        given = node.args
+        if node.decorator_list:
+            raise _Outside(node, f"a decorator of {node.name} is not in the language of equations")
+        if given.vararg or given.kwarg:
+            raise _Outside(node, f"* among the arguments of {node.name}: name them")
+        for argument in _arguments(node):
+            if argument.arg == "_":
+                raise _Outside(argument, self._foreign("an argument _"))
+            if argument.annotation is None:
+                raise _Outside(argument, f"the argument {argument.arg} of {node.name} has no type")
+        if node.returns is None:
+            raise _Outside(node, f"the result of {node.name} has no type: write -> float")
+
+    def _hinted(self, node: ast.AST, annotation: ast.expr | None, what: str) -> Type | None:
+        """The type that an annotation names; None: it has no size."""
+        if annotation is None:
+            raise _Follows
+        try:
+            text = ast.unparse(annotation)
+            hint: Any = eval(text, self.scope)
+            hint = eval(hint, self.scope) if isinstance(hint, str) else hint
+            return None if has_no_size(hint) else type_of(hint)
+        except Exception as error:
+            if PLACED.match(str(error)):
+                raise
+            said = (
+                str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+            )
+            raise _Outside(node, f"{what}: {said}") from None
+
+    # Mistakes
+
+    def _noting(self) -> _Noting:
+        return _Noting(self)
+
+    def _foreign(self, what: str) -> str:
+        return f"{what} is not in the language of equations{advice(what)}"
+
+    def _cannot(self, node: ast.AST, what: str) -> _Outside:
+        return _Outside(node, self._foreign(what))
+
+    # Blocks
+
+    def _block(self, nodes: Sequence[ast.stmt]) -> list[Statement]:
+        found: list[Statement] = []
+        for node in nodes:
+            before = len(found)
+            self._before = found
+            with _Noting(self, node):
+                self._statement(node, found)
+            self._before = None
+            about = _comments(self.path).get(node.end_lineno or 0)
+            is_simple = not isinstance(
+                node, (ast.If, ast.While, ast.For, ast.FunctionDef, ast.Match)
+            )
+            if about and is_simple and len(found) > before:
+                found[-1].comment = about
+        return found
+
+    def _statement(self, node: ast.stmt, found: list[Statement]) -> None:
+        name = f"_{type(node).__name__.lower()}_statement"
+        if _is_text(node):
+            return
+        if not hasattr(self, name):
+            raise self._cannot(node, word_of(node))
+        getattr(self, name)(node, found)
+
+    def _pass_statement(self, node: ast.Pass, found: list[Statement]) -> None:
+        """Nothing to do."""
+
+    def _expr_statement(self, node: ast.Expr, found: list[Statement]) -> None:
+        if not isinstance(node.value, ast.Call):
+            raise self._cannot(node, word_of(node))
+        found.append(tree.Do(self.expression(node.value)))
+
+    def _return_statement(self, node: ast.Return, found: list[Statement]) -> None:
+        assert self.node is not None
+        name, value = self.node.name, None
+        try:
+            if node.value is None and self._gives:
+                raise _Outside(node, f"{name} has a result: return a value")
+            if node.value is not None:
+                if not self._gives:
+                    raise _Outside(node, f"{name} returns a value, and its type is None")
+                value = self.fitting(node.value, self._returns)
+                self._returns = self._returns or value.type
+        finally:
+            self.known = None
+        found.append(tree.Return(value))
+
+    def _break_statement(self, node: ast.Break, found: list[Statement]) -> None:
+        self.known = None
+        found.append(tree.Break())
+
+    def _continue_statement(self, node: ast.Continue, found: list[Statement]) -> None:
+        self.known = None
+        found.append(tree.Continue())
+
+    def _if_statement(self, node: ast.If, found: list[Statement]) -> None:
+        test: Expression = Number(True, BOOL)
+        with self._noting():
+            test = self.condition(node.test)
+        before = self.known
+        body = self._block(node.body)
+        after, self.known = self.known, before
+        orelse = self._block(node.orelse)
+        self.known = _both(after, self.known)
+        found.append(tree.If(test, body, orelse))
+
+    def _assert_statement(self, node: ast.Assert, found: list[Statement]) -> None:
+        test = Operation(tree.NOT, (self.condition(node.test),), BOOL)
+        # The text is made only where the condition does not hold.
+        self._before = None
+        parts: list[str | tuple[Expression, str]] = ["AssertionError: "]
+        if node.msg is not None:
+            parts += self._message(node.msg)
+        found.append(tree.If(test, [tree.Raise(parts)]))
+
+    def _match_statement(self, node: ast.Match, found: list[Statement]) -> None:
+        subject = self._held(self.expression(node.subject), "case")
+        if not is_whole(subject.type):
+            raise _Outside(node, f"match of {subject.type.word}: it takes an int or an enumeration")
+        self._before = None
+        rest = {*subject.type.made} if getattr(subject.type, "made", None) else {None}
+        before, after = self.known, None
+        tests: list[tuple[Expression | None, Sequence[Statement]]] = []
+        for case in node.cases:
+            self.known = before
+            test: Expression | None = None
+            with self._noting():
+                values = self._cases(case.pattern)
+                if rest - {None} and case.guard is None:
+                    rest -= {getattr(value, "value", None) for value in values}
+                test = self._is_one_of(subject, values) if values and rest else None
+                if case.guard is not None:
+                    guard = self.condition(case.guard)
+                    test = guard if test is None else Operation(tree.AND, (test, guard), BOOL)
+            tests.append((test, self._block(case.body)))
+            after = _both(after, self.known)
+            if test is None:
+                break
+        self.known = _both(after, before) if tests[-1][0] is not None else after
+        orelse: Sequence[Statement] = ()
+        for test, body in reversed(tests):
+            orelse = body if test is None else [tree.If(test, body, orelse)]
+        found += orelse
+
+    def _cases(self, pattern: ast.pattern) -> list[Expression]:
+        """The values of a case; none: all others."""
+        if isinstance(pattern, ast.MatchAs) and pattern.pattern is None and pattern.name is None:
+            return []
+        if isinstance(pattern, ast.MatchOr):
+            return [value for one in pattern.patterns for value in self._cases(one)]
+        if isinstance(pattern, ast.MatchValue):
+            value = self.expression(pattern.value)
+            if is_whole(value.type):
+                return [value]
+        raise _Outside(pattern, "a case other than an int, a member of an enumeration or _")
+
+    def _is_one_of(self, subject: Expression, values: Sequence[Expression]) -> Expression:
+        tests = [Operation(tree.EQUAL, (subject, value), BOOL) for value in values]
+        return tests[0] if len(tests) == 1 else Operation(tree.OR, tests, BOOL)
+
+    def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
+        if node.orelse:
+            raise _Outside(node.orelse[0], self._foreign("else of a while"))
+        is_endless = isinstance(node.test, ast.Constant) and node.test.value is True
+        inside = [n for statement in node.body for n in ast.walk(statement)]
+        if is_endless:
+            if not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in inside):
+                raise _Outside(node, "a while that nothing ends: write break, or a condition")
+        elif not _names(node.test) & {*_stored(*node.body)}:
+            raise self._cannot(node, "a while that changes nothing in its condition")
+        self._before = None
+        test: Expression = Number(True, BOOL)
+        with self._noting():
+            test = self.condition(node.test)
+        before = self._before_loop(node.body)
+        body = self._block(node.body)
+        self.known = None if is_endless and not _leaves(node.body) else before
+        found.append(tree.While(test, body))
+
+    def _for_statement(self, node: ast.For, found: list[Statement]) -> None:
+        if node.orelse:
+            raise _Outside(node.orelse[0], self._foreign("else of a for"))
+        self._check_target(node.target)
+        changed = {*_stored(*node.body), *_names(node.target)}
+        first = _first_name(node.target)
+
+        def hold(value: Expression, source: ast.expr, word: str) -> Expression:
+            """Keep what the body could change, or what would be computed in each turn."""
+            if word == "start" or (_is_fixed(value) and not _names(source) & changed):
+                return value
+            return self._kept(value, f"{first}_{word}")
+
+        before = self._before_loop([node.target, *node.body])
+        counter = Local(self._unused(f"{first}_at"), INT)
+        try:
+            loop = self._loop(node.target, node.iter, counter, hold)
+        except (_Outside, _Follows):
+            self._forget(node.target)
+            self._block(node.body)
+            self.known = before
+            raise
+        made = loop.made(counter)
+        turns = _Turns(made, counter)
+        used = {*_free(*node.body), *_stored(*node.body), *(before or {})}
+        names = {name: value for name, value in loop.bound if name in used or loop.turns}
+        stores = [self._store(node, [each]) for each in names.items()]
+        if before is not None:
+            mine = frozenset((turns,))
+            of_loop: _Known = {
+                name: (value.type, _PLAIN if name in before and not before[name][1] else mine)
+                for name, value in names.items()
+            }
+            self.known = {**before, **of_loop}
+        counts = [name for name, value in names.items() if value is counter]
+        if counts and not loop.is_wide and not {*counts} & {*(before or {}), *_stored(*node.body)}:
+            self._counted.append(turns)
+        self._loops.append(turns)
+        body = self._block(node.body)
+        self._loops.pop()
+        made.body = [*stores, *body]
+        self.known = {**before, **of_loop} if before is not None and loop.turns else before
+        found.append(made)
+
+    def _before_loop(self, nodes: Sequence[ast.AST]) -> _Known | None:
+        """What is known before a loop: names of earlier loops that it uses again begin anew."""
+        if self.known is not None:
+            again = {*_stored(*nodes)}
+            self.known = {
+                name: value for name, value in self.known.items()
+                if name not in again or not value[1] - {*self._loops}
+            }  # fmt: skip
+        return self.known
+
+    # Functions within this one
+
+    def _functiondef_statement(self, node: ast.FunctionDef, found: list[Statement]) -> None:
+        if self._counts[node.name] > 1:
+            raise _Outside(node, f"{node.name} is given a value twice: use two names")
+        own = {*(argument.arg for argument in _arguments(node)), *_stored(*node.body)}
+        captured = self._captured(_free(node))
+        for name in captured:
+            if name in own:
+                raise _Outside(node, f"{name} has two meanings in {node.name}: rename one")
+            if self._counts[name] > (name not in self.made.arguments):
+                raise _Outside(node, f"{name}, which {node.name} uses, is changed")
+        inner = self._inner(node.name, own, node)
+        inner.build(
+            lambda name: self._sizeless(node, name),
+            {name: self._local(node, name).type for name in captured},
+        )
+        arguments = _arguments(node)
+        n = len(arguments) - len(node.args.kwonlyargs)
+        defaults = [*zip(arguments[n - len(node.args.defaults) : n], node.args.defaults)]
+        defaults += [(a, d) for a, d in zip(node.args.kwonlyargs, node.args.kw_defaults) if d]
+        given = {}
+        for argument, default in defaults:
+            if _names(default) & self.names:
+                raise _Outside(default, f"the default value of {argument.arg} is no constant")
+            given[argument.arg] = self.fitting(default, inner.made.arguments[argument.arg])
+        names = [argument.arg for argument in arguments]
+        called = _Callable(inner.made, names, n, given, captured)
+        self.functions = {**self.functions, node.name: called}
+        self.program.functions["inner", inner.made] = inner.made
+        self._know(node.name, NOTHING)
+
+    def _sizeless(self, node: ast.FunctionDef, name: str) -> Type:
+        what = "a Vector or Matrix has no size here: write Annotated[Vector, 3]"
+        raise _Outside(node, f"the argument {name} of {node.name}: {what}")
+
+    def _captured(self, names: Sequence[str]) -> list[str]:
+        """The variables among some names, and those that local functions among them capture."""
+        found = [n for name in names for n in (name, *self._captured_by(name))]
+        return [n for n in dict.fromkeys(found) if n in self.names and n not in self.functions]
+
+    def _captured_by(self, name: str) -> Sequence[str]:
+        return self.functions[name].captured if name in self.functions else ()
+
+    def _inner(self, word: str, own: set[str], node: ast.FunctionDef | None = None) -> _Builder:
+        """What builds a function within this one, which has names of its own."""
+        made = Function(self.made.module, f"{self.made.name}_{word}", {}, sizes=self.made.sizes)
+        inner = _Builder(self.program, self.path, self.scope, made, node)
+        known = self.functions if self.known is None else self.known
+        inner.functions = {
+            name: called
+            for name, called in self.functions.items()
+            if name in known and name not in own
+        }
+        inner._taken = {*self._taken, *own}
+        return inner
+
+    def _closed(self, node: ast.AST, name: str) -> Expression:
+        """The value of a variable that a function called here has captured."""
+        return self._closure.get(name) or self._local(node, name)
+
+    # Assignments
+
+    def _assign_statement(self, node: ast.Assign, found: list[Statement]) -> None:
+        for target in node.targets:
+            self._check_target(target)
+        value: ast.expr = node.value
+        if len(node.targets) == 1:
+            self._assign(node.targets[0], value, found)
+            return
+        held = self._kept(self.expression(value), "all")
+        for target in node.targets:
+            found += self._take_apart(target, held)
+
+    def _annassign_statement(self, node: ast.AnnAssign, found: list[Statement]) -> None:
+        self._check_target(node.target)
+        assert isinstance(node.target, ast.Name)
+        if node.value is None:
+            raise self._cannot(node, word_of(node))
+        type_ = self._hinted(node, node.annotation, node.target.id)
+        found.append(self._store(node, [(node.target.id, self.fitting(node.value, type_))]))
+
+    def _augassign_statement(self, node: ast.AugAssign, found: list[Statement]) -> None:
+        self._check_target(node.target)
+        assert isinstance(node.target, ast.Name)
+        target = ast.copy_location(ast.Name(node.target.id, ast.Load()), node)
+        changed = ast.copy_location(ast.BinOp(target, node.op, node.value), node)
+        found.append(self._store(node, [(target.id, self.expression(changed))]))
+
+    def _check_target(self, node: ast.expr) -> None:
+        if isinstance(node, (ast.Tuple, ast.List)):
+            if isinstance(node, ast.List):
+                raise self._cannot(node, f"an assignment to {word_of(node)}")
+            parts = [part for part in ast.walk(node) if isinstance(part, ast.Name)]
+            names = [part.id for part in parts if part.id != "_"]
+            if len(names) != len({*names}):
+                raise self._cannot(node, "a name twice in one assignment")
+            for element in node.elts:
+                self._check_target(element)
+        elif not isinstance(node, ast.Name):
+            is_of_matrix = isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Tuple)
+            what = f"{word_of(node)} of a matrix" if is_of_matrix else word_of(node)
+            raise self._cannot(node, f"an assignment to {what}")
+
+    def _assign(self, target: ast.expr, value: ast.expr, found: list[Statement]) -> None:
+        if isinstance(target, ast.Name) and target.id == "_":
+            found.append(tree.Do(self.expression(value)))
+        elif isinstance(target, ast.Name):
+            known = (self.known or {}).get(target.id)
+            wanted = known[0] if known else None
+            found.append(self._store(target, [(target.id, self.expression(value, wanted))]))
+        elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
+            has_star = any(isinstance(one, ast.Starred) for one in value.elts)
+            if has_star or len(target.elts) != len(value.elts):
+                held = self._kept(self.expression(value), "all")
+                found += self._take_apart(target, held)
+                return
+            pairs = [*zip(target.elts, value.elts)]
+            if _names(target) & _names(value):
+                # All are computed before the first is stored.
+                values = [
+                    self._kept(self.expression(one), f"next_{i}")
+                    for i, (_, one) in enumerate(pairs)
+                ]
+                for (one, _), held in zip(pairs, values):
+                    found += self._take_apart(one, held)
+            elif all(isinstance(one, ast.Name) and one.id != "_" for one, _ in pairs):
+                made = [(ast.unparse(one), self.expression(other)) for one, other in pairs]
+                found.append(self._store(target, made))
+            else:
+                for one, other in pairs:
+                    self._assign(one, other, found)
+        else:
+            made_of = self.expression(value)
+            # A part that depends on what is given a value here is read before.
+            if not _is_fixed(made_of) or _names(target) & _names(value):
+                made_of = self._kept(made_of, self._name_of_all(target, value))
+            found += self._take_apart(target, made_of)
+
+    def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
+        """A name for what is taken apart: the name of the function it comes from."""
+        name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
+        return name.lstrip("_") or "all"
+
+    def _take_apart(self, target: ast.expr, value: Expression) -> list[Statement]:
+        made = list(self._taken_apart(target, value))
+        return [self._store(target, made)] if made else []
+
+    def _taken_apart(self, target: ast.expr, value: Expression) -> Iterator[tuple[str, Expression]]:
+        """The names in a target, each with its part of a value."""
+        if isinstance(target, ast.Name):
+            if target.id != "_":
+                yield target.id, value
+            return
+        assert isinstance(target, ast.Tuple)
+        parts = self._parts_of(target, value)
+        if len(parts) != len(target.elts):
+            raise _Outside(target, f"{len(target.elts)} names for {len(parts)} values")
+        for one, part in zip(target.elts, parts):
+            yield from self._taken_apart(one, part)
+
+    def _parts_of(self, node: ast.AST, value: Expression) -> list[Expression]:
+        """The elements of a value that has a name."""
+        if isinstance(value.type, Array):
+            return [Item(value, int_of(i)) for i in range(value.type.n)]
+        if isinstance(value.type, Record):
+            return [Field(value, name, part) for name, part in value.type.fields]
+        raise _Outside(node, "a number is taken apart")
+
+    def _store(self, node: ast.AST, values: Sequence[tuple[str, Expression]]) -> tree.Store:
+        """The statement that gives names their values, one after the other."""
+        stores = []
+        for name, value in values:
+            known = (self.known or {}).get(name)
+            if value.type == NOTHING:
+                raise _Outside(node, "what returns nothing is used as a value")
+            if known and known[0] == INT and getattr(value.type, "made", None):
+                value = _as_int(value)
+            if known and known[0] != value.type and not known[1]:
+                raise _Outside(node, self._other(name, known[0], value))
+            stores.append((self._variable(name, value.type), value))
+            self._know(name, value.type)
+        return tree.Store(stores)
+
+    def _other(self, name: str, before: Type, value: Expression) -> str:
+        if UNKNOWN in (before, value.type):
+            raise _Follows
+        if before == FLOAT and is_whole(value.type):
+            better = f"{value.value}.0" if isinstance(value, Number) else "float(...)"
+            return f"{name} is a float and gets an int: write {better}"
+        if is_whole(before) and value.type == FLOAT:
+            return f"{name} is {before.word} and gets a float: begin with a float, such as 0.0"
+        return f"{name} is {before.word} and gets {value.type.word}: use another name"
+
+    def _know(self, name: str, type_: Type) -> None:
+        """A name has a value from here on."""
+        if self.known is not None:
+            self.known = {**self.known, name: (type_, _PLAIN)}
+
+    def _forget(self, node: ast.AST) -> None:
+        """Names have a value from here on that has been refused."""
+        for name in _stored(node):
+            self._know(name, UNKNOWN)
+
+    def _variable(self, name: str, type_: Type) -> str:
+        """The variable of the tree that is a name with values of a type."""
+        if (name, type_) not in self._variables:
+            is_first = name not in self._variables.values()
+            self._variables[name, type_] = name if is_first else self._unused(name)
+        return self._variables[name, type_]
+
+    def _unused(self, name: str) -> str:
+        """A name for the tree only, which the function has not and gets now."""
+        names = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
+        found = next(n for n in names if n not in self._taken)
+        self._taken.add(found)
+        return found
+
+    def _held(self, value: Expression, name: str) -> Expression:
+        """A value that may be used several times: in a variable, if it is computed."""
+        return value if _is_fixed(value) else self._kept(value, name)
+
+    def _kept(self, value: Expression, name: str) -> Expression:
+        """A value in a variable of its own."""
+        if self._before is None:
+            raise _Outside(ast.Pass(), "this is computed only in some cases: give it a name before")
+        if value.type == NOTHING:
+            raise _Outside(ast.Pass(), "what returns nothing is used as a value")
+        found = self._unused(name)
+        self._before.append(tree.Store([(found, value)]))
+        return Local(found, value.type)
+
+    # Refusals of the component's own
+
+    def _raise_statement(self, node: ast.Raise, found: list[Statement]) -> None:
+        call = node.exc
+        if not isinstance(call, ast.Call) or len(call.args) != 1 or call.keywords or node.cause:
+            self.known = None
+            raise self._cannot(node, "a raise without a text")
+        kind = self._meant(call.func)
+        is_known = is_class(kind, BaseException) and issubclass(kind, _EXCEPTIONS)
+        if not is_known or kind.__str__ is not BaseException.__str__:
+            self.known = None
+            what = ast.unparse(call.func)
+            raise _Outside(node, f"{what} is not an exception: write raise Refusal(...)")
+        head = "" if kind is Refusal else f"{kind.__name__}: "
+        try:
+            found.append(tree.Raise([head, *self._message(call.args[0])]))
+        finally:
+            self.known = None
+
+    def _message(self, text: ast.expr) -> list[str | tuple[Expression, str]]:
+        """The texts and values of a text."""
+        if not isinstance(text, ast.JoinedStr):
+            if isinstance(text, ast.Constant) and isinstance(text.value, str):
+                return [text.value]
+            raise self._cannot(text, "a raise without a text")
+        found: list[str | tuple[Expression, str]] = []
+        for part in text.values:
+            if isinstance(part, ast.FormattedValue):
+                found.append(self._formatted(part))
+            else:
+                found.append(str(ast.literal_eval(part)))
+        return found
+
+    def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
+        """A value in a text, and its format."""
+        value = self.expression(part.value)
+        if part.conversion not in (-1, ord("s")):
+            raise _Outside(part.value, f"!{chr(part.conversion)} in a text: leave it out")
+        if any(isinstance(x, ast.FormattedValue) for x in getattr(part.format_spec, "values", ())):
+            raise _Outside(part.value, "a format that is computed")
+        how = "".join(ast.literal_eval(x) for x in getattr(part.format_spec, "values", ()))
+        if value.type in (TEXT, BOOL) and not how:
+            return value, ""
+        if is_whole(value.type) and how in ("", "d"):
+            return value, "d"
+        if is_number(value.type) and NUMBER_FORMAT.fullmatch(how):
+            return self._float(value), how
+        name = ast.unparse(part.value)
+        raise _Outside(part.value, f"{{{name}}} in a text: write {{{name}:g}}")
+
+    # Loops
+
+    def _loop(
+        self,
+        target: ast.expr,
+        iterable: ast.expr,
+        counter: Local,
+        hold: _Hold,
+    ) -> _Loop:
+        """What a loop goes over.
+
+        Args:
+            target: what gets the values.
+            iterable: what they come from.
+            counter: the number of the turn, or of a range.
+            hold: makes a value one that can be read in each turn.
+
+        """
+        called, call = self._called(iterable)
+        if call and called is range:
+            return self._range(target, call, counter, hold)
+        if call and called is reversed:
+            self._check_plain(call, "reversed", 1)
+            called, inner = self._called(call.args[0])
+            if inner and called is range:
+                return self._backward(target, inner, counter)
+        bound, n = self._items(target, iterable, counter, hold)
+        return _Loop(int_of(0), int_of(n), 1, n, bound)
+
+    def _called(self, node: ast.expr) -> tuple[Any, ast.Call | None]:
+        return (self._meant(node.func), node) if isinstance(node, ast.Call) else (None, None)
+
+    def _range(
+        self,
+        target: ast.expr,
+        call: ast.Call,
+        counter: Local,
+        hold: _Hold,
+    ) -> _Loop:
+        if not isinstance(target, ast.Name):
+            raise _Outside(target, "more than one name for the numbers of a range")
+        start, stop, step = bounds = self._bounds(call)
+        numbers = [one.value if isinstance(one, Number) else None for one in bounds]
+        if not numbers[2]:
+            raise _Outside(call, "a step of a range that is not a constant other than 0")
+        start, stop = hold(start, call, "start"), hold(stop, call, "stop")
+        turns = None if None in numbers else len(range(*numbers))
+        far = numbers[1] is None or abs(numbers[1] + numbers[2]) >= 2**31
+        is_wide = abs(numbers[2]) > 1 and far
+        bound = [] if target.id == "_" else [(target.id, counter)]
+        return _Loop(start, stop, numbers[2], turns, bound, is_wide)
+
+    def _backward(self, target: ast.expr, call: ast.Call, counter: Local) -> _Loop:
+        """The numbers of a range from the last to the first."""
+        if not isinstance(target, ast.Name):
+            raise _Outside(target, "more than one name for the numbers of a range")
+        numbers = [one.value if isinstance(one, Number) else None for one in self._bounds(call)]
+        if None in numbers or not numbers[2]:
+            raise _Outside(call, "reversed of a range of other than constants")
+        back = range(*numbers)[::-1]
+        check_int(back.stop)
+        bound = [] if target.id == "_" else [(target.id, counter)]
+        is_wide = abs(back.step) > 1 and abs(back.stop + back.step) >= 2**31
+        return _Loop(int_of(back.start), int_of(back.stop), back.step, len(back), bound, is_wide)
+
+    def _bounds(self, call: ast.Call) -> list[Expression]:
+        """Where a range begins and ends, and its step."""
+        self._check_plain(call, "range")
+        if not 1 <= len(call.args) <= 3:
+            raise _Outside(call, f"range with {len(call.args)} arguments")
+        bounds = [self._bound_of(argument) for argument in call.args]
+        if len(bounds) == 1:
+            bounds = [int_of(0), *bounds]
+        return [*bounds, int_of(1)][:3]
+
+    def _bound_of(self, node: ast.expr) -> Expression:
+        """A bound of a range; what consists of constants is the number that it stands for."""
+        value = self._size(node)
+        if value is not None:
+            check_int(value)
+            return int_of(value)
+        return self._integer(node, "a bound of a range")
+
+    def _items(
+        self,
+        target: ast.expr,
+        iterable: ast.expr,
+        place: Expression,
+        hold: _Hold,
+    ) -> tuple[list[tuple[str, Expression]], int]:
+        """Names with their values at a place, and how many places there are."""
+        called, call = self._called(iterable)
+        if call and called in (zip, enumerate):
+            return self._side_by_side(target, call, called, place, hold)
+        if call and called is range:
+            return self._numbers(target, call, place)
+        if call and called is reversed:
+            self._check_plain(call, "reversed", 1)
+            value = hold(self._array(call.args[0]), call.args[0], "all")
+            assert isinstance(value.type, Array)
+            last = int_of(value.type.n - 1)
+            down = Operation(tree.COUNT_MULTIPLY, (place, int_of(-1)), INT)
+            item = Item(value, Operation(tree.COUNT_ADD, (last, down), INT))
+        else:
+            value = hold(self._array(iterable), iterable, "all")
+            assert isinstance(value.type, Array)
+            item = Item(value, place)
+        return [*self._taken_apart(target, item)], value.type.n
+
+    def _array(self, node: ast.expr) -> Expression:
+        value = self.expression(node)
+        if not isinstance(value.type, Array):
+            what = "a loop over something other than a range, vector or tuple of one type"
+            raise _Outside(node, what)
+        return value
+
+    def _side_by_side(
+        self,
+        target: ast.expr,
+        call: ast.Call,
+        called: Any,
+        place: Expression,
+        hold: _Hold,
+    ) -> tuple[list[tuple[str, Expression]], int]:
+        """The items of `zip` and `enumerate`."""
+        first = 0
+        if called is enumerate:
+            words = [one for one in call.keywords if one.arg == "start"]
+            begin = [*call.args[1:], *(one.value for one in words)]
+            if begin:
+                number = self._size(begin[0])
+                if number is None:
+                    raise _Outside(call, "enumerate with a start that is no constant")
+                first = number
+            call = ast.copy_location(
+                ast.Call(call.func, call.args[:1], [k for k in call.keywords if k not in words]),
+                call,
+            )
+        self._check_plain(call, called.__name__)
+        if not isinstance(target, ast.Tuple):
+            raise _Outside(target, f"{called.__name__} without a name for each part")
+        if called is zip:
+            if len(target.elts) != len(call.args) or not call.args:
+                raise _Outside(target, "another number of names than zip has parts")
+            pairs = [self._items(t, i, place, hold) for t, i in zip(target.elts, call.args)]
+            return [one for bound, _ in pairs for one in bound], min(n for _, n in pairs)
+        if len(target.elts) != 2 or len(call.args) != 1:
+            raise _Outside(target, "enumerate without two names")
+        bound, n = self._items(target.elts[1], call.args[0], place, hold)
+        number_of = place
+        if first:
+            check_int(first + n)
+            number_of = Operation(tree.COUNT_ADD, (place, int_of(first)), INT)
+        return [*self._taken_apart(target.elts[0], number_of), *bound], n
+
+    def _numbers(
+        self, target: ast.expr, call: ast.Call, place: Expression
+    ) -> tuple[list[tuple[str, Expression]], int]:
+        """The numbers of a range that stands beside something else."""
+        numbers = [one.value if isinstance(one, Number) else None for one in self._bounds(call)]
+        first, stop, step = numbers
+        if first is None or stop is None or not step:
+            raise _Outside(call, "a range of other than constants within a zip")
+        n = len(range(first, stop, step))
+        if abs(step) * n >= 2**31:
+            raise _Outside(call, "a range of so many numbers within a zip")
+        moved = place if step == 1 else Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
+        item = Operation(tree.COUNT_ADD, (int_of(first), moved), INT) if first else moved
+        return [*self._taken_apart(target, item)], n
+
+    # Expressions
+
+    def expression(self, node: ast.expr, wanted: Type | None = None) -> Expression:
+        """An expression as a tree, of a type if there is a choice."""
+        name = f"_{type(node).__name__.lower()}"
+        if not hasattr(self, name):
+            raise self._cannot(node, word_of(node))
+        self._depth += 1
+        if self._depth > _DEEPEST:
+            raise _Outside(node, f"an expression of {_DEEPEST} levels: take it apart")
+        try:
+            found: Expression = getattr(self, name)(node, wanted)
+        except (_Outside, _Follows, RecursionError) as error:
+            if isinstance(error, _Outside) and not hasattr(error.node, "lineno"):
+                error.node = node
+            raise
+        except Exception as error:
+            said = (
+                str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+            )
+            raise _Outside(node, said) from None
+        finally:
+            self._depth -= 1
+        if found.type == UNKNOWN:
+            raise _Follows
+        return found
+
+    def fitting(self, node: ast.expr, wanted: Type | None) -> Expression:
+        """An expression of exactly this type."""
+        return self._fit(node, self.expression(node, wanted), wanted)
+
+    def _fit(self, node: ast.AST, value: Expression, wanted: Type | None) -> Expression:
+        """The tree of an expression, if it is of exactly this type."""
+        if wanted is None or value.type == wanted:
+            return value
+        if wanted == UNKNOWN:
+            raise _Follows
+        if wanted == INT and getattr(value.type, "made", None):
+            return _as_int(value)
+        if wanted == FLOAT and is_whole(value.type):
+            text = ast.unparse(node)
+            better = f"{text}.0" if text.removeprefix("-").isdecimal() else f"float({text})"
+            raise _Outside(node, f"{text} is an int where a float is wanted: write {better}")
+        if value.type == INT and getattr(wanted, "made", None):
+            what = f"an int where {wanted.word} is wanted: write {wanted.made.__name__}(...)"
+            raise _Outside(node, what)
+        raise _Outside(node, f"{value.type.word} where {wanted.word} is wanted")
+
+    def _number(self, node: ast.expr, value: Expression | None = None) -> Expression:
+        """An operand as a float."""
+        if isinstance(node, ast.Constant) and type(node.value) is int:
+            return Number(float(node.value), FLOAT)
+        value = value or self.expression(node)
+        if not is_number(value.type):
+            raise _Outside(node, f"{value.type.word} where a number is wanted")
+        return self._float(value)
+
+    def _float(self, value: Expression) -> Expression:
+        if value.type == FLOAT:
+            return value
+        return Operation(tree.TO_FLOAT, (value,), FLOAT)
+
+    def _integer(self, node: ast.expr, what: str) -> Expression:
+        """An expression that is an int."""
+        value = self.expression(node)
+        if not is_whole(value.type):
+            raise _Outside(node, f"{what} that is {value.type.word}, not an int")
+        return value
+
+    def _sometimes(self, make: Callable[[ast.expr], Expression], node: ast.expr) -> Expression:
+        """An expression that is computed in some cases only."""
+        before, self._before = self._before, None
+        try:
+            return make(node)
+        finally:
+            self._before = before
+
+    def _check_plain(self, node: ast.Call, word: str, n: int | None = None) -> None:
+        """Check that a call has arguments by their places only."""
+        if node.keywords:
+            raise _Outside(node, f"{word} with {node.keywords[0].arg or '**'}=")
+        if any(isinstance(argument, ast.Starred) for argument in node.args):
+            raise _Outside(node, f"{word} with a star")
+        if n is not None and len(node.args) != n:
+            raise _Outside(node, f"{word} with {len(node.args)} arguments")
+
+    # Names and constants
+
+    def _meant(self, node: ast.expr) -> Any:
+        """What a name of a module stands for; None: it is a local one, or an expression."""
+        if isinstance(node, ast.Name) and node.id not in self.names | self.functions.keys():
+            builtins: Any = self.scope.get("__builtins__", {})
+            builtins = builtins if isinstance(builtins, dict) else vars(builtins)
+            return self.scope.get(node.id, builtins.get(node.id))
+        if isinstance(node, ast.Attribute):
+            owner = self._meant(node.value)
+            if isinstance(owner, ModuleType) or is_class(owner, IntEnum):
+                return getattr(owner, node.attr, None)
+        return None
+
+    def _folded(self, node: ast.expr) -> float | None:
+        """The number that an expression of constants is; None: it is computed."""
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            operand = self._folded(node.operand)
+            return None if operand is None else -operand
+        if isinstance(node, ast.BinOp) and type(node.op) in _FOLDED:
+            one, other = self._folded(node.left), self._folded(node.right)
+            if one is None or other is None:
+                return None
+            with suppress(ArithmeticError):
+                return _FOLDED[type(node.op)](one, other)
+            return None
+        if isinstance(node, ast.Call) and self._meant(node.func) is len:
+            found = self.expression(node)
+            return int(found.value) if isinstance(found, Number) else None
+        value = node.value if isinstance(node, ast.Constant) else self._meant(node)
+        return value if type(value) in (int, float) else None  # type: ignore[return-value]
+
+    def _size(self, node: ast.expr | None) -> int | None:
+        """The int that an expression of constants is; None: it is none, or computed."""
+        value = None if node is None else self._folded(node)
+        return value if isinstance(value, int) else None
+
+    def _constant(self, node: ast.Constant, wanted: Type | None) -> Expression:
+        value: Any = node.value
+        if isinstance(value, str):
+            return tree.Text(value)
+        if type(value) not in (bool, int, float):
+            raise self._cannot(node, f"the constant {value!r}")
+        if type(value) is int:
+            check_int(value)
+        return Number(value, type_of_value(value, ""))
+
+    def _name(self, node: ast.Name, wanted: Type | None) -> Expression:
+        if node.id == "_":
+            raise self._cannot(node, "a value of _")
+        if node.id in self.functions and node.id not in self.names:
+            raise _Outside(node, f"{node.id} is a function: call it")
+        if node.id not in self.names:
+            return self._of_module(node)
+        return self._local(node, node.id)
+
+    def _local(self, node: ast.AST, name: str) -> Expression:
+        if self.known is None:
+            types = [type_ for one, type_ in self._variables if one == name]
+            if not types:
+                raise _Follows
+            return Local(self._variables[name, types[-1]], types[-1])
+        if name not in self.known:
+            raise _Outside(node, f"{name} may have no value here")
+        type_, loops = self.known[name]
+        for turns in loops - {*self._loops}:
+            turns.escapes = True
+        if type_ == UNKNOWN:
+            raise _Follows
+        if name in self.functions:
+            raise _Outside(node, f"{name} is a function: call it")
+        return Local(self._variable(name, type_), type_)
+
+    def _of_module(self, node: ast.expr) -> Expression:
+        name = node.id if isinstance(node, ast.Name) else ast.unparse(node).rsplit(".")[-1]
+        value = self._meant(node)
+        if value is None:
+            shown = ast.unparse(node)
+            known = advice(f"the name {shown}")
+            raise _Outside(node, self._foreign(f"the name {shown}") if known else
+                           f"the name {shown} is not known here")  # fmt: skip
+        if isinstance(value, ModuleType):
+            what = f"the module {value.__name__}"
+            raise _Outside(node, f"{what} is not a value: name a part of it")
+        if callable(value):
+            raise self._cannot(node, f"the name {ast.unparse(node)}")
+        # It bears the name of the module that it stands in, wherever it was imported.
+        owner = self._meant(node.value) if isinstance(node, ast.Attribute) else None
+        here = sys.modules.get(self.scope["__name__"])
+        module = owner if isinstance(owner, ModuleType) else here
+        home = self.scope["__name__"] if module is None else _home(module, name)
+        if isinstance(value, IntEnum):
+            home, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
+        elif (home == "math" or owner is math) and type(value) is float:
+            return Number(value, FLOAT)
+        return self._constant_of(home, name, value)
+
+    def _constant_of(
+        self, module: str, name: str, value: Any, wanted: Type | None = None
+    ) -> Expression:
+        type_ = wanted or type_of_value(value, name)
+        check_value(value, type_, name)
+        return tree.Constant(module, name, value, type_)
+
+    def _attribute(self, node: ast.Attribute, wanted: Type | None) -> Expression:
+        owner = self._meant(node.value)
+        if isinstance(owner, ModuleType) or is_class(owner, IntEnum):
+            return self._of_module(node)
+        value = self.expression(node.value)
+        if node.attr == "T" and is_algebraic(value.type) and len(sizes(value.type)) == 2:
+            return arrays.transpose(self.program, value)
+        if isinstance(value.type, Record) and value.type.made:
+            for name, part in value.type.fields:
+                if name == node.attr:
+                    return Field(value, name, part)
+        raise _Outside(node, f"{node.attr} is not a field of {value.type.word}")
+
+    # Elements
+
+    def _subscript(self, node: ast.Subscript, wanted: Type | None) -> Expression:
+        value = self.expression(node.value)
+        if isinstance(node.slice, ast.Slice):
+            return self._slice(node, node.slice, value)
+        if not isinstance(node.slice, ast.Tuple):
+            return self._element(node, node.slice, value)
+        if getattr(value.type, "made", None) is not Matrix:
+            raise _Outside(node, f"two subscripts of {value.type.word}")
+        for place in node.slice.elts:
+            if isinstance(place, ast.Slice):
+                raise _Outside(node, "a slice of a Matrix: its column j is A.T[j], its row i A[i]")
+            value = self._element(node, place, value)
+        return value
+
+    def _element(self, node: ast.Subscript, place: ast.expr, value: Expression) -> Expression:
+        type_ = value.type
+        n = type_.n if isinstance(type_, Array) else len(parts_of(type_))
+        key = _constant(place)
+        if key is None:
+            key = self._size(place)
+            if isinstance(type_, Array) and key not in range(-n, n):
+                key = None
+        if isinstance(key, int) and not isinstance(key, bool):
+            key += n if key < 0 else 0
+        if key is not None:
+            if type(key) is not int or not 0 <= key < n:
+                raise _Outside(node, f"there is no element {ast.unparse(place)} here")
+            if isinstance(type_, Array):
+                return Item(value, int_of(key))
+            assert isinstance(type_, Record)
+            return Field(value, *type_.fields[key])
+        if not isinstance(type_, Array):
+            kinds = {*parts_of(type_)}
+            what = "something other than a tuple of parts of one type"
+            if kinds == {FLOAT, INT} and not getattr(type_, "made", None):
+                what = "a tuple of ints and floats: write all of them as floats"
+            raise _Outside(node, f"a computed subscript of {what}")
+        where = self._integer(place, "a subscript")
+        return Item(value, Operation(tree.PLACE, (where, int_of(n)), INT))
+
+    def _slice(self, node: ast.Subscript, places: ast.Slice, value: Expression) -> Expression:
+        if getattr(value.type, "made", None) is Matrix:
+            raise _Outside(node, "a slice of a Matrix: write Matrix((A[0], A[1]))")
+        parts = self._sliced(node, places, value)
+        if is_algebraic(value.type):
+            return Make(vector(len(parts)), parts)
+        return Make(tuple_of([part.type for part in parts]), parts)
+
+    def _sliced(
+        self, node: ast.Subscript, places: ast.Slice, value: Expression
+    ) -> list[Expression]:
+        """The elements of a constant slice."""
+        bounds = [places.lower, places.upper, places.step]
+        numbers = [self._size(bound) for bound in bounds]
+        are_known = all(n is not None or bound is None for n, bound in zip(numbers, bounds))
+        if not are_known or not isinstance(value.type, (Array, Record)):
+            raise _Outside(node, "a slice other than a constant one of a vector or tuple")
+        if numbers[2] == 0:
+            raise _Outside(node, "a slice with a step of 0")
+        parts = self._parts_of(node, self._held(value, "all"))[slice(*numbers)]
+        if not parts:
+            raise _Outside(node, "a slice without elements")
+        return parts
+
+    # Tuples
+
+    def _tuple(self, node: ast.Tuple, wanted: Type | None) -> Expression:
+        types = parts_of(wanted) if wanted is not None and not getattr(wanted, "made", 1) else ()
+        values = self._elements(node.elts, types)
+        made = wanted if types else tuple_of([value.type for value in values])
+        assert made is not None
+        if len(values) != len(parts_of(made)):
+            raise _Outside(node, f"{len(values)} values for {len(parts_of(made))}")
+        return Make(made, values)
+
+    def _elements(
+        self, nodes: Sequence[ast.expr], types: Sequence[Type | None]
+    ) -> list[Expression]:
+        """Expressions, of which those with a star stand for their elements."""
+        values: list[Expression] = []
+        for node in nodes:
+            if isinstance(node, ast.Starred):
+                parts = self._unpacked(node.value)
+                wanted = [*types[len(values) :], *[None] * len(parts)]
+                values += [self._fit(node, *one) for one in zip(parts, wanted)]
+            else:
+                wanted = [*types[len(values) :], None]
+                values.append(self.fitting(node, wanted[0]))
+        return values
+
+    def _unpacked(self, node: ast.expr) -> list[Expression]:
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
+            return self._sliced(node, node.slice, self.expression(node.value))
+        return self._parts_of(node, self._held(self.expression(node), "all"))
+
+    # Operators
+
+    def _binop(self, node: ast.BinOp, wanted: Type | None) -> Expression:
+        if isinstance(node.op, ast.Mult) and isinstance(node.left, (ast.Tuple, ast.List)):
+            return self._repeated(node, node.left, node.right)
+        left = self.expression(node.left)
+        if isinstance(node.op, ast.Pow):
+            return self._power(node, left)
+        right = self.expression(node.right)
+        if is_algebraic(left.type) or is_algebraic(right.type):
+            return self._of_arrays(node, left, right)
+        for side, value in ((node.left, left), (node.right, right)):
+            if not is_number(value.type):
+                raise _Outside(side, f"{value.type.word} where a number is wanted")
+        if type(node.op) not in _ARITHMETIC:
+            raise self._cannot(node, f"the operator {word_of(node.op)}")
+        of_floats, of_ints = _ARITHMETIC[type(node.op)]
+        if FLOAT not in (left.type, right.type):
+            type_ = FLOAT if isinstance(node.op, ast.Div) else INT
+            return Operation(of_ints, (left, right), type_)
+        operands = self._number(node.left, left), self._number(node.right, right)
+        if of_floats is tree.DIVIDE and isinstance(operands[1], Number) and operands[1].value:
+            of_floats = tree.OVER
+        return Operation(of_floats, operands, FLOAT)
+
+    def _repeated(self, node: ast.AST, items: ast.Tuple | ast.List, times: ast.expr) -> Expression:
+        """A tuple some times over."""
+        if isinstance(items, ast.List):
+            raise self._cannot(items, word_of(items))
+        n, values = self._size(times), self._elements(items.elts, ())
+        if n is None or n < 1:
+            raise _Outside(node, "a tuple a number of times that is not a constant above 0")
+        return Make(tuple_of([value.type for value in values] * n), values * n)
+
+    def _power(self, node: ast.BinOp, base: Expression) -> Expression:
+        exponent = self._folded(node.right)
+        if exponent is None or not float(exponent).is_integer():
+            raise self._cannot(node, "** with other than a whole constant")
+        if not is_number(base.type):
+            raise _Outside(node.left, f"{base.type.word} where a number is wanted")
+        if is_whole(base.type) and isinstance(exponent, int) and exponent >= 0:
+            check_int(exponent)
+            return Operation(tree.INT_POWER, (base, int_of(exponent)), INT)
+        operands = self._number(node.left, base), Number(float(exponent), FLOAT)
+        return Operation(tree.POWER, operands, FLOAT)
+
+    def _of_arrays(self, node: ast.BinOp, left: Expression, right: Expression) -> Expression:
+        operands = [
+            self._number(one, value) if is_number(value.type) else value
+            for one, value in ((node.left, left), (node.right, right))
+        ]
+        found = arrays.binary(self.program, node.op, operands[0], operands[1])
+        if found is None:
+            sign = ast.unparse(ast.BinOp(ast.Name("a"), node.op, ast.Name("b")))[2:-2]
+            what = f"{left.type.word} {sign} {right.type.word} is not defined"
+            raise _Outside(node, what)
+        return found
+
+    def _unaryop(self, node: ast.UnaryOp, wanted: Type | None) -> Expression:
+        if isinstance(node.op, ast.Not):
+            return Operation(tree.NOT, (self.condition(node.operand),), BOOL)
+        if isinstance(node.op, ast.Invert):
+            raise self._cannot(node, f"the operator {word_of(node.op)}")
+        is_minus = isinstance(node.op, ast.USub)
+        if is_minus and isinstance(node.operand, ast.Constant) and type(node.operand.value) is int:
+            check_int(-node.operand.value)
+            return Number(-node.operand.value, INT)
+        operand = self.expression(node.operand)
+        if is_algebraic(operand.type) and is_minus:
+            return arrays.negative(self.program, operand)
+        if not is_number(operand.type):
+            raise _Outside(node, f"{operand.type.word} where a number is wanted")
+        if not is_minus:
+            # Of a bool it makes an int.
+            return operand if operand.type == FLOAT else _as_int(operand)
+        if is_whole(operand.type):
+            return Operation(tree.INT_NEGATIVE, (operand,), INT)
+        return Operation(tree.NEGATIVE, (operand,), FLOAT)
+
+    def condition(self, node: ast.expr) -> Expression:
+        """An expression as a truth value."""
+        if isinstance(node, ast.BoolOp):
+            return self._joined(node, self.condition)
+        value = self.expression(node)
+        if value.type == FLOAT:
+            return Operation(tree.NOT_EQUAL, (value, Number(0.0, FLOAT)), BOOL)
+        if not is_whole(value.type):
+            raise _Outside(node, f"{value.type.word} as a condition")
+        return value
+
+    def _boolop(self, node: ast.BoolOp, wanted: Type | None) -> Expression:
+        def of_bool(one: ast.expr) -> Expression:
+            value = self.expression(one)
+            if value.type != BOOL:
+                what = f"{value.type.word} before or after and, or: write a comparison"
+                raise _Outside(one, what)
+            return value
+
+        return self._joined(node, of_bool)
+
+    def _joined(self, node: ast.BoolOp, make: Callable[[ast.expr], Expression]) -> Expression:
+        first, *others = node.values
+        values = [make(first), *(self._sometimes(make, other) for other in others)]
+        return Operation(tree.OR if isinstance(node.op, ast.Or) else tree.AND, values, BOOL)
+
+    def _compare(self, node: ast.Compare, wanted: Type | None) -> Expression:
+        nodes = [node.left, *node.comparators]
+        values = [self.expression(nodes[0]), self.expression(nodes[1])]
+        values += [self._sometimes(self.expression, one) for one in nodes[2:]]
+        parts = []
+        for op, left, right, one, other in zip(node.ops, nodes, nodes[1:], values, values[1:]):
+            if type(op) not in _COMPARISONS:
+                raise self._cannot(node, "a comparison other than of size")
+            for side, value in ((left, one), (right, other)):
+                if not is_number(value.type):
+                    raise _Outside(side, f"a comparison of {value.type.word}")
+            if FLOAT in (one.type, other.type):
+                one, other = self._number(left, one), self._number(right, other)
+            parts.append(Operation(_COMPARISONS[type(op)], (one, other), BOOL))
+        return parts[0] if len(parts) == 1 else Operation(tree.AND, parts, BOOL)
+
+    def _ifexp(self, node: ast.IfExp, wanted: Type | None) -> Expression:
+        test = self.condition(node.test)
+        one, other = (
+            self._sometimes(lambda side: self.expression(side, wanted), side)
+            for side in (node.body, node.orelse)
+        )
+        if FLOAT in (one.type, other.type):
+            one = self._fit(node.body, one, FLOAT)
+            other = self._fit(node.orelse, other, FLOAT)
+        elif one.type != other.type and INT in (one.type, other.type):
+            # A member of an enumeration beside an int is one.
+            one, other = self._fit(node.body, one, INT), self._fit(node.orelse, other, INT)
+            return Choice(test, _as_int(one), _as_int(other))
+        return Choice(test, one, self._fit(node.orelse, other, one.type))
+
+    # Calls
+
+    def _call(self, node: ast.Call, wanted: Type | None) -> Expression:
+        local = node.func.id if isinstance(node.func, ast.Name) else ""
+        if local in self.functions:
+            if self.known is not None and local not in self.known:
+                raise _Outside(node, f"{local} may have no value here")
+            return self._call_of(node, self.functions[local])
+        if not isinstance(node.func, (ast.Name, ast.Attribute)):
+            raise self._cannot(node, word_of(node.func))
+        called = self._meant(node.func)
+        if called is None and isinstance(node.func, ast.Attribute):
+            return self._method(node, node.func)
+        if called in (Vector, Matrix, tuple):
+            return self._made_array(node, called)
+        if isinstance(called, BuiltinFunctionType) and called in BY_FUNCTION:
+            return self._mathematics(node, BY_FUNCTION[called])
+        for function, make in _BUILT_IN.items():
+            if called is function:
+                return make(self, node)
+        if is_record(called):
+            return self._record(node, called)
+        if is_class(called, IntEnum):
+            return self._member(node, called)
+        if isinstance(called, FunctionType) and _is_at_hand(
+            called, self.path, self.scope["__name__"]
+        ):
+            return self._function(node, called)
+        what = f"the name {ast.unparse(node.func)}"
+        if advice(what):
+            raise self._cannot(node, what)
+        raise _Outside(node, f"{ast.unparse(node.func)} is not a function of equations")
+
+    def _mathematics(self, node: ast.Call, name: str) -> Expression:
+        about = FUNCTIONS[name]
+        self._check_plain(node, name, about.arguments)
+        if about.result == INT:
+            return self._to_int(node.args[0], name)
+        values = [self._number(argument) for argument in node.args]
+        if about.factor:
+            return Operation(tree.MULTIPLY, (values[0], Number(about.factor, FLOAT)), FLOAT)
+        return Operation(tree.MATHEMATICS[name], values, about.result)
+
+    def _to_int(self, node: ast.expr, name: str) -> Expression:
+        value = self.expression(node)
+        if not is_number(value.type):
+            raise _Outside(node, f"{name} of {value.type.word}")
+        if value.type != FLOAT:
+            return _as_int(value)
+        if name == "round":
+            whole: Expression = Operation(tree.NEAREST, (value,), FLOAT)
+        else:
+            word = "trunc" if name == "int" else name
+            whole = Operation(tree.MATHEMATICS[word], (value,), FLOAT)
+        return Operation(tree.TO_INT, (whole,), INT)
+
+    def _of_number(self, node: ast.Call, name: str) -> Expression:
+        self._check_plain(node, name, 1)
+        value = self.expression(node.args[0])
+        if not is_number(value.type):
+            raise _Outside(node, f"{name} of {value.type.word}")
+        return value
+
+    def _abs(self, node: ast.Call) -> Expression:
+        value = self._of_number(node, "abs")
+        if value.type == FLOAT:
+            return Operation(tree.ABS, (value,), FLOAT)
+        return Operation(tree.INT_ABS, (value,), INT)
+
+    def _bool(self, node: ast.Call) -> Expression:
+        return Operation(tree.TO_BOOL, (self._of_number(node, "bool"),), BOOL)
+
+    def _float_of(self, node: ast.Call) -> Expression:
+        return self._float(self._of_number(node, "float"))
+
+    def _int(self, node: ast.Call) -> Expression:
+        self._check_plain(node, "int", 1)
+        return self._to_int(node.args[0], "int")
+
+    def _round(self, node: ast.Call) -> Expression:
+        self._check_plain(node, "round", 1)
+        return self._to_int(node.args[0], "round")
+
+    def _len(self, node: ast.Call) -> Expression:
+        self._check_plain(node, "len", 1)
+        value = self.expression(node.args[0])
+        if not isinstance(value.type, (Array, Record)):
+            raise _Outside(node, "len of a number")
+        if value.fails:
+            self._held(value, "all")
+        return int_of(len(parts_of(value.type)))
+
+    def _min(self, node: ast.Call) -> Expression:
+        return self._extreme(node, "min")
+
+    def _max(self, node: ast.Call) -> Expression:
+        return self._extreme(node, "max")
+
+    def _extreme(self, node: ast.Call, word: str) -> Expression:
+        self._check_plain(node, word)
+        if len(node.args) == 1:
+            if isinstance(node.args[0], ast.GeneratorExp):
+                return self._reduced(node.args[0], word)
+            value = self.expression(node.args[0])
+            if not isinstance(value.type, Array):
+                raise _Outside(node, f"{word} of {value.type.word}")
+            if not is_number(value.type.item):
+                raise _Outside(node, f"{word} of {value.type.item.word}")
+            return arrays.extreme(self.program, word, value)
+        if not node.args:
+            raise _Outside(node, f"{word} without arguments")
+        values = [self.expression(argument) for argument in node.args]
+        for argument, value in zip(node.args, values):
+            if not is_number(value.type):
+                raise _Outside(argument, f"{word} of {value.type.word}")
+        if any(value.type == FLOAT for value in values):
+            values = [self._fit(one, value, FLOAT) for one, value in zip(node.args, values)]
+        elif any(value.type != values[0].type for value in values):
+            values = [*map(_as_int, values)]
+        found = values[0]
+        for value in values[1:]:
+            found = arrays.extreme_of_two(word, found, value)
+        return found
+
+    def _sum(self, node: ast.Call) -> Expression:
+        return self._of_generator(node, "sum")
+
+    def _any(self, node: ast.Call) -> Expression:
+        return self._of_generator(node, "any")
+
+    def _all(self, node: ast.Call) -> Expression:
+        return self._of_generator(node, "all")
+
+    def _of_generator(self, node: ast.Call, word: str) -> Expression:
+        self._check_plain(node, word, 1)
+        [given] = node.args
+        if not isinstance(given, ast.GeneratorExp):
+            if isinstance(given, ast.ListComp):
+                raise self._cannot(node, f"{word} of a list")
+            raise self._cannot(node, f"the name {word}")
+        return self._reduced(given, word)
+
+    # Vectors, matrices and tuples
+
+    def _made_array(self, node: ast.Call, made: Any) -> Expression:
+        self._check_plain(node, made.__name__)
+        if len(node.args) != 1:
+            raise _Outside(node, f"{made.__name__} of other than one argument")
+        given = self._unrolled(node.args[0])
+        if isinstance(given, ast.GeneratorExp):
+            return self._comprehension(given, made)
+        if isinstance(given, (ast.List, ast.Tuple)) and made is Matrix:
+            rows = [self._row(self._unrolled(row)) for row in given.elts]
+        elif isinstance(given, (ast.List, ast.Tuple)):
+            values = self._elements(given.elts, ())
+            return self._collected(node, made, values)
+        else:
+            value = self.expression(given)
+            if getattr(value.type, "made", None) is made and made is not tuple:
+                return value
+            parts = self._parts_of(given, self._held(value, "all"))
+            if made is not Matrix:
+                return self._collected(node, made, parts)
+            rows = [self._as_row(given, part) for part in parts]
+        if not rows or any(row.type != rows[0].type for row in rows):
+            raise _Outside(node, "a Matrix of rows of different lengths")
+        return Make(matrix(len(rows), *sizes(rows[0].type)), rows)
+
+    def _unrolled(self, node: ast.expr) -> ast.expr:
+        """A list or a tuple that is written some times over, written out."""
+        if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
+            return node
+        items, times = node.left, self._size(node.right)
+        if not isinstance(items, (ast.List, ast.Tuple)) or times is None:
+            return node
+        return ast.copy_location(ast.Tuple(items.elts * times, ast.Load()), node)
+
+    def _collected(self, node: ast.AST, made: Any, values: Sequence[Expression]) -> Expression:
+        """A vector or a tuple of some values."""
+        if made is tuple:
+            return Make(tuple_of([value.type for value in values]), values)
+        for value in values:
+            if not is_number(value.type):
+                raise _Outside(node, f"{value.type.word} in a Vector")
+        return Make(vector(len(values)), [*map(self._float, values)])
+
+    def _row(self, node: ast.expr) -> Expression:
+        if isinstance(node, (ast.List, ast.Tuple)):
+            return self._collected(node, Vector, self._elements(node.elts, ()))
+        if isinstance(node, ast.GeneratorExp):
+            return self._comprehension(node, Vector)
+        return self._as_row(node, self.expression(node))
+
+    def _as_row(self, node: ast.expr, value: Expression) -> Expression:
+        if getattr(value.type, "made", None) is Vector:
+            return value
+        return self._collected(node, Vector, self._parts_of(node, self._held(value, "row")))
+
+    # Expressions with a for
+
+    def _comprehension(self, node: ast.GeneratorExp, made: Any) -> Expression:
+        """A vector, a matrix or a tuple of what an expression gives in a loop."""
+        if node.generators[0].ifs:
+            raise _Outside(node, "an if in an expression of a fixed size")
+
+        def fill(inner: _Builder, loop: _Loop, counter: Local) -> _Filled:
+            if not loop.turns:
+                raise _Outside(node, "a number of elements that is not a constant above 0")
+            before: list[Statement] = []
+            inner._before = before
+            element = inner._row(node.elt) if made is Matrix else inner.expression(node.elt)
+            inner._before = None
+            if made is Matrix:
+                type_: Array = matrix(loop.turns, *sizes(element.type))
+            elif made is tuple:
+                found = tuple_of([element.type] * loop.turns)
+                assert isinstance(found, Array)
+                type_ = found
+            else:
+                if not is_number(element.type):
+                    raise _Outside(node, f"{element.type.word} in a Vector")
+                element, type_ = inner._float(element), vector(loop.turns)
+            elements, place = inner._unused("elements"), Local(inner._unused("place"), INT)
+            where: Expression = counter
+            moves = not (
+                isinstance(loop.start, Number) and loop.start.value == 0 and loop.step == 1
+            )
+            if moves:
+                where = place
+                following = Operation(tree.COUNT_ADD, (place, int_of(1)), INT)
+                before.append(tree.StoreItem(elements, [where], element))
+                before.append(tree.Store([(place.name, following)]))
+            else:
+                before.append(tree.StoreItem(elements, [where], element))
+            first = [tree.Store([(place.name, int_of(0))])] if moves else []
+            return _Filled(
+                [tree.Reserve(elements, type_), *first], before,
+                tree.Return(Local(elements, type_)), type_,
+            )  # fmt: skip
+
+        return self._in_a_loop(node, fill)
+
+    def _generatorexp(self, node: ast.GeneratorExp, wanted: Type | None) -> Expression:
+        raise self._cannot(node, word_of(node))
+
+    def _reduced(self, node: ast.GeneratorExp, word: str) -> Expression:
+        """What `sum`, `min`, `max`, `any` or `all` makes of an expression in a loop."""
+        tests = node.generators[0].ifs
+
+        def fill(inner: _Builder, loop: _Loop, counter: Local) -> _Filled:
+            block: list[Statement] = []
+            inner._before = block
+            test = None
+            if tests:
+                conditions = [
+                    inner.condition(tests[0]),
+                    *(inner._sometimes(inner.condition, one) for one in tests[1:]),
+                ]
+                test = conditions[0]
+                if len(tests) > 1:
+                    test = Operation(tree.AND, conditions, BOOL)
+                inner._before = None
+            if word in ("any", "all"):
+                value = inner.condition(node.elt)
+                is_any = word == "any"
+                left = value if is_any else Operation(tree.NOT, (value,), BOOL)
+                block.append(
+                    tree.If(left if test is None else Operation(tree.AND, (test, left), BOOL),
+                            [tree.Return(Number(is_any, BOOL))])
+                )  # fmt: skip
+                return _Filled((), block, tree.Return(Number(not is_any, BOOL)), BOOL)
+            value = inner.expression(node.elt)
+            if not is_number(value.type):
+                raise _Outside(node, f"{word} of {value.type.word}")
+            found = inner._unused("found")
+            if word == "sum":
+                if value.type == FLOAT:
+                    raise self._cannot(node, "sum of floats")
+                total = Operation(tree.INT_ADD, (Local(found, INT), value), INT)
+                add: Statement = tree.Store([(found, total)])
+                block.append(add if test is None else tree.If(test, [add]))
+                start: list[Statement] = [tree.Store([(found, int_of(0))])]
+                return _Filled(start, block, tree.Return(Local(found, INT)), INT)
+            if test is not None or not loop.turns:
+                raise _Outside(node, f"{word} of a number of values that is not a constant above 0")
+            each = Local(inner._unused("each"), value.type)
+            block.append(tree.Store([(each.name, value)]))
+            is_first = Operation(tree.EQUAL, (counter, loop.start), BOOL)
+            kept = Local(found, value.type)
+            next_ = Choice(is_first, each, arrays.extreme_of_two(word, kept, each))
+            block.append(tree.Store([(found, next_)]))
+            zero: Expression = Number(0.0, FLOAT) if value.type == FLOAT else int_of(0)
+            start = [tree.Store([(found, zero)])]
+            return _Filled(start, block, tree.Return(kept), value.type)
+
+        return self._in_a_loop(node, fill)
+
+    def _in_a_loop(
+        self, node: ast.GeneratorExp, fill: Callable[[_Builder, _Loop, Local], _Filled]
+    ) -> Expression:
+        """A function of its own with a loop, called with what it needs."""
+        if len(node.generators) > 1 or node.generators[0].is_async:
+            raise _Outside(node, "an expression with more than one for")
+        [generator] = node.generators
+        self._check_target(generator.target)
+        own, first = _names(generator.target), _first_name(generator.target)
+        self._parts += 1
+        inner = self._inner(f"each{self._parts}", own)
+        given: dict[str, Expression] = {}
+        inside = [name for name in _free(node.elt, *generator.ifs) if name not in own]
+        for name in dict.fromkeys(inside):
+            if name in self.names and name not in self.functions:
+                given[name] = self._local(node, name)
+        inner.names = {*given, *own}
+        inner._start({name: value.type for name, value in given.items()})
+        for name in dict.fromkeys(n for one in inside for n in self._captured_by(one)):
+            if name in given:
+                continue
+            argument = inner._unused(name) if name in own else name
+            given[argument] = self._closed(node, name)
+            inner._closure[name] = Local(argument, given[argument].type)
+        counter = Local(inner._unused(f"{first}_at"), INT)
+
+        def hold(value: Expression, source: ast.expr, word: str) -> Expression:
+            """Pass what the loop goes over."""
+            if isinstance(value, (tree.Constant, Number)):
+                return value
+            is_free = isinstance(value, Local) and value.name not in {*own, *given}
+            name = value.name if is_free else inner._unused(f"{first}_{word}")
+            given[name] = value
+            return Local(name, value.type)
+
+        loop = self._loop(generator.target, generator.iter, counter, hold)
+        stores = [inner._store(node, [each]) for each in loop.bound]
+        filled = fill(inner, loop, counter)
+        made = loop.made(counter, [*stores, *filled.body])
+        if any(value is counter for _, value in loop.bound) and not loop.is_wide:
+            inner._counted.append(_Turns(made, counter))
+        inner.made.returns = filled.type
+        inner.made.arguments = {name: value.type for name, value in given.items()}
+        inner._end([*filled.before, made, filled.after])
+        self.program.functions["inner", inner.made] = inner.made
+        return Call(inner.made, [*given.values()])
+
+    # Methods, records and functions
+
+    def _method(self, node: ast.Call, method: ast.Attribute) -> Expression:
+        owner = self.expression(method.value)
+        type_, name = owner.type, method.attr
+        if name == "_replace" and isinstance(type_, Record) and type_.made:
+            return self._changed(node, owner)
+        is_known = name == "replaced" or (name == "sum" and len(sizes(type_)) == 1)
+        if not (is_algebraic(type_) and is_known):
+            raise _Outside(node, f"{type_.word} has no method {name} in the language")
+        self._check_plain(node, name, 0 if name == "sum" else 2)
+        if name == "sum":
+            return arrays.sum_of(self.program, owner)
+        assert isinstance(type_, Array)
+        place = self.fitting(node.args[0], INT)
+        value = (
+            self._number(node.args[1])
+            if type_.item == FLOAT
+            else self.fitting(node.args[1], type_.item)
+        )
+        return arrays.replaced(self.program, owner, place, value)
+
+    def _changed(self, node: ast.Call, owner: Expression) -> Expression:
+        """A record with other values of some fields."""
+        if node.args:
+            raise _Outside(node, "_replace without names of fields")
+        assert isinstance(owner.type, Record)
+        owner = self._held(owner, "all")
+        given = {str(keyword.arg): keyword.value for keyword in node.keywords}
+        values = []
+        for name, part in owner.type.fields:
+            value = given.pop(name, None)
+            values.append(Field(owner, name, part) if value is None else self.fitting(value, part))
+        for name in given:
+            raise _Outside(node, f"{name} is not a field of {owner.type.word}")
+        return Make(owner.type, values)
+
+    def _record(self, node: ast.Call, made: Any) -> Expression:
+        type_ = type_of(made)
+        assert isinstance(type_, Record)
+        wanted = dict(type_.fields)
+        given = self._elements(node.args, [*wanted.values()])
+        if len(given) > len(wanted):
+            raise _Outside(node, f"{len(given)} values for {len(wanted)} fields")
+        values: dict[str, Expression] = dict(zip(wanted, given))
+        for keyword in node.keywords:
+            name = str(keyword.arg)
+            if keyword.arg is None:
+                raise self._cannot(node, "a call with **")
+            if name not in wanted or name in values:
+                raise _Outside(node, f"{name} is not a further field of {type_.word}")
+            values[name] = self.fitting(keyword.value, wanted[name])
+        for name, value in made._field_defaults.items():
+            if name not in values:
+                values[name] = self._default(made.__module__, f"{made.__name__}_{name}", name,
+                                             value, wanted[name])  # fmt: skip
+        if len(values) != len(wanted):
+            raise _Outside(node, f"{len(values)} values for {len(wanted)} fields")
+        return Make(type_, [values[name] for name in wanted])
+
+    def _member(self, node: ast.Call, made: Any) -> Expression:
+        """The member of an enumeration that an int stands for."""
+        self._check_plain(node, made.__name__, 1)
+        given, type_ = self._integer(node.args[0], made.__name__), enumeration(made)
+
+        def body() -> Sequence[Statement]:
+            k = Local("k", INT)
+            known = self._is_one_of(k, [int_of(int(member)) for member in made])
+            parts = ["ValueError: ", (k, "d"), f" is not a valid {made.__qualname__}"]
+            return [
+                tree.If(Operation(tree.NOT, (known,), BOOL), [tree.Raise(parts)]),
+                tree.Return(Operation(tree.AS_INT, (k,), type_)),
+            ]
+
+        of = self.program.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
+        return Call(of, (_as_int(given),))
+
+    def _default(self, module: str, name: str, field: str, value: Any, wanted: Type) -> Expression:
+        if isinstance(wanted, (Array, Record)):
+            found = type_of_value(value, f"the default value of {field}")
+            if found != wanted:
+                raise TypeError(f"the default value of {field} is {found.word}")
+            return self._constant_of(module, name, value)
+        check_value(value, wanted, f"the default value of {field}")
+        return Number(value, wanted)
+
+    def _function(self, node: ast.Call, called: FunctionType) -> Expression:
+        hints = hints_of(called)
+        code = called.__code__
+        names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
+        function = None
+        if any(has_no_size(hints.get(name)) for name in names):
+            sized = (name for name in names if name in hints and not has_no_size(hints[name]))
+            types: Mapping[str, Type] = {name: type_of(hints[name]) for name in sized}
+        else:
+            function = self.program.function(called)
+            types = function.arguments
+        defaults = [*(called.__defaults__ or ())]
+        values: dict[str, Any] = dict(
+            zip(names[code.co_argcount - len(defaults) : code.co_argcount], defaults)
+        )
+        values |= called.__kwdefaults__ or {}
+        given = self._given(node, names, code.co_argcount, types, {*values})
+        for name, value in values.items():
+            if name not in given:
+                wanted = types[name] if name in types else type_of_value(value, name)
+                given[name] = self._default(
+                    called.__module__, f"{called.__name__}_{name}", name, value, wanted
+                )
+        if function is None:
+            for name in names:
+                type_ = given[name].type
+                if has_no_size(hints.get(name)) and not has_only_floats(type_):
+                    what = f"{type_.word} with other than floats: write them as 1.0"
+                    raise _Outside(node, what)
+            function = self.program.function(called, [given[name].type for name in names])
+        return Call(function, [given[name] for name in names])
+
+    def _call_of(self, node: ast.Call, called: _Callable) -> Expression:
+        """A call of a local function."""
+        given = self._given(
+            node, called.names, called.positional, called.function.arguments, {*called.defaults}
+        )
+        given = {**called.defaults, **given}
+        values = [given[name] for name in called.names]
+        values += [self._closed(node, name) for name in called.captured]
+        return Call(called.function, values)
+
+    def _given(
+        self,
+        node: ast.Call,
+        names: Sequence[str],
+        positional: int,
+        types: Mapping[str, Type],
+        optional: set[str],
+    ) -> dict[str, Expression]:
+        """The arguments of a call, by their names."""
+        values = self._elements(node.args, [types.get(name) for name in names])
+        words = {str(keyword.arg): keyword.value for keyword in node.keywords}
+        places = names[: len(values)]
+        missing = {*names} - {*places} - {*words} - optional
+        if (
+            len(values) > positional or missing or {*words} - {*names} or {*words} & {*places}
+            or len(words) < len(node.keywords)
+        ):  # fmt: skip
+            raise _Outside(node, f"arguments other than {', '.join(names)}")
+        found = dict(zip(places, values))
+        for name, value in words.items():
+            found[name] = self.fitting(value, types.get(name))
+        return found
+
+
+class _Filled(NamedTuple):
+    """What a loop that stands for an expression consists of.
+
+    Attributes:
+        before: it.
+        body: in it.
+        after: it.
+        type: of the result.
+
+    """
+
+    before: Sequence[Statement]
+    body: Sequence[Statement]
+    after: Statement
+    type: Type
+
+
+class _Noting:
+    """Notes what is refused within it, and goes on after it."""
+
+    def __init__(self, builder: _Builder, node: ast.stmt | None = None) -> None:
+        self._builder, self._node = builder, node
+
+    def __enter__(self) -> None:
+        """Begin."""
+
+    def __exit__(self, kind: type | None, error: BaseException | None, _: Any) -> bool:
+        """Note a refusal; what the statement would have given a value has one that is unknown."""
+        if error is None:
+            return False
+        builder = self._builder
+        builder.has_mistakes = True
+        if isinstance(error, _Outside):
+            line = getattr(error.node, "lineno", getattr(self._node, "lineno", 0))
+            builder.program.refuse(f"{builder.path}:{line}: ", str(error))
+        elif isinstance(error, TypeError):
+            line = getattr(self._node, "lineno", 0)
+            builder.program.refuse(f"{builder.path}:{line}: ", str(error))
+        elif not isinstance(error, _Follows):
+            return False
+        if self._node is not None:
+            builder._forget(self._node)
+        return True
+
+
+def _both(one: _Known | None, other: _Known | None) -> _Known | None:
+    """What has a value of one type on both ways; None: no step comes there."""
+    if one is None or other is None:
+        return one if other is None else other
+    return {
+        name: (type_, loops | other[name][1])
+        for name, (type_, loops) in one.items()
+        if name in other and other[name][0] == type_
+    }
+
+
+def _first_name(target: ast.expr) -> str:
+    """The first name in a target, by which what belongs to its loop is named."""
+    names = (part.id.lstrip("_") for part in ast.walk(target) if isinstance(part, ast.Name))
+    return next(filter(None, names), "x")
+
+
+def _is_fixed(value: Expression) -> bool:
+    """Whether a value is a number, a variable or a constant, or a part of one that is not sought."""
+    if isinstance(value, Field):
+        return _is_fixed(value.owner)
+    if isinstance(value, Item):
+        return _is_fixed(value.owner) and isinstance(value.place, Number)
+    return isinstance(value, (Number, Local, tree.Constant))
+
+
+def _as_int(value: Expression) -> Expression:
+    """A bool, or a member of an enumeration, as the int that it is."""
+    if value.type == INT:
+        return value
+    return Operation(tree.AS_INT, (value,), INT)
+
+
+#: What the functions of Python that need no import make of a call.
+_BUILT_IN: Mapping[Any, Callable[[_Builder, ast.Call], Expression]] = {
+    abs: _Builder._abs, all: _Builder._all, any: _Builder._any, bool: _Builder._bool,
+    float: _Builder._float_of, int: _Builder._int, len: _Builder._len, max: _Builder._max,
+    min: _Builder._min, round: _Builder._round, sum: _Builder._sum,
+}  # fmt: skip

@@ -1,0 +1,303 @@
+"""Types of the language of equations: numbers, and arrays and records of them."""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+from functools import cache
+from typing import Annotated, Any, Union, get_args, get_origin
+
+from auv_fmu.language.arrays import Matrix, Vector
+from fmus.ports.groups import hints_of, is_class, is_record
+
+#: How a text begins that says where it is about.
+PLACED = re.compile(r".+:\d+: ")
+
+#: A vector or matrix may be copied to the stack, which has 1 MB in Windows.
+_MOST_NUMBERS = 65_536
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A number, or a text of a refusal.
+
+    Attributes:
+        word: what readers call it.
+        made: an enumeration; None: it is none.
+
+    """
+
+    word: str
+    made: Any = None
+
+
+@dataclass(frozen=True)
+class Array:
+    """A vector, a matrix, which is an array of rows, or a tuple whose elements are alike.
+
+    Attributes:
+        item, n: type of the elements, and how many there are.
+        made: Vector or Matrix; None: a tuple.
+
+    """
+
+    item: Type
+    n: int
+    made: Any = None
+
+    @property
+    def word(self) -> str:
+        """What readers call it."""
+        if self.made is Matrix:
+            return f"a Matrix of {self.n} rows of {sizes(self)[1]}"
+        return f"a {'Vector' if self.made else 'tuple'} of {self.n}"
+
+
+@dataclass(frozen=True)
+class Record:
+    """A NamedTuple, or a tuple whose elements differ.
+
+    Attributes:
+        fields: names with their types; those of a tuple are m0, m1 ...
+        made: the class; None: a tuple.
+
+    """
+
+    fields: tuple[tuple[str, Type], ...]
+    made: Any = None
+
+    @property
+    def word(self) -> str:
+        """What readers call it."""
+        return f"a {self.made.__name__}" if self.made else f"a tuple of {len(self.fields)}"
+
+
+Type = Union[Scalar, Array, Record]
+
+FLOAT, INT, BOOL, TEXT, NOTHING = map(Scalar, ("a float", "an int", "a bool", "a text", "nothing"))
+
+#: Of what has been refused already.
+UNKNOWN = Scalar("unknown")
+
+_SCALARS: dict[Any, Scalar] = {float: FLOAT, int: INT, bool: BOOL, str: TEXT}
+
+
+def is_whole(type_: Type) -> bool:
+    """Whether it is an int, a bool or a member of an enumeration."""
+    return type_ in (INT, BOOL) or (isinstance(type_, Scalar) and type_.made is not None)
+
+
+def is_number(type_: Type) -> bool:
+    """Whether one can compute with it."""
+    return type_ == FLOAT or is_whole(type_)
+
+
+def is_algebraic(type_: Type) -> bool:
+    """Whether it is a vector or a matrix."""
+    return isinstance(type_, Array) and type_.made is not None
+
+
+def sizes(type_: Type) -> tuple[int, ...]:
+    """The length of an array, or the rows and columns of a matrix."""
+    return (type_.n, *sizes(type_.item)) if isinstance(type_, Array) else ()
+
+
+def parts_of(type_: Type) -> tuple[Type, ...]:
+    """The types of the elements of an array or a record; none of a number."""
+    if isinstance(type_, Array):
+        return (type_.item,) * type_.n
+    return tuple(part for _, part in type_.fields) if isinstance(type_, Record) else ()
+
+
+def scalars_in(type_: Type) -> Iterator[Scalar]:
+    """The types of all numbers in it."""
+    if isinstance(type_, Scalar):
+        yield type_
+    for part in parts_of(type_):
+        yield from scalars_in(part)
+
+
+@cache
+def count(type_: Type) -> int:
+    """How many numbers it holds."""
+    if isinstance(type_, Array):
+        return type_.n * count(type_.item)
+    return sum(map(count, parts_of(type_))) if isinstance(type_, Record) else 1
+
+
+@cache
+def has_only_floats(type_: Type) -> bool:
+    """Whether all numbers in it are floats."""
+    if isinstance(type_, Array):
+        return has_only_floats(type_.item)
+    return (
+        type_ == FLOAT if isinstance(type_, Scalar) else all(map(has_only_floats, parts_of(type_)))
+    )
+
+
+def vector(n: int) -> Array:
+    """The type of a vector."""
+    _check_size(f"a Vector of {n}", n)
+    return Array(FLOAT, n, Vector)
+
+
+def matrix(rows: int, columns: int) -> Array:
+    """The type of a matrix."""
+    _check_size(f"a Matrix of {rows} rows of {columns}", rows * columns)
+    return Array(vector(columns), rows, Matrix)
+
+
+def _check_size(what: str, n: int) -> None:
+    if n < 1:
+        raise TypeError(f"{what} is empty")
+    if n > _MOST_NUMBERS:
+        raise TypeError(f"{what} is too large for C, which takes at most {_MOST_NUMBERS} numbers")
+
+
+def tuple_of(items: list[Type]) -> Array | Record:
+    """The type of a plain tuple."""
+    if TEXT in items:
+        raise TypeError("a tuple of texts; choose between texts by if")
+    if items and all(item == items[0] for item in items):
+        return Array(items[0], len(items))
+    return Record(tuple((f"m{i}", item) for i, item in enumerate(items)))
+
+
+def type_of(hint: Any) -> Type:
+    """The type that an annotation names.
+
+    Raises:
+        TypeError: it is none of the language.
+
+    """
+    if get_origin(hint) is Annotated:
+        hint, *notes = get_args(hint)
+        given = [note for note in notes if type(note) is int]
+        if hint is Vector and len(given) == 1:
+            return vector(*given)
+        if hint is Matrix and len(given) == 2:
+            return matrix(*given)
+    if hint in (Vector, Matrix):
+        example = "Vector, 3" if hint is Vector else "Matrix, 2, 3"
+        raise TypeError(f"{hint.__name__} has no size here: write Annotated[{example}]")
+    if hint in _SCALARS:
+        return _SCALARS[hint]
+    if get_origin(hint) is tuple and Ellipsis not in get_args(hint):
+        return tuple_of([type_of(part) for part in get_args(hint)])
+    if is_class(hint, IntEnum):
+        return enumeration(hint)
+    if is_record(hint):
+        return _record(hint)
+    name = hint.__name__ if isinstance(hint, type) else hint
+    raise TypeError(f"{name} is not a type in the language of equations")
+
+
+def enumeration(made: type[IntEnum]) -> Scalar:
+    """The type of the members of an enumeration."""
+    return Scalar(f"a {made.__name__}", made)
+
+
+@cache
+def _record(made: Any) -> Record:
+    own = {name for name, value in vars(made).items() if inspect.isfunction(value)}
+    special = sorted(name for name in own if re.fullmatch(r"__\w+__", name))
+    changed = [name for name in special if vars(made)[name].__module__ == made.__module__]
+    if changed:
+        raise TypeError(f"{place_of(made)}{changed[0]} in the class {made.__name__}: leave it out")
+    return Record(tuple((n, _field(made, n, hint)) for n, hint in hints_of(made).items()), made)
+
+
+def _field(made: type, name: str, hint: Any) -> Type:
+    """The type of a field of a class."""
+    try:
+        type_ = type_of(hint)
+        if type_ == TEXT:
+            raise TypeError("texts are for raise Refusal(...) only")
+    except TypeError as error:
+        if PLACED.match(str(error)):
+            raise
+        raise TypeError(f"{place_of(made, name)}{made.__name__}.{name}: {error}") from None
+    return type_
+
+
+def place_of(made: type, field: str = "") -> str:
+    """Where a class stands, or a field of it, as the beginning of a message; empty: not known."""
+    try:
+        lines, first = inspect.getsourcelines(made)
+        path = inspect.getsourcefile(made)
+    except OSError:
+        return ""
+    at = [i for i, line in enumerate(lines) if field and re.match(rf"\s+{field}\s*:", line)]
+    return f"{path}:{first + (at or [0])[0]}: "
+
+
+def has_no_size(hint: Any) -> bool:
+    """Whether an annotation names a vector or a matrix of any size, or a tuple with one."""
+    parts = get_args(hint) if get_origin(hint) is tuple else ()
+    return hint in (Vector, Matrix) or any(map(has_no_size, parts))
+
+
+def type_of_value(value: Any, name: str) -> Type:
+    """The type of what stands in a module: numbers, or tuples of them.
+
+    Raises:
+        TypeError: it is none of the language.
+
+    """
+    if isinstance(value, Vector):
+        return vector(len(value))
+    if isinstance(value, Matrix):
+        return matrix(len(value), len(value[0]) if value else 0)
+    if is_record(type(value)):
+        return type_of(type(value))
+    if isinstance(value, tuple) and value:
+        return tuple_of([type_of_value(part, name) for part in value])
+    if isinstance(value, IntEnum):
+        return enumeration(type(value))
+    if type(value) in (float, int, bool):
+        return _SCALARS[type(value)]
+    advice = ""
+    if hasattr(value, "dtype"):
+        # numpy's numbers make numpy's of all that they meet, which divide by zero.
+        advice = ": write float(...) or int(...)"
+    elif isinstance(value, dict):
+        advice = ": write a tuple, and the place of an element for its key"
+    raise TypeError(f"{name} is not a number, nor a tuple of numbers{advice}")
+
+
+def check_value(value: Any, type_: Type, name: str) -> None:
+    """Refuse what is of another type than its annotation tells.
+
+    Raises:
+        TypeError: it is.
+
+    """
+    parts = parts_of(type_)
+    if not isinstance(type_, Scalar):
+        made = type_.made or tuple
+        if not isinstance(value, made) or len(value) != len(parts):
+            raise TypeError(f"{name} is not {type_.word}")
+        for field, one, part in zip(getattr(value, "_fields", range(len(value))), value, parts):
+            check_value(one, part, f"{name}.{field}")
+        return
+    if type_ == FLOAT and isinstance(value, int):
+        raise TypeError(f"{name} is an int where a float is wanted: write {value}.0")
+    kind = type_.made or (float if type_ == FLOAT else int)
+    if type(value) is not float if type_ == FLOAT else not isinstance(value, kind):
+        raise TypeError(f"{name} is a {type(value).__name__} where {type_.word} is wanted")
+    if not isinstance(value, float):
+        check_int(value)
+
+
+def check_int(value: int) -> None:
+    """Refuse an int that does not fit.
+
+    Raises:
+        TypeError: it does not.
+
+    """
+    if not -(2**31) <= value < 2**31:
+        raise TypeError(f"{value} is an int of more than 32 bits: write {value}.0")

@@ -1,0 +1,613 @@
+"""Trees in C: structures, constants and functions, in the order in which they need each other."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import textwrap
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
+from itertools import groupby
+from math import isinf, isnan
+from typing import Any
+
+from fmus.language import tree
+from fmus.language.mathematics import FUNCTIONS, OWN, RANGE
+from fmus.language.tree import (
+    Call,
+    Choice,
+    Expression,
+    Field,
+    Function,
+    Item,
+    Local,
+    Make,
+    Number,
+    Operation,
+    Operator,
+    Statement,
+)
+from fmus.language.types import (
+    BOOL,
+    FLOAT,
+    NOTHING,
+    TEXT,
+    Array,
+    Record,
+    Scalar,
+    Type,
+    is_algebraic,
+    is_whole,
+)
+from fmus.native.names import class_in_c, in_c, is_of_library, words_of_runtime
+
+LINE_WIDTH = 98
+INDENT = "    "
+
+#: How tightly the operators of C bind.
+_TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, _POSTFIX = range(9)
+
+#: Operators of C between two operands.
+_INFIX: dict[Operator, tuple[str, int]] = {
+    tree.ADD: ("+", _SUM), tree.SUBTRACT: ("-", _SUM), tree.MULTIPLY: ("*", _PRODUCT),
+    tree.OVER: ("/", _PRODUCT), tree.COUNT_ADD: ("+", _SUM), tree.COUNT_MULTIPLY: ("*", _PRODUCT),
+    tree.LESS: ("<", _RELATION), tree.LESS_EQUAL: ("<=", _RELATION),
+    tree.GREATER: (">", _RELATION), tree.GREATER_EQUAL: (">=", _RELATION),
+    tree.EQUAL: ("==", _EQUALITY), tree.NOT_EQUAL: ("!=", _EQUALITY),
+}  # fmt: skip
+
+#: Functions of arithmetic.h, and of C.
+_CALLED: dict[Operator, str] = {
+    tree.DIVIDE: "py_div", tree.FLOOR_DIVIDE: "py_floordiv", tree.MODULO: "py_mod",
+    tree.POWER: "py_pow", tree.INT_ADD: "int_add", tree.INT_SUBTRACT: "int_sub",
+    tree.INT_MULTIPLY: "int_mul", tree.INT_NEGATIVE: "int_neg", tree.INT_DIVIDE: "int_div",
+    tree.INT_FLOOR_DIVIDE: "int_floordiv", tree.INT_MODULO: "int_mod", tree.INT_POWER: "int_pow",
+    tree.INT_ABS: "int_abs", tree.TO_INT: "int_of", tree.PLACE: "place_in", tree.ABS: "fabs",
+    tree.NEAREST: "nearest", tree.MIN: "smaller", tree.MAX: "larger",
+    tree.INT_MIN: "smaller_int", tree.INT_MAX: "larger_int",
+}  # fmt: skip
+
+#: Spaces that no line is broken at, and what stands for a space in a text.
+_UNBROKEN = re.compile(r"(?<!,) (?!(?:[-+?:]|&&|\|\|) )")
+_KEPT = "\x01"
+
+#: What stands for a space that a line is best broken at.
+_BREAK = "\x02"
+
+
+def quoted(text: str) -> str:
+    """A text in C."""
+    escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    escaped = re.sub(r"[\x00-\x1f\x7f]", lambda found: f"\\{ord(found[0]):03o}", escaped)
+    # Two question marks may begin a trigraph.
+    escaped = escaped.replace("?", "\\?") if "??" in escaped else escaped
+    return f'"{escaped}"'
+
+
+def lines_of(text: str, indent: str) -> list[str]:
+    """A statement as lines, which end after the commas of its outermost list if that will do."""
+    lines: list[str] = []
+    begin = indent
+    for item in text.split(_BREAK):
+        if lines and len(f"{lines[-1]} {item}") <= LINE_WIDTH:
+            lines[-1] += f" {item}"
+        else:
+            lines.append(begin + item)
+        begin = indent + INDENT
+    found = [part for line in lines for part in _wrapped(line, begin)]
+    return [line.replace(_KEPT, " ") for line in found]
+
+
+def _wrapped(line: str, indent: str) -> list[str]:
+    """Lines that end after commas and before operators."""
+    if len(line) <= LINE_WIDTH:
+        return [line]
+    text = line.lstrip()
+    wrapper = textwrap.TextWrapper(
+        LINE_WIDTH,
+        initial_indent=line.removesuffix(text),
+        subsequent_indent=indent,
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return wrapper.wrap(_UNBROKEN.sub(_KEPT, text))
+
+
+def _list(items: Iterable[str]) -> str:
+    """Items between commas, at which a line is broken rather than within them."""
+    return f",{_BREAK}".join(item.replace(_BREAK, " ") for item in items)
+
+
+def number_in_c(value: float) -> str:
+    """A number in C."""
+    if isinstance(value, float):
+        if isnan(value):
+            return "NAN"
+        if isinf(value):
+            return "INFINITY" if value > 0.0 else "-INFINITY"
+        return repr(float(value))
+    # The smallest int is no literal of C.
+    return "(-2147483647 - 1)" if value == -(2**31) else str(int(value))
+
+
+def members(type_: Type) -> Sequence[tuple[str, Type]]:
+    """How each part of a value is written after a name, and its type."""
+    if isinstance(type_, Array):
+        return [(f".v[{i}]", type_.item) for i in range(type_.n)]
+    return [(f".{in_c(n)}", part) for n, part in type_.fields] if isinstance(type_, Record) else ()
+
+
+def strip_sphinx_marks(text: str) -> str:
+    """Take the marks that Sphinx reads out of a text."""
+    return closed(re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text))
+
+
+def closed(text: str) -> str:
+    """A text that does not end the comment it stands in."""
+    return text.replace("*/", "* /")
+
+
+def _comment(text: str) -> list[str]:
+    """A docstring as a comment."""
+    lines = strip_sphinx_marks(textwrap.dedent(text)).rstrip().splitlines()
+    if len(lines) < 2:
+        return [f"/* {line} */" for line in lines]
+    return [f"/* {lines[0]}", *(f" * {line}".rstrip() for line in lines[1:]), " */"]
+
+
+class Emitter:
+    """Functions in C.
+
+    Attributes:
+        structures, constants: their texts, by their names.
+
+    """
+
+    def __init__(self, functions: Iterable[Function]) -> None:
+        """Begin with functions, each after those that it calls."""
+        self._functions = [*functions]
+        self.structures: dict[str, str] = {}
+        self.constants: dict[str, str] = {}
+        self._types: dict[Type, str] = {}
+        self._constants: dict[tuple[Type, str], str] = {}
+        self._wrappers: dict[str, str] = {}
+        #: Counters that may pass the largest int, for whose type they are cast.
+        self.wide = {
+            one.counter
+            for function in self._functions
+            for one in tree.statements_in(function.body)
+            if isinstance(one, tree.For) and one.is_wide
+        }
+        #: Names of variables, which nothing else has.
+        self._variables = {in_c(name) for one in self._functions for name in _variables(one)}
+        self._taken: set[str] = set()
+        self._names: dict[Function, str] = {}
+        for function in self._functions:
+            for type_ in (*function.arguments.values(), function.returns):
+                self.type(type_)
+        for function in self._functions:
+            self._names[function] = self._unused(self._wanted(function))
+
+    def text(self) -> str:
+        """All of it."""
+        functions = [self._function(function) for function in self._functions]
+        parts = [*self.structures.values(), *self.constants.values(), *self._wrappers.values()]
+        return "\n\n".join([*parts, *functions])
+
+    def call(self, function: Function, arguments: Sequence[str]) -> str:
+        """A call, in a function that has an `error` where this one needs it."""
+        given = [*arguments, *(["error"] if function.fails else [])]
+        return f"{self._names[function]}({_list(given)})"
+
+    # Names
+
+    def _unused(self, name: str) -> str:
+        name += "_" if is_of_library(name) else ""
+        while name in self._taken | self._variables or name in words_of_runtime():
+            name += "_"
+        self._taken.add(name)
+        return name
+
+    def _wanted(self, function: Function) -> str:
+        """The name of a function, which begins with that of its module, and ends with its sizes."""
+        module = function.module.rpartition(".")[2]
+        own = function.name.lstrip("_")
+        parts = [module, own, *map(self.type, function.sizes)]
+        return re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+
+    # Types and constants
+
+    def type(self, type_: Type) -> str:
+        """The type, whose structures are defined."""
+        if isinstance(type_, Scalar):
+            if is_whole(type_):
+                return "int"
+            return {FLOAT: "double", TEXT: "const char *"}.get(type_, "void")
+        if type_ not in self._types:
+            self._types[type_] = self._structure(type_)
+        return self._types[type_]
+
+    def declared(self, type_: Type) -> str:
+        """A type before a name."""
+        name = self.type(type_)
+        return name if name.endswith("*") else f"{name} "
+
+    def _structure(self, type_: Array | Record) -> str:
+        """The name of a structure, which is defined after those that it needs."""
+        if isinstance(type_, Array):
+            item = self.type(type_.item)
+            if type_.item == FLOAT:
+                name = f"Vector{type_.n}"
+            elif is_algebraic(type_):
+                name = f"Matrix{type_.n}x{item.removeprefix('Vector')}"
+            else:
+                name = f"{item}x{type_.n}"
+            self.structures[name] = f"typedef struct {{\n    {item} v[{type_.n}];\n}} {name};"
+            return name
+        about = _comments(type_.made)
+        rows = [
+            f"    {self.type(part)} {in_c(name)};{about.get(name, '')}"
+            for name, part in type_.fields
+        ]
+        rows = rows or ["    char nothing; /* C has no empty structure */"]
+        if type_.made:
+            name = class_in_c(type_.made.__name__)
+            doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
+        else:
+            name, doc = "_".join(map(self._part_name, dict(type_.fields).values())) or "Empty", ""
+        while name in self.structures or name in self._variables:
+            name += "_"
+        head = [f"/* {strip_sphinx_marks(doc)} */"] if doc else []
+        text = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
+        self.structures[name] = text
+        return name
+
+    def _part_name(self, type_: Type) -> str:
+        """The name of a part of a tuple: a tuple within it ends with a mark of its own."""
+        is_tuple = isinstance(type_, Record) and type_.made is None
+        return f"{self.type(type_)}_" if is_tuple else self.type(type_)
+
+    def _constant(self, one: tree.Constant) -> str:
+        text = self._literal(one.value, one.type)
+        if (one.type, text) not in self._constants:
+            module = one.module.rpartition(".")[2]
+            name = self._unused(f"{module}_{one.name.lstrip('_')}")
+            self._constants[one.type, text] = name
+            value = f"static const {self.declared(one.type)}{name} = {text};"
+            self.constants[name] = "\n".join(lines_of(value, ""))
+        return self._constants[one.type, text]
+
+    def _literal(self, value: Any, type_: Type) -> str:
+        """A value as an initializer."""
+        if isinstance(type_, Scalar):
+            return number_in_c(value)
+        parts = _list(self._literal(one, part) for one, (_, part) in zip(value, members(type_)))
+        return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
+
+    def _wrapper(self, name: str) -> None:
+        """Define a function of `math` that raises as Python's does."""
+        raises = FUNCTIONS[name].raises
+        if raises == OWN:
+            return
+        body = f"    return {name}(x);"
+        if raises == RANGE:
+            body = f"    return bounded_result(x, {name}(x), error);"
+        else:
+            body = f"    if ({raises}) raise_domain_error(error);\n{body}"
+        head = f"static inline double math_{name}(double x, Error *error) {{"
+        self._wrappers[name] = f"{head}\n{body}\n}}"
+
+    # Expressions
+
+    def expression(self, one: Expression, within: int = _TERNARY, by_address: str = "") -> str:
+        """An expression as an operand of what binds so tightly."""
+        text, binding = self._bound(one, by_address)
+        return text if binding >= within else f"({text})"
+
+    def _bound(self, one: Expression, at: str) -> tuple[str, int]:
+        """An expression, and how tightly its outermost operator binds."""
+        if isinstance(one, Number):
+            text = number_in_c(one.value)
+            return text, _UNARY if text.startswith("-") else _POSTFIX
+        if isinstance(one, tree.Text):
+            return quoted(one.value).replace(" ", _KEPT), _POSTFIX
+        if isinstance(one, Local):
+            if one.name in self.wide:
+                return f"(int){in_c(one.name)}", _UNARY
+            return (f"(*{in_c(one.name)})" if one.name == at else in_c(one.name)), _POSTFIX
+        if isinstance(one, tree.Constant):
+            return self._constant(one), _POSTFIX
+        if isinstance(one, Field):
+            return f"{self.expression(one.owner, _POSTFIX, at)}.{in_c(one.name)}", _POSTFIX
+        if isinstance(one, Item):
+            owner = self.expression(one.owner, _POSTFIX, at)
+            return f"{owner}.v[{self.expression(one.place, _TERNARY, at)}]", _POSTFIX
+        if isinstance(one, Make):
+            return f"({self.type(one.type)}){self._made(one, at)}", _POSTFIX
+        if isinstance(one, Choice):
+            test, this = (self.expression(part, _OR, at) for part in (one.test, one.one))
+            return f"{test} ? {this} : {self.expression(one.other, _TERNARY, at)}", _TERNARY
+        if isinstance(one, Call):
+            given = [self.expression(part, _TERNARY, at) for part in one.parts]
+            if one.function.by_address:
+                place = [*one.function.arguments].index(one.function.by_address)
+                given[place] = f"&{given[place]}"
+            return self.call(one.function, given), _POSTFIX
+        assert isinstance(one, Operation)
+        return self._operation(one, at)
+
+    def _made(self, one: Make, at: str) -> str:
+        """The initializer of a structure."""
+        self.type(one.type)
+        texts = [
+            self._made(part, at) if isinstance(part, Make) else self.expression(part, _TERNARY, at)
+            for part in one.parts
+        ]
+        if isinstance(one.type, Array):
+            return f"{{{{{_list(texts)}}}}}"
+        filled = [f"{name} = {text}" for (name, _), text in zip(members(one.type), texts)]
+        return f"{{{_list(filled) or '0'}}}"
+
+    def _mathematics(self, one: Operation, op: Operator, at: str) -> tuple[str, int]:
+        texts = [self.expression(part, _TERNARY, at) for part in one.operands]
+        # A macro takes the commas of a structure for its own.
+        if any(isinstance(part, Make) for each in one.parts for part in tree.expressions_in(each)):
+            texts = [f"({text})" for text in texts]
+        if op.fails:
+            self._wrapper(op.function)
+            return f"math_{op.function}({', '.join([*texts, 'error'])})", _POSTFIX
+        text = f"{op.function}({', '.join(texts)})"
+        return (f"{text} != 0", _EQUALITY) if one.type == BOOL else (text, _POSTFIX)
+
+    def _operation(self, one: Operation, at: str) -> tuple[str, int]:
+        op = one.operator
+        if op.function:
+            return self._mathematics(one, op, at)
+        if op in _INFIX:
+            sign, binding = _INFIX[op]
+            left, right = (self.expression(p, binding + i, at) for i, p in enumerate(one.parts))
+            return f"{left} {sign} {right}", binding
+        if op in _CALLED:
+            texts = [self.expression(part, _TERNARY, at) for part in one.parts]
+            given = _list([*texts, *(["error"] if op.fails else [])])
+            return f"{_CALLED[op]}({given})", _POSTFIX
+        if op in (tree.AND, tree.OR):
+            sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
+            # Compilers want brackets around one kind of them within the other.
+            return sign.join(self.expression(p, _EQUALITY, at) for p in one.parts), binding
+        [part] = one.parts
+        if op == tree.AS_INT:
+            return self._bound(part, at)
+        if op == tree.TO_BOOL:
+            zero = "0.0" if part.type == FLOAT else "0"
+            return f"{self.expression(part, _RELATION, at)} != {zero}", _EQUALITY
+        if op == tree.NEGATIVE:
+            return f"-{self.expression(part, _POSTFIX, at)}", _UNARY
+        sign = {tree.NOT: "!", tree.TO_FLOAT: "(double)"}[op]
+        return f"{sign}{self.expression(part, _UNARY, at)}", _UNARY
+
+    # Functions
+
+    def _function(self, function: Function) -> str:
+        given = [
+            f"const {self.type(type_)} *{in_c(name)}"
+            if name == function.by_address
+            else f"{self.declared(type_)}{in_c(name)}"
+            for name, type_ in function.arguments.items()
+        ]
+        given += ["Error *error"] if function.fails else []
+        name = self._names[function]
+        head = f"static {self.declared(function.returns)}{name}({_list(given) or 'void'}) {{"
+        body = _Body(self, function).block(function.body, {*function.arguments}, INDENT)
+        return "\n".join([*_comment(function.doc), *lines_of(head, ""), *body, "}"])
+
+
+class _Body:
+    """The statements of a function on their way to C."""
+
+    def __init__(self, emitter: Emitter, function: Function) -> None:
+        self._emitter, self._function = emitter, function
+
+    def _text(self, one: Expression, within: int = _TERNARY) -> str:
+        return self._emitter.expression(one, within, self._function.by_address)
+
+    def block(self, statements: Sequence[Statement], known: set[str], indent: str) -> list[str]:
+        """A block; variables are declared where the first statement of it needs them."""
+        used: dict[str, list[int]] = {}
+        for i, statement in enumerate(statements):
+            for name in _used(statement):
+                used.setdefault(name, []).append(i)
+        here: dict[int, list[str]] = {}
+        for name, places in used.items():
+            is_here = len(places) > 1 or name in _used(statements[places[0]], deep=False)
+            if is_here and name not in known:
+                here.setdefault(places[0], []).append(name)
+        known = known | {name for names in here.values() for name in names}
+        stores = Counter(_stores(statements))
+        lines: list[str] = []
+        for i, statement in enumerate(statements):
+            new = here.get(i, [])
+            if not isinstance(statement, (tree.Store, tree.Reserve)):
+                lines += [f"{indent}{self._zero(name, statements)}" for name in new]
+            found = [*self._statement(statement, new, stores, known, indent)]
+            if statement.comment and found:
+                found = _annotated(found, f"/* {closed(statement.comment)} */", indent)
+            lines += found
+        return lines
+
+    def _zero(self, name: str, statements: Sequence[Statement]) -> str:
+        """The declaration of a variable that gets its value in a block below."""
+        type_ = _types(statements)[name]
+        value = "0" if isinstance(type_, Scalar) else "{0}"
+        return f"{self._emitter.declared(type_)}{in_c(name)} = {value};"
+
+    def _statement(
+        self,
+        one: Statement,
+        new: Sequence[str],
+        stores: Counter[str],
+        known: set[str],
+        indent: str,
+    ) -> Iterator[str]:
+        inner, emitter = indent + INDENT, self._emitter
+        if isinstance(one, tree.Store):
+            yield from self._stored(one, new, stores, indent)
+        elif isinstance(one, tree.Reserve):
+            yield f"{indent}{emitter.declared(one.type)}{in_c(one.name)};"
+        elif isinstance(one, tree.StoreItem):
+            places = "".join(f".v[{self._text(place)}]" for place in one.places)
+            yield from lines_of(f"{in_c(one.name)}{places} = {self._text(one.value)};", indent)
+        elif isinstance(one, tree.Do):
+            text = self._text(one.call, _UNARY)
+            is_plain = isinstance(one.call, Call) and one.call.type == NOTHING
+            yield from lines_of(f"{text};" if is_plain else f"(void){text};", indent)
+        elif isinstance(one, tree.Return):
+            yield from self._returned(one, indent)
+        elif isinstance(one, (tree.Break, tree.Continue)):
+            yield f"{indent}{type(one).__name__.lower()};"
+        elif isinstance(one, tree.Raise):
+            yield from lines_of(self._raised(one), indent)
+            yield f"{indent}{self._left()}"
+        elif isinstance(one, tree.If):
+            yield from lines_of(f"if ({self._text(one.test)}) {{", indent)
+            yield from self.block(one.body, known, inner)
+            if one.orelse:
+                yield f"{indent}}} else {{"
+                yield from self.block(one.orelse, known, inner)
+            yield f"{indent}}}"
+        else:
+            assert isinstance(one, (tree.While, tree.For))
+            yield from lines_of(f"{self._head(one)} {{", indent)
+            counter = {one.counter} if isinstance(one, tree.For) else set()
+            yield from self.block(one.body, known | counter, inner)
+            yield f"{indent}}}"
+
+    def _head(self, one: tree.While | tree.For) -> str:
+        """The first line of a loop, which ends after an error that it could not end by itself."""
+        if isinstance(one, tree.While):
+            return f"while (!error->raised && {self._text(one.test, _AND)})"
+        fails = one.turns is None or any(map(tree.may_fail, tree.statements_in(one.body)))
+        name, sign = in_c(one.counter), "<" if one.step > 0 else ">"
+        test = f"{'!error->raised && ' if fails else ''}{name} {sign} {self._text(one.stop, _SUM)}"
+        change = {1: f"{name}++", -1: f"{name}--"}.get(one.step, f"{name} += {one.step}")
+        kind = "long long" if one.is_wide else "int"
+        return f"for ({kind} {name} = {self._text(one.start)}; {test}; {change})"
+
+    def _stored(
+        self, one: tree.Store, new: Sequence[str], stores: Counter[str], indent: str
+    ) -> Iterator[str]:
+        """The values of variables; those of one type that are new are declared together."""
+
+        def alike(value: tuple[str, Expression]) -> tuple[Any, ...]:
+            name, made = value
+            is_new = name in new
+            is_text = made.type == TEXT and is_new
+            return is_new, is_new and stores[name] == 1, made.type, name if is_text else ""
+
+        for (is_new, is_constant, type_, _), group in groupby(one.values, alike):
+            texts = [f"{in_c(name)} = {self._text(value)}" for name, value in group]
+            if is_new:
+                head = "const " if is_constant and type_ != TEXT else ""
+                text = f"{head}{self._emitter.declared(type_)}{', '.join(texts)};"
+            else:
+                text = "; ".join(texts) + ";"
+            yield from lines_of(text, indent)
+
+    def _returned(self, one: tree.Return, indent: str) -> Iterator[str]:
+        text = f"return {self._text(one.value)};" if one.value is not None else "return;"
+        is_long = len(indent) + len(text) > LINE_WIDTH
+        if is_long and isinstance(one.value, Make) and isinstance(one.value.type, Record):
+            # A line for each field.
+            yield f"{indent}return ({self._emitter.type(one.value.type)}){{"
+            for (name, _), part in zip(members(one.value.type), one.value.parts):
+                value = (
+                    self._emitter._made(part, self._function.by_address)
+                    if isinstance(part, Make)
+                    else self._text(part)
+                )
+                yield from lines_of(f"{name} = {value},", indent + INDENT)
+            yield f"{indent}}};"
+            return
+        yield from lines_of(text, indent)
+
+    def _left(self) -> str:
+        """The statement that ends the function after an error."""
+        returns = self._function.returns
+        if returns == NOTHING:
+            return "return;"
+        is_number = isinstance(returns, Scalar)
+        return "return 0;" if is_number else f"return ({self._emitter.type(returns)}){{0}};"
+
+    def _raised(self, one: tree.Raise) -> str:
+        form, arguments = "", []
+        for part in one.parts:
+            if isinstance(part, str):
+                form += part.replace("%", "%%")
+                continue
+            value, how = part
+            text = self._text(value)
+            if value.type == BOOL:
+                text = f'{self._text(value, _OR)} ? "True" : "False"'
+            form += f"%{how}" if how else "%s"
+            arguments.append(text)
+        told = quoted(form).replace(" ", _KEPT)
+        return f"raise_error({_list(['error', told, *arguments])});"
+
+
+def _used(one: Statement, deep: bool = True) -> set[str]:
+    """The variables that a statement uses or gives a value, with those of its blocks or without."""
+    found = {
+        part.name
+        for each in tree.expressions_of(one)
+        for part in tree.expressions_in(each)
+        if isinstance(part, Local)
+    } | {*tree.stored_in(one)}
+    for block in tree.blocks_of(one) if deep else ():
+        for statement in block:
+            found |= _used(statement)
+    return found - {one.counter} if isinstance(one, tree.For) else found
+
+
+def _stores(statements: Sequence[Statement]) -> Iterator[str]:
+    """The variables that are given a value, each time; those of an element twice."""
+    for one in tree.statements_in(statements):
+        yield from tree.stored_in(one) * (1 + isinstance(one, (tree.StoreItem, tree.Reserve)))
+
+
+def _types(statements: Sequence[Statement]) -> dict[str, Type]:
+    """The types of all variables that are given a value."""
+    found = {}
+    for one in tree.statements_in(statements):
+        if isinstance(one, tree.Store):
+            found |= {name: value.type for name, value in one.values}
+    return found
+
+
+def _variables(function: Function) -> Iterator[str]:
+    """The names of all arguments and variables of a function."""
+    yield from function.arguments
+    for one in tree.statements_in(function.body):
+        yield from tree.stored_in(one)
+        if isinstance(one, tree.For):
+            yield one.counter
+
+
+def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
+    """Lines with a comment at the end, or before them."""
+    if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= LINE_WIDTH:
+        return [f"{lines[0]} {comment}"]
+    return [f"{indent}{comment}", *lines]
+
+
+@cache
+def _comments(made: Any) -> dict[str, str]:
+    """What `#:` says of the fields of a class, as comments."""
+    if made is None:
+        return {}
+    try:
+        text = inspect.getsource(made)
+    except OSError:
+        return {}  # it was not written as a class
+    found = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
+    return {name: f" /* {strip_sphinx_marks(text)} */" for name, text in found}

@@ -1,0 +1,600 @@
+"""A reference through waypoints: straight legs at constant velocity, rounded where they meet.
+
+It is not in the paper, which asks of a reference that y_d, dy_d and ddy_d are bounded (Assumption
+4), and that it is a motion of (1) and (2) (Definition 1). The first holds here, the second on
+straight legs only: what the vehicle cannot follow in a rounding is refused by :func:`check`.
+
+A point that runs from waypoint to waypoint at constant velocities v_k jumps from one to the next at
+each corner. The reference is where this point is on the average, over the time T around the moment
+and weighted by a parabola. So a corner at waypoint p_k, passed at t_k, becomes a rounding of T: in
+it, with a = (t - t_k) / T + 1/2 from 0 to 1,
+
+    y_d = p_k + v_k (t - t_k) + (v_k+1 - v_k) T (a^3 - a^4 / 2)
+    dy_d = v_k + (v_k+1 - v_k) (3 a^2 - 2 a^3)
+    ddy_d = (v_k+1 - v_k) 6 a (1 - a) / T
+
+- y_d is twice continuously differentiable, and its derivatives are exact.
+- Legs that take longer than T are straight and at constant velocity between their roundings. A
+  corner is cut by 3/32 |v_k+1 - v_k| T.
+- The reference never leaves the hull of the waypoints, and is nowhere faster than its fastest leg;
+  |ddy_d| is at most 3/2 of the largest |v_k+1 - v_k| / T where roundings do not overlap.
+- Before the first corner and after the last one it rests: start and arrival are corners, too.
+- Roundings may overlap: where many waypoints lie close together, they are what smooths the curve.
+
+A spline through the waypoints would meet them exactly, and swing out beside long legs, at a speed
+that was not chosen.
+"""
+
+from __future__ import annotations
+
+from math import atan2, degrees, sqrt, tan
+from typing import Annotated, NamedTuple
+
+from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.vectors import (
+    Vector3,
+    Vector5,
+    Vector32,
+    add_scaled,
+    distance,
+    norm,
+    sub,
+)
+from auv_fmu.paper.actuators import Limits
+from auv_fmu.paper.control_point import ELL, Distance
+from auv_fmu.paper.motion_planner import STEEPEST, Reference
+from auv_fmu.paper.vehicle import Vehicle
+
+#: Most waypoints of a path, as many as a Vector32 holds; and those that the default leaves over.
+MOST = 32
+_UNUSED = (0.0,) * 26
+
+#: Moments of a rounding at which it is held against the limits, as a share of it: the middle of it,
+#: where a corner of equal speeds asks for most, is among them.
+_BETWEEN = 1 / 32
+
+#: Square of the steepest slope.
+_STEEPEST_SLOPE = tan(STEEPEST) * tan(STEEPEST)
+
+#: What rounding may make of the steepness of two velocities, as a share of their product, and of
+#: their products with the fastest one.
+_OF_BOTH = 1e-9
+_OF_THE_FASTEST = 1e-12
+
+#: Where two moments differ by a smaller share of a rounding, they are one.
+_SHORTEST = 1e-6
+
+_AT_REST: Vector3 = (0.0, 0.0, 0.0)
+
+
+class ImpossiblePath(ArithmeticError):
+    """The vehicle cannot follow the path."""
+
+
+class Waypoints(NamedTuple):
+    """Points to pass, and when; the defaults are a small survey, near the vehicle of Fig. 4."""
+
+    n: Annotated[
+        int, Variable("1", "Number of waypoints; later ones are not used", 2, MOST, name="count")
+    ] = 6
+    x: Annotated[Vector32, Variable("m", "North of the waypoint (x)", name="waypoint[{}].x")] = (
+        3.0,
+        15.0,
+        15.0,
+        3.0,
+        3.0,
+        15.0,
+        *_UNUSED,
+    )
+    y: Annotated[Vector32, Variable("m", "East of the waypoint (y)", name="waypoint[{}].y")] = (
+        6.0,
+        6.0,
+        10.0,
+        10.0,
+        14.0,
+        14.0,
+        *_UNUSED,
+    )
+    z: Annotated[Vector32, Variable("m", "Depth of the waypoint (z)", name="waypoint[{}].z")] = (
+        0.0,
+        4.0,
+        4.0,
+        4.0,
+        4.0,
+        0.0,
+        *_UNUSED,
+    )
+    t: Annotated[
+        Vector32,
+        Variable("s", "Time at which the waypoint is passed, if `timed`", name="waypoint[{}].t"),
+    ] = (3.0, 28.0, 36.0, 60.0, 68.0, 93.0, *_UNUSED)
+    timed: Annotated[
+        bool,
+        Variable("1", "Whether waypoints are passed at their times; if not, at the cruise speed"),
+    ] = False
+    cruise: Annotated[float, Variable("m/s", "Speed between waypoints without times", POSITIVE)] = (
+        0.5
+    )
+    rounding: Annotated[float, Variable("s", "Duration of the rounding of a corner", POSITIVE)] = (
+        6.0
+    )
+
+
+class Parameters(NamedTuple):
+    """All parameters of the planner."""
+
+    waypoints: Annotated[Waypoints, Variable(name="")] = Waypoints()
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: that is to follow
+    ell: Distance = ELL
+    limits: Annotated[Limits, Variable(name="")] = Limits()
+    #: With (2) and (3) a straight run ends at 2.67 m/s.
+    speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
+    #: Where a turn on the spot ends.
+    turn_max: Annotated[float, Variable("rad/s", "Largest accepted turn rate", 0.0)] = 4.0
+
+
+class Corner(NamedTuple):
+    """A waypoint on the way."""
+
+    k: int  #: its number, from 0; n: after the last one
+    t: float  #: when it would be passed without roundings [s]
+
+
+class PathState(NamedTuple):
+    """Where on the path the reference is."""
+
+    start: float  #: time at which the run began [s]
+    t: float  #: time [s]
+    ahead: Corner  #: the first whose rounding is not over
+
+
+class Demand(NamedTuple):
+    """What a moment of the path asks of the vehicle."""
+
+    speed: float  #: [m/s]
+    turn: float  #: rate at which the path turns [rad/s]
+    tau: Vector3  #: (u, q, r) [N, N.m]
+
+
+# The path
+
+
+def waypoint(waypoints: Waypoints, k: int) -> Vector3:
+    """Waypoint k [m], from 0."""
+    return waypoints.x[k], waypoints.y[k], waypoints.z[k]
+
+
+def duration(waypoints: Waypoints, k: int) -> float:
+    """How long the leg to waypoint k takes [s]."""
+    if waypoints.timed:
+        return waypoints.t[k] - waypoints.t[k - 1]
+    return distance(waypoint(waypoints, k - 1), waypoint(waypoints, k)) / waypoints.cruise
+
+
+def velocity(waypoints: Waypoints, k: int) -> Vector3:
+    """v_k [m/s], of the leg to waypoint k: nothing before the first and after the last one."""
+    if not 0 < k < waypoints.n:
+        return _AT_REST
+    T = duration(waypoints, k)
+    x, y, z = sub(waypoint(waypoints, k), waypoint(waypoints, k - 1))
+    return x / T, y / T, z / T
+
+
+def first_corner(waypoints: Waypoints, start: float) -> Corner:
+    """The start of the path: the whole of its rounding lies ahead, unless times say otherwise.
+
+    Args:
+        waypoints: of the path.
+        start: time at which the run began [s].
+
+    """
+    return Corner(0, waypoints.t[0] if waypoints.timed else start + waypoints.rounding / 2)
+
+
+def next_corner(waypoints: Waypoints, corner: Corner) -> Corner:
+    """The corner after one."""
+    k = corner.k + 1
+    if k >= waypoints.n:
+        return Corner(waypoints.n, corner.t)
+    return Corner(k, waypoints.t[k] if waypoints.timed else corner.t + duration(waypoints, k))
+
+
+def corner_ahead(waypoints: Waypoints, corner: Corner, t: float) -> Corner:
+    """The first corner, from a given one on, whose rounding is not over.
+
+    Args:
+        waypoints: of the path.
+        corner: from which to look.
+        t: time [s].
+
+    """
+    while corner.k < waypoints.n and corner.t + waypoints.rounding / 2 <= t:
+        corner = next_corner(waypoints, corner)
+    return corner
+
+
+def initial_state(waypoints: Waypoints, t: float) -> PathState:
+    """State at the start of a run, at time t [s]."""
+    return PathState(t, t, corner_ahead(waypoints, first_corner(waypoints, t), t))
+
+
+def advance(waypoints: Waypoints, state: PathState, t: float) -> PathState:
+    """The state at another time.
+
+    Args:
+        waypoints: of the path.
+        state: at some time.
+        t: the other one; it may lie before, where a host goes back [s].
+
+    """
+    corner = state.ahead if t >= state.t else first_corner(waypoints, state.start)
+    return PathState(state.start, t, corner_ahead(waypoints, corner, t))
+
+
+def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
+    """y_d, dy_d/dt and d2y_d/dt2 in closed form.
+
+    Args:
+        waypoints: of the path.
+        corner: the first whose rounding is not over.
+        t: time [s].
+
+    """
+    T = waypoints.rounding
+    k = corner.k if corner.k < waypoints.n else waypoints.n - 1
+    v = velocity(waypoints, corner.k)
+    y_d, dy_d, ddy_d = add_scaled(waypoint(waypoints, k), t - corner.t, v), v, _AT_REST
+    while corner.k < waypoints.n and corner.t - T / 2 < t:
+        a = (t - corner.t) / T + 0.5
+        v_next = velocity(waypoints, corner.k + 1)
+        jump = sub(v_next, v)
+        y_d = add_scaled(y_d, T * a * a * a * (1.0 - a / 2), jump)
+        dy_d = add_scaled(dy_d, a * a * (3.0 - 2 * a), jump)
+        ddy_d = add_scaled(ddy_d, 6 * a * (1.0 - a) / T, jump)
+        corner = next_corner(waypoints, corner)
+        v = v_next
+    return Reference(y_d, dy_d, ddy_d)
+
+
+def course(waypoints: Waypoints, corner: Corner, dy_d: Vector3) -> Vector3:
+    """A vector in the direction of the reference.
+
+    Where it rests, that is the direction of the last leg before; at the start, of the first one.
+
+    Args:
+        waypoints: of the path.
+        corner: the first whose rounding is not over.
+        dy_d: velocity of the reference [m/s].
+
+    """
+    k = corner.k
+    while norm(dy_d) == 0.0 and k > 1:
+        k -= 1
+        dy_d = velocity(waypoints, k)
+    while norm(dy_d) == 0.0 and k < waypoints.n:
+        k = k + 1
+        dy_d = velocity(waypoints, k)
+    return dy_d
+
+
+def posture(y_d: Vector3, along: Vector3, ell: float) -> Vector5:
+    """Posture (x, y, z, theta, psi) of a vehicle on the path that points along it.
+
+    Args:
+        y_d: its control point [m], earth frame.
+        along: direction of the path, earth frame, of any length but 0.
+        ell: distance of the control point [m].
+
+    """
+    dx, dy, dz = along
+    x, y, z = add_scaled(y_d, -ell / norm(along), along)
+    return x, y, z, atan2(-dz, sqrt(dx * dx + dy * dy)), atan2(dy, dx)
+
+
+# What it asks of the vehicle
+
+
+def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
+    """What (2) asks of the actuators where the vehicle turns steadily with the path.
+
+    In a steady turn sway and heave are v = -m11 u r / d22 and w = m11 u q / d33, so the speed of
+    the control point (10) gives the surge u, and (2) the force and moments. The force that speeds
+    the vehicle up along the path is added to it.
+
+    Args:
+        vehicle: that follows.
+        ell: distance of its control point [m].
+        moment: of the reference, whose velocity is neither zero nor vertical.
+
+    Raises:
+        ImpossiblePath: the path turns within the length ell: no steady motion of the vehicle does.
+
+    """
+    m11, m22, m33 = vehicle.m11, vehicle.m22, vehicle.m33
+    (x, y, z), (dx, dy, dz), (ddx, ddy, ddz) = moment
+    speed, level = norm(moment.dy_d), sqrt(dx * dx + dy * dy)
+    faster = (dx * ddx + dy * ddy) / level
+    q = (dz * faster - ddz * level) / (speed * speed)
+    r = (dx * ddy - dy * ddx) / (level * speed)
+    # speed^2 = u^2 + (v + ell r)^2 + (w - ell q)^2, with the sway and heave that belong to u.
+    sway, heave = m11 * r / vehicle.d22, m11 * q / vehicle.d33
+    A = 1.0 + sway * sway + heave * heave
+    B = ell * (sway * r + heave * q)
+    C = ell * ell * (r * r + q * q) - speed * speed
+    if B * B < A * C:
+        raise ImpossiblePath(
+            f"at ({x:.3g}, {y:.3g}, {z:.3g}) m the path turns at {sqrt(r * r + q * q):.3g} rad/s "
+            f"with {speed:.3g} m/s: more tightly than the vehicle's control point can, {ell:g} m "
+            f"ahead; turn more widely, with a longer rounding"
+        )
+    u = (B + sqrt(B * B - A * C)) / A
+    v, w = -sway * u, heave * u
+    thrust = m11 * (dx * ddx + dy * ddy + dz * ddz) / speed
+    return Demand(
+        speed,
+        sqrt(r * r + q * q),
+        (
+            thrust + vehicle.d11 * u - m22 * v * r + m33 * w * q,
+            vehicle.d55 * q + vehicle.righting_pitch * -dz / speed - (m33 - m11) * u * w,
+            vehicle.d66 * r - (m11 - m22) * u * v,
+        ),
+    )
+
+
+# Whether it can be followed
+
+
+def check(parameters: Parameters) -> None:
+    """Refuse a path that the vehicle cannot follow, and say where.
+
+    Raises:
+        ImpossiblePath: waypoints make no path, or it asks for more than a limit.
+
+    """
+    waypoints, vehicle = parameters.waypoints, parameters.vehicle
+    if not (vehicle.d22 > 0.0 and vehicle.d33 > 0.0):
+        raise ImpossiblePath(
+            "d22 and d33 must be positive: nothing else limits the drift in a turn"
+        )
+    k = 1
+    while k < waypoints.n:
+        _check_leg(waypoints, k)
+        k = k + 1
+    if norm(course(waypoints, first_corner(waypoints, 0.0), _AT_REST)) == 0.0:
+        raise ImpossiblePath("all waypoints are the same: there is no path between them")
+    _check_pitch(waypoints)
+    corner = first_corner(waypoints, 0.0)
+    ahead = corner
+    while corner.k < waypoints.n:
+        ahead = corner_ahead(waypoints, ahead, corner.t - waypoints.rounding / 2)
+        _check_rounding(parameters, corner, ahead)
+        corner = next_corner(waypoints, corner)
+
+
+def _check_leg(waypoints: Waypoints, k: int) -> None:
+    """Refuse a leg, to waypoint k, that nothing can go along."""
+    before, behind = waypoint(waypoints, k - 1), waypoint(waypoints, k)
+    x, y, z = sub(behind, before)
+    if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
+        raise ImpossiblePath(
+            f"waypoint {k + 1:d} has the time {waypoints.t[k]:g} s, and the one before it "
+            f"{waypoints.t[k - 1]:g} s: times must increase"
+        )
+    if not waypoints.timed and distance(before, behind) == 0.0:
+        raise ImpossiblePath(
+            f"waypoints {k:d} and {k + 1:d} are the same; only waypoints with times can rest"
+        )
+    climb = atan2(abs(z), sqrt(x * x + y * y))
+    if climb > STEEPEST:
+        raise ImpossiblePath(
+            f"the leg from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
+            f"degrees, {degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
+            f"(1) has a pole at 90"
+        )
+
+
+def _check_pitch(waypoints: Waypoints) -> None:
+    """Refuse a path that is too steep in a rounding, between legs that are not.
+
+    From one moment at which a rounding begins or ends to the next, dy_d is one cubic polynomial.
+    """
+    opening, closing = first_corner(waypoints, 0.0), first_corner(waypoints, 0.0)
+    begin, fastest, k = opening.t - waypoints.rounding / 2, 0.0, 1
+    while k < waypoints.n:
+        speed = norm(velocity(waypoints, k))
+        fastest = speed if speed > fastest else fastest
+        k = k + 1
+    while closing.k < waypoints.n:
+        ahead, end = closing, closing.t + waypoints.rounding / 2
+        if opening.k < waypoints.n and opening.t - waypoints.rounding / 2 < end:
+            end = opening.t - waypoints.rounding / 2
+            opening = next_corner(waypoints, opening)
+        else:
+            closing = next_corner(waypoints, closing)
+        if end > begin:
+            _check_pitch_between(waypoints, ahead, begin, end, fastest)
+        begin = end
+
+
+def _check_pitch_between(
+    waypoints: Waypoints, ahead: Corner, begin: float, end: float, fastest: float
+) -> None:
+    """Refuse what is too steep between two moments [s], of which dy_d is a cubic polynomial.
+
+    Args:
+        waypoints: of the path.
+        ahead: the first corner whose rounding is not over at the beginning.
+        begin: one moment [s].
+        end: the other one [s].
+        fastest: speed of the fastest leg [m/s].
+
+    """
+    duration, done, share = end - begin, 0.0, 1.0
+    early = reference(waypoints, corner_ahead(waypoints, ahead, begin), begin)
+    while done < 1.0:
+        t = begin + duration * (done + share)
+        late = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
+        if _is_never_steep(early, late, duration * share, fastest):
+            early = late
+            done = done + share
+            share = 1.0 - done
+        else:
+            share = share / 2
+            t = begin + duration * (done + share)
+            corner = corner_ahead(waypoints, ahead, t)
+            (x, y, z), dy_d, _ = reference(waypoints, corner, t)
+            climb = atan2(abs(dy_d[2]), sqrt(dy_d[0] * dy_d[0] + dy_d[1] * dy_d[1]))
+            if _steepness(dy_d, dy_d, fastest) > 0.0:
+                raise ImpossiblePath(
+                    f"near waypoint {corner.k + 1:d}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path "
+                    f"climbs or dives at {degrees(climb):.1f} degrees, "
+                    f"{degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
+                    f"(1) has a pole at 90; insert a less steep leg"
+                )
+            if share < _SHORTEST:
+                raise ImpossiblePath(
+                    f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no "
+                    f"vehicle can follow; add a waypoint to one side"
+                )
+
+
+def _is_never_steep(early: Reference, late: Reference, duration: float, fastest: float) -> bool:
+    """Whether the path is nowhere too steep between two moments.
+
+    Its steepness there is a polynomial of the sixth degree, and nowhere larger than the largest of
+    its coefficients in the basis of Bernstein.
+
+    Args:
+        early: the path at one moment.
+        late: at the other one, between which dy_d is a cubic polynomial.
+        duration: from one to the other [s].
+        fastest: speed of the fastest leg [m/s].
+
+    """
+    a, d = early.dy_d, late.dy_d
+    b, c = add_scaled(a, duration / 3, early.ddy_d), add_scaled(d, -duration / 3, late.ddy_d)
+    return (
+        _steepness(a, a, fastest) <= 0.0
+        and _steepness(a, b, fastest) <= 0.0
+        and 2 * _steepness(a, c, fastest) + 3 * _steepness(b, b, fastest) <= 0.0
+        and _steepness(a, d, fastest) + 9 * _steepness(b, c, fastest) <= 0.0
+        and 2 * _steepness(b, d, fastest) + 3 * _steepness(c, c, fastest) <= 0.0
+        and _steepness(c, d, fastest) <= 0.0
+        and _steepness(d, d, fastest) <= 0.0
+    )
+
+
+def _steepness(one: Vector3, other: Vector3, fastest: float) -> float:
+    """A bilinear form: of a velocity and itself positive where it is steeper than STEEPEST.
+
+    What rounding may make of it is taken off.
+
+    Args:
+        one: a velocity [m/s].
+        other: another one [m/s].
+        fastest: speed of the fastest leg [m/s].
+
+    """
+    m, n = norm(one), norm(other)
+    steep = one[2] * other[2] - _STEEPEST_SLOPE * (one[0] * other[0] + one[1] * other[1])
+    return steep - _OF_BOTH * m * n - _OF_THE_FASTEST * fastest * (m + n)
+
+
+def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> None:
+    """Refuse a rounding that asks for too much, also at its ends, which are those of its legs.
+
+    Args:
+        parameters: of the planner.
+        corner: to be rounded.
+        ahead: the first whose rounding is not over at the beginning of this one.
+
+    """
+    waypoints = parameters.waypoints
+    before, i = _AT_REST, 0
+    while i * _BETWEEN <= 1.0:
+        t = corner.t + waypoints.rounding * (i * _BETWEEN - 0.5)
+        moment = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
+        dx, dy, dz = moment.dy_d
+        # The pitch has been checked: what is vertical here is what rounding has left of a rest.
+        moves = dx * dx + dy * dy > 0.0
+        if before[0] * dx + before[1] * dy + before[2] * dz < 0.0 or (
+            not moves and norm(moment.ddy_d) > 0.0
+        ):
+            raise ImpossiblePath(
+                f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no vehicle "
+                f"can follow; add a waypoint to one side"
+            )
+        if moves:
+            _check_moment(parameters, corner.k + 1, moment)
+        before = moment.dy_d
+        i = i + 1
+
+
+def _check_moment(parameters: Parameters, number: int, moment: Reference) -> None:
+    """Refuse a moment that asks for too much, near the waypoint of a number."""
+    hold_moment(
+        demand(parameters.vehicle, parameters.ell, moment),
+        parameters.limits,
+        parameters.speed_max,
+        parameters.turn_max,
+        number,
+        moment.y_d,
+    )
+
+
+def hold_moment(
+    asked: Demand, limits: Limits, speed_max: float, turn_max: float, number: int, y_d: Vector3
+) -> None:
+    """Refuse a moment that asks for too much.
+
+    Args:
+        asked: of the vehicle.
+        limits: of its actuators.
+        speed_max: that is let pass [m/s].
+        turn_max: that is let pass [rad/s].
+        number: of the waypoint near which that is, from 1; 0: there are none.
+        y_d: the control point [m].
+
+    Raises:
+        ImpossiblePath: it asks for more than a limit.
+
+    """
+    speed, turn, (tau_u, tau_q, tau_r) = asked
+    tau_min, tau_max = limits
+    hold_bounds("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
+    hold_bounds("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
+    hold_bounds("a surge force", tau_u, tau_min[0], tau_max[0], "N", number, y_d)
+    hold_bounds("a moment in pitch", tau_q, tau_min[1], tau_max[1], "N.m", number, y_d)
+    hold_bounds("a moment in yaw", tau_r, tau_min[2], tau_max[2], "N.m", number, y_d)
+
+
+def hold_bounds(
+    what: str, asked: float, least: float, most: float, unit: str, number: int, y_d: Vector3
+) -> None:
+    """Refuse what is out of bounds.
+
+    Args:
+        what: is asked for.
+        asked: how much of it.
+        least, most: its bounds.
+        unit: of these.
+        number: of the waypoint near which that is, from 1; 0: there are none.
+        y_d: the control point [m].
+
+    Raises:
+        ImpossiblePath: it is.
+
+    """
+    if not least <= asked <= most:
+        limit = least if asked < least else most
+        if number == 0:
+            raise ImpossiblePath(
+                f"at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m the reference asks for {what} of "
+                f"{asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of {limit:.3g}; "
+                f"lead more slowly or in wider turns, or take a place nearer to the leader"
+            )
+        raise ImpossiblePath(
+            f"near waypoint {number:d}, at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m, the path "
+            f"asks for {what} of {asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of "
+            f"{limit:.3g}; reduce the speed or raise rounding"
+        )

@@ -1,0 +1,123 @@
+"""The limits of the actuators, equation (3), and the dynamics that Remark 2 leaves out."""
+
+from __future__ import annotations
+
+from math import exp, expm1
+from typing import Annotated, NamedTuple
+
+from auv_fmu.language.quantities import TAU
+from auv_fmu.language.variable import Variable
+from auv_fmu.language.vectors import Vector3, scale, sub
+
+
+class Limits(NamedTuple):
+    """Limits of (3) for u, q, r, with the values of section 4.1."""
+
+    tau_min: Annotated[Vector3, Variable(TAU, "Lower limit of the actuators (3)", maximum=0.0)] = (
+        -80.0,
+        -80.0,
+        -80.0,
+    )
+    tau_max: Annotated[Vector3, Variable(TAU, "Upper limit of the actuators (3)", 0.0)] = (
+        80.0,
+        80.0,
+        80.0,
+    )
+
+
+def limit(tau_k: float, tau_min: float, tau_max: float) -> float:
+    """One actuator that cannot leave its limits: equation (3).
+
+    Args:
+        tau_k: commanded force [N] or moment [N.m].
+        tau_min, tau_max: limits in the same unit, tau_min < tau_max.
+
+    """
+    if tau_k > tau_max:
+        return tau_max
+    if tau_k < tau_min:
+        return tau_min
+    return tau_k
+
+
+def limit_all(tau: Vector3, tau_min: Vector3, tau_max: Vector3) -> Vector3:
+    """Equation (3) for k = u, q, r."""
+    return (
+        limit(tau[0], tau_min[0], tau_max[0]),
+        limit(tau[1], tau_min[1], tau_max[1]),
+        limit(tau[2], tau_min[2], tau_max[2]),
+    )
+
+
+class Drive(NamedTuple):
+    """What the actuators u, q, r give within a step [N, N.m]."""
+
+    first: Vector3  #: at its beginning
+    middle: Vector3  #: halfway, as Simpson's rule needs it for the mean
+    last: Vector3  #: at its end
+    mean: Vector3  #: over it
+
+
+def respond(before: float, tau_k: float, T: float, h: float) -> float:
+    """One actuator of first order, T dtau_a/dt = tau_k - tau_a, after a step: exactly.
+
+    Args:
+        before: what it gave at the beginning of the step [N, N.m].
+        tau_k: what it is to give, held during the step, within the limits of (3).
+        T: its time constant [s]; 0: it follows at once.
+        h: step [s].
+
+    """
+    return tau_k + (before - tau_k) * exp(-h / T) if T else tau_k
+
+
+def mean_response(before: float, tau_k: float, T: float, h: float) -> float:
+    """The mean of the same actuator over the step: its impulse divided by h, exactly."""
+    if not T:
+        return tau_k
+    x = h / T
+    return tau_k + (before - tau_k) * (-expm1(-x) / x if x else 1.0)
+
+
+def given(before: Vector3, tau: Vector3, T: Vector3) -> Vector3:
+    """What the actuators u, q, r give: those that follow at once what they are to give.
+
+    Args:
+        before: what they gave just before [N, N.m].
+        tau: what they are to give [N, N.m].
+        T: their time constants [s]; 0: they follow at once.
+
+    """
+    return (
+        before[0] if T[0] else tau[0],
+        before[1] if T[1] else tau[1],
+        before[2] if T[2] else tau[2],
+    )
+
+
+def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
+    """What the actuators u, q, r give within a step.
+
+    A vehicle that takes the mean feels the true impulse, and so does one whose scheme weighs
+    first, middle and last by 1, 4, 1: the middle is off by O(h^4), and right for any T.
+
+    Args:
+        before: what they gave at its beginning [N, N.m].
+        tau: what they are to give, held during the step, within the limits of (3) [N, N.m].
+        T: their time constants [s]; 0: they follow at once.
+        h: step [s].
+
+    """
+    first = given(before, tau, T)
+    last = (
+        respond(before[0], tau[0], T[0], h),
+        respond(before[1], tau[1], T[1], h),
+        respond(before[2], tau[2], T[2], h),
+    )
+    mean = (
+        mean_response(before[0], tau[0], T[0], h),
+        mean_response(before[1], tau[1], T[1], h),
+        mean_response(before[2], tau[2], T[2], h),
+    )
+    middle = scale(0.25, sub(sub(scale(6.0, mean), first), last))
+    return Drive(first, middle, last, mean)

@@ -1,0 +1,522 @@
+"""The simulated vehicle with six degrees of freedom: section 4.1.
+
+The controller is derived on five degrees of freedom; the paper simulates six and takes "the
+roll interaction as an external disturbance". The plant does that to the letter: the terms that
+roll adds to (2) enter through tau_w, so (2) stands once and is met exactly when p = 0
+(reading 1). Not in the paper, and off by default: roll that is held at zero, which leaves only
+(1) and (2), water that moves, actuators with dynamics, and an integrator of fourth order.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from random import Random
+from typing import Annotated, NamedTuple
+
+from auv_fmu.language.quantities import ETA, LAG, NU, VELOCITY
+from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.vectors import (
+    Rotation,
+    Vector3,
+    Vector4,
+    Vector6,
+    add,
+    add_scaled,
+    sub,
+)
+from auv_fmu.paper.actuators import Drive, Limits, drive, given, limit_all
+from auv_fmu.paper.attitude import (
+    euler_from_rotation,
+    euler_without_roll,
+    normalised,
+    quaternion_from_euler,
+    quaternion_rates,
+    rotate,
+    rotate_back,
+    rotation_from_quaternion,
+)
+from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
+from auv_fmu.paper.vehicle import Vehicle, accelerations, euler_rates
+
+#: Initial posture of section 4.1: x, y, z [m], phi, theta, psi [rad]; it does not give phi.
+ETA_0: Vector6 = (2.0, 6.0, 0.0, 0.0, 0.0, 0.0)
+
+#: Initial velocity (u, v, w, p, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
+NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+#: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.
+_FARTHEST = 1e6
+
+_NO_FORCE = (0.0, 0.0, 0.0)
+_STILL = (0.0, 0.0, 0.0)
+
+
+class Integrator(IntEnum):
+    """A way to integrate (1) and (2) over a step."""
+
+    EULER = 0  #: Euler's scheme, which section 4.1 simulates with
+    RK4 = 1  #: the classical Runge-Kutta scheme of fourth order; not in the paper
+
+
+#: Each by a name of its own, which Python finds faster than in the class.
+EULER, RK4 = Integrator
+
+
+class RollAxis(NamedTuple):
+    """What the sixth degree of freedom adds to :class:`~auv_fmu.paper.vehicle.Vehicle`."""
+
+    m44: Annotated[float, Variable("kg.m2", "Roll inertia with added inertia", POSITIVE)] = 22.5
+    d44: Annotated[float, Variable("kg.m2/s", "Linear damping of roll", 0.0)] = 20.0
+    righting_roll: Annotated[
+        float,
+        Variable(
+            "N.m",
+            "Righting moment in roll, not given in the paper; by default as in pitch",
+            name="righting.roll",
+        ),
+    ] = 5.0
+    rolls: Annotated[
+        bool,
+        Variable(
+            "1",
+            "Whether roll is free; if false, the vehicle follows (1) and (2). Not in the paper",
+            name="roll",
+        ),
+    ] = True
+
+
+class Localisation(NamedTuple):
+    """The localisation system; section 4.1 gives none of its numbers (reading 7)."""
+
+    std: Annotated[
+        float,
+        Variable(
+            "m",
+            "Standard deviation of each measured coordinate",
+            0.0,
+            _FARTHEST,
+        ),
+    ] = 0.001
+    seed: Annotated[int, Variable("1", "Seed of the noise")] = 1
+
+
+class Parameters(NamedTuple):
+    """All parameters of the plant."""
+
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()
+    roll: Annotated[RollAxis, Variable(name="")] = RollAxis()
+    ell: Distance = ELL
+    limits: Annotated[Limits, Variable(name="")] = Limits()
+    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = ETA_0
+    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = NU_0
+    noise: Localisation = Localisation()
+    current: Annotated[
+        Vector3,
+        Variable(VELOCITY, "Ocean current in the earth frame; not in the paper", tunable=True),
+    ] = (0.0, 0.0, 0.0)
+    T: Annotated[
+        Vector3,
+        Variable(
+            LAG,
+            "Time constant of the actuator lag, after the limits; 0: no lag. Not in the paper "
+            "(Remark 2)",
+            0.0,
+            name="actuator.T",
+        ),
+    ] = (0.0, 0.0, 0.0)
+    integrator: Annotated[
+        Integrator,
+        Variable("1", "Scheme that integrates (1) and (2): euler, as in the paper, or rk4"),
+    ] = Integrator.EULER
+
+
+class PlantState(NamedTuple):
+    """Motion of the vehicle, and what drives it."""
+
+    position: Vector3  #: centre of mass (x, y, z) [m], earth frame
+    quaternion: Vector4  #: attitude, body to earth, scalar first
+    nu_r: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
+    tau: Vector3  #: (tau_u, tau_q, tau_r) that acted at the end of the last step [N, N.m]
+    water: Vector3  #: velocity of the water that nu_r is through [m/s], earth frame
+
+
+class PlantOutputs(NamedTuple):
+    """What can be seen of the vehicle."""
+
+    euler: Vector3  #: roll, pitch, yaw [rad]
+    y: Vector3  #: control point [m], earth frame, without measurement noise
+    dy: Vector3  #: velocity of the control point [m/s], earth frame
+    nu: Vector6  #: (u, v, w, p, q, r) over ground [m/s, rad/s], body frame
+    nu_r: Vector6  #: the same through the water
+
+
+class Rates(NamedTuple):
+    """What (1) and (2) say at a state."""
+
+    position: Vector3  #: [m/s], earth frame
+    attitude: Vector4  #: of the quaternion; without roll, of (0, 0, theta, psi) [1/s, rad/s]
+    nu_r: Vector6  #: d/dt (u, v, w, p, q, r) [m/s2, rad/s2]
+
+
+def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
+    """Velocity over ground of a vehicle that moves through water with nu_r [m/s, rad/s].
+
+    A constant current without rotation enters (2) only through this: the terms of (2) take the
+    velocity through the water in the place of nu (Fossen).
+
+    Args:
+        nu_r: (u, v, w, p, q, r) through the water, body frame.
+        rotation: body to earth.
+        water: velocity of the water [m/s], earth frame.
+
+    """
+    c_x, c_y, c_z = water
+    if not (c_x or c_y or c_z):
+        return nu_r
+    u, v, w, p, q, r = nu_r
+    u_c, v_c, w_c = rotate_back(rotation, water)
+    return u + u_c, v + v_c, w + w_c, p, q, r
+
+
+def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantState:
+    """The same motion over ground, in water that moves at another velocity.
+
+    Water whose velocity changes at an instant changes the velocity through the water, as a vehicle
+    with a mass keeps its own. What :func:`carried` knows of the change is no longer part of it.
+
+    Args:
+        state: of the vehicle, in whatever water it has been.
+        rotation: body to earth, of its quaternion.
+        water: velocity of the water from now on [m/s], earth frame.
+
+    """
+    change = sub(state.water, water)
+    c_x, c_y, c_z = change
+    if not (c_x or c_y or c_z):
+        return state
+    nu_r = over_ground(state.nu_r, rotation, change)
+    return PlantState(state.position, state.quaternion, nu_r, state.tau, water)
+
+
+def carried(state: PlantState, dwater: Vector3, h: float) -> PlantState:
+    """The state after a step in which the water has speeded up, from that after a step without.
+
+    Water that speeds up takes a neutrally buoyant vehicle along, as it would take itself. With the
+    mass m of the vehicle and of the water that it displaces, the added mass A and the acceleration
+    a of the water, both forces of the water (Froude-Krylov m a, added mass A (a - dv/dt)) give
+
+        m dv/dt = m a + A (a - dv/dt) + ...,   so   (m + A) d(v - water)/dt = ...
+
+    So (2) holds for the velocity through the water as in still water, and m + A, which is the M of
+    (2), need not be known in its parts. Only the velocity over ground changes, by that of the
+    water: over the step by h a, and the position by h^2 a / 2 more.
+
+    Args:
+        state: of the vehicle after the step, with the water as it was at the beginning.
+        dwater: acceleration of the water [m/s2], earth frame.
+        h: step [s].
+
+    """
+    a_x, a_y, a_z = dwater
+    if not (a_x or a_y or a_z):
+        return state
+    return PlantState(
+        add_scaled(state.position, 0.5 * h * h, dwater),
+        state.quaternion,
+        state.nu_r,
+        state.tau,
+        add_scaled(state.water, h, dwater),
+    )
+
+
+def accelerations_6dof(
+    vehicle: Vehicle, roll: RollAxis, nu: Vector6, rotation: Rotation, tau: Vector3, tau_w: Vector6
+) -> Vector6:
+    """Body-fixed accelerations with roll: (2) and the terms of a diagonal M that p adds.
+
+    Args:
+        vehicle, roll: parameters.
+        nu: (u, v, w, p, q, r) [m/s, rad/s], body frame.
+        rotation: body to earth.
+        tau: applied (tau_u, tau_q, tau_r) [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m]; enters with a minus.
+
+    Returns:
+        d/dt (u, v, w, p, q, r) [m/s2, rad/s2].
+
+    """
+    m44, d44, righting_roll, rolls = roll
+    m22, m33, m55, m66 = vehicle.m22, vehicle.m33, vehicle.m55, vehicle.m66
+    u, v, w, p, q, r = nu
+    tau_wu, tau_wv, tau_ww, tau_wp, tau_wq, tau_wr = tau_w
+    sin_theta, cos_theta_sin_phi = -rotation[0][2], rotation[1][2]
+    du, dv, dw, dq, dr = accelerations(
+        vehicle,
+        (u, v, w, q, r),
+        sin_theta,
+        tau,
+        (
+            tau_wu,
+            tau_wv - m33 * w * p,
+            tau_ww + m22 * v * p,
+            tau_wq - (m66 - m44) * p * r,
+            tau_wr - (m44 - m55) * p * q,
+        ),
+    )
+    dp = (
+        (m22 - m33) * v * w
+        + (m55 - m66) * q * r
+        - d44 * p
+        - righting_roll * cos_theta_sin_phi
+        - tau_wp
+    ) / m44
+    return du, dv, dw, dp if rolls else 0.0, dq, dr
+
+
+def rates(
+    vehicle: Vehicle,
+    roll: RollAxis,
+    state: PlantState,
+    rotation: Rotation,
+    tau: Vector3,
+    tau_w: Vector6,
+) -> Rates:
+    """How the motion changes: (1) and (2).
+
+    Args:
+        vehicle, roll: parameters.
+        state: of the vehicle.
+        rotation: body to earth, of its quaternion.
+        tau: (tau_u, tau_q, tau_r) that acts [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+
+    """
+    _, quaternion, nu_r, _, water = state
+    u, v, w, p, q, r = nu_r
+    velocity = rotate(rotation, (u, v, w))
+    c_x, c_y, c_z = water
+    if c_x or c_y or c_z:
+        velocity = add(velocity, water)
+    dnu = accelerations_6dof(vehicle, roll, nu_r, rotation, tau, tau_w)
+    if roll.rolls:
+        return Rates(velocity, quaternion_rates(quaternion, (p, q, r)), dnu)
+    _, theta, _ = euler_without_roll(rotation)
+    dtheta, dpsi = euler_rates(theta, q, r)
+    return Rates(velocity, (0.0, 0.0, dtheta, dpsi), dnu)
+
+
+def moved(
+    roll: RollAxis, state: PlantState, rotation: Rotation, rate: Rates, tau: Vector3, h: float
+) -> PlantState:
+    """The state that h seconds at constant rates lead to.
+
+    Args:
+        roll: parameters.
+        state: of the vehicle.
+        rotation: body to earth, of its quaternion.
+        rate: of the state.
+        tau: (tau_u, tau_q, tau_r) that acts after that time [N, N.m].
+        h: time [s].
+
+    """
+    position, (a, b, c, d), (u, v, w, p, q, r), _, water = state
+    _, (da, db, dc, dd), (du, dv, dw, dp, dq, dr) = rate
+    position = add_scaled(position, h, rate.position)
+    nu = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
+    if roll.rolls:
+        attitude = normalised((a + h * da, b + h * db, c + h * dc, d + h * dd))
+        return PlantState(position, attitude, nu, tau, water)
+    phi, theta, psi = euler_without_roll(rotation)
+    attitude = quaternion_from_euler(phi, theta + h * dc, psi + h * dd)
+    return PlantState(position, attitude, nu, tau, water)
+
+
+def step(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    acting: Drive,
+    tau_w: Vector6,
+    h: float,
+) -> PlantState:
+    """One step of Euler's scheme under held inputs.
+
+    Args:
+        parameters: of the plant.
+        state: at the beginning of the step.
+        rotation: body to earth, of its quaternion; its outputs need it too.
+        acting: what the actuators give.
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+        h: step [s].
+
+    """
+    vehicle, roll = parameters.vehicle, parameters.roll
+    rate = rates(vehicle, roll, state, rotation, acting.mean, tau_w)
+    return moved(roll, state, rotation, rate, acting.last, h)
+
+
+def step_rk4(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    acting: Drive,
+    tau_w: Vector6,
+    h: float,
+) -> PlantState:
+    """One step of the classical Runge-Kutta scheme under held inputs; arguments as of Euler's."""
+    vehicle, roll = parameters.vehicle, parameters.roll
+    one = rates(vehicle, roll, state, rotation, acting.first, tau_w)
+    near = moved(roll, state, rotation, one, acting.middle, 0.5 * h)
+    turned = rotation_from_quaternion(near.quaternion)
+    two = rates(vehicle, roll, near, turned, acting.middle, tau_w)
+    near = moved(roll, state, rotation, two, acting.middle, 0.5 * h)
+    turned = rotation_from_quaternion(near.quaternion)
+    three = rates(vehicle, roll, near, turned, acting.middle, tau_w)
+    near = moved(roll, state, rotation, three, acting.last, h)
+    turned = rotation_from_quaternion(near.quaternion)
+    four = rates(vehicle, roll, near, turned, acting.last, tau_w)
+    rate = weighted(one, two, three, four)
+    return moved(roll, state, rotation, rate, acting.last, h)
+
+
+def weighted(one: Rates, two: Rates, three: Rates, four: Rates) -> Rates:
+    """The mean rates of a step, of those at its beginning, twice halfway, and at its end."""
+    return Rates(
+        (
+            mean(one.position[0], two.position[0], three.position[0], four.position[0]),
+            mean(one.position[1], two.position[1], three.position[1], four.position[1]),
+            mean(one.position[2], two.position[2], three.position[2], four.position[2]),
+        ),
+        (
+            mean(one.attitude[0], two.attitude[0], three.attitude[0], four.attitude[0]),
+            mean(one.attitude[1], two.attitude[1], three.attitude[1], four.attitude[1]),
+            mean(one.attitude[2], two.attitude[2], three.attitude[2], four.attitude[2]),
+            mean(one.attitude[3], two.attitude[3], three.attitude[3], four.attitude[3]),
+        ),
+        (
+            mean(one.nu_r[0], two.nu_r[0], three.nu_r[0], four.nu_r[0]),
+            mean(one.nu_r[1], two.nu_r[1], three.nu_r[1], four.nu_r[1]),
+            mean(one.nu_r[2], two.nu_r[2], three.nu_r[2], four.nu_r[2]),
+            mean(one.nu_r[3], two.nu_r[3], three.nu_r[3], four.nu_r[3]),
+            mean(one.nu_r[4], two.nu_r[4], three.nu_r[4], four.nu_r[4]),
+            mean(one.nu_r[5], two.nu_r[5], three.nu_r[5], four.nu_r[5]),
+        ),
+    )
+
+
+def mean(one: float, two: float, three: float, four: float) -> float:
+    """Simpson's mean, with two values for the middle."""
+    return (one + 2.0 * (two + three) + four) / 6.0
+
+
+def begin(parameters: Parameters, water: Vector3) -> PlantState:
+    """State at the start, with actuators at rest.
+
+    Args:
+        parameters: of the plant.
+        water: velocity of the water [m/s], earth frame.
+
+    """
+    x, y, z, phi, theta, psi = parameters.eta0
+    quaternion = quaternion_from_euler(phi, theta, psi)
+    state = PlantState((x, y, z), quaternion, parameters.nu0, _NO_FORCE, _STILL)
+    return immersed(state, rotation_from_quaternion(quaternion), water)
+
+
+def flow(parameters: Parameters, water: Vector3) -> Vector3:
+    """Velocity of the water: the parameter `current` and what is told beside it [m/s]."""
+    return add(parameters.current, water)
+
+
+def applied(parameters: Parameters, tau: Vector3) -> Vector3:
+    """What the limits (3) leave of a command (tau_u, tau_q, tau_r) [N, N.m]."""
+    return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
+
+
+def actuation(parameters: Parameters, state: PlantState, tau: Vector3) -> Vector3:
+    """What the actuators give (tau_u, tau_q, tau_r) [N, N.m].
+
+    Args:
+        parameters: of the plant.
+        state: of the vehicle.
+        tau: what they are to give, after the limits of (3) [N, N.m].
+
+    """
+    return given(state.tau, tau, parameters.T)
+
+
+def advance(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    tau: Vector3,
+    tau_w: Vector6,
+    water: Vector3,
+    dwater: Vector3,
+    h: float,
+) -> PlantState:
+    """State after a step under held inputs, by the integrator of the parameters.
+
+    Args:
+        parameters: of the plant.
+        state, rotation: at the beginning.
+        tau: (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+        water: velocity of the water at the beginning [m/s], earth frame.
+        dwater: its acceleration [m/s2], earth frame.
+        h: step [s].
+
+    """
+    T_u, T_q, T_r = parameters.T
+    state = immersed(state, rotation, water)
+    acts = Drive(tau, tau, tau, tau)
+    if T_u or T_q or T_r:
+        acts = drive(state.tau, tau, parameters.T, h)
+    if parameters.integrator == RK4:
+        state = step_rk4(parameters, state, rotation, acts, tau_w, h)
+    else:
+        state = step(parameters, state, rotation, acts, tau_w, h)
+    return carried(state, dwater, h)
+
+
+def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> PlantOutputs:
+    """Euler angles, control point (9), its velocity (10), and the velocity of the vehicle.
+
+    Args:
+        state: of the vehicle.
+        rotation: body to earth, of its quaternion.
+        ell: distance of the control point [m].
+        rolls: whether the vehicle does.
+
+    """
+    position, _, nu_r, _, water = state
+    nu = over_ground(nu_r, rotation, water)
+    return PlantOutputs(
+        euler_from_rotation(rotation) if rolls else euler_without_roll(rotation),
+        control_point(position, rotation, ell),
+        control_point_velocity(rotation, nu, ell),
+        nu,
+        nu_r,
+    )
+
+
+def white_noise(seed: int) -> Random:
+    """The generator of the localisation system's noise, another one for each seed.
+
+    Args:
+        seed: any 32-bit integer. Random takes the magnitude of its seed.
+
+    """
+    return Random(seed % 2**32)
+
+
+def measure(y: Vector3, n: Vector3, std: float) -> Vector3:
+    """The localisation system: y with white noise.
+
+    Args:
+        y: control point [m], earth frame.
+        n: three independent standard normal numbers.
+        std: standard deviation of each axis [m]; not in the paper (reading 7).
+
+    """
+    return add_scaled(y, std, n)

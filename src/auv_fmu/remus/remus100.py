@@ -1,0 +1,301 @@
+"""The REMUS 100, an underwater vehicle with fins and one propeller, whose numbers are published.
+
+The model is that of the class `remus100` in PythonVehicleSimulator 1.0.1, by Fossen; the page of
+the component says where each number comes from and what is odd in it. Not in the paper. Everything
+refers to the centre of buoyancy, and the body frame lies in it: x forward, y to starboard, z down.
+"""
+
+from __future__ import annotations
+
+from math import cos, exp, sin, sqrt
+from typing import Annotated, NamedTuple
+
+from auv_fmu.language.arrays import Vector
+from auv_fmu.language.linear_algebra import solve
+from auv_fmu.language.quantities import ETA, NU, VELOCITY
+from auv_fmu.language.variable import Variable
+from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled
+from auv_fmu.paper.attitude import rotate, rotation_from_euler
+from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
+from auv_fmu.paper.plant import Localisation
+from auv_fmu.remus.hull import (
+    Drag,
+    Hull,
+    Inertia,
+    coriolis,
+    cross_flow,
+    inertia,
+    lift_and_drag,
+    righting,
+)
+from auv_fmu.remus.tail import FASTEST, FASTEST_TURN, Tail, forces, limit_tail
+
+
+class TooFast(ArithmeticError):
+    """A motion through the water for which the model does not hold."""
+
+
+class Parameters(NamedTuple):
+    """All parameters of the vehicle."""
+
+    hull: Annotated[Hull, Variable(name="")] = Hull()
+    drag: Annotated[Drag, Variable(name="")] = Drag()
+    tail: Annotated[Tail, Variable(name="")] = Tail()
+    T_delta: Annotated[float, Variable("s", "Time constant of the fins", 0.0, name="fin.T")] = 0.1
+    T_n: Annotated[
+        float, Variable("s", "Time constant of the propeller", 0.0, name="propeller.T")
+    ] = 1.0
+    ell: Distance = ELL
+    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = (
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
+    noise: Localisation = Localisation()
+    current: Annotated[
+        Vector3, Variable(VELOCITY, "Ocean current in the earth frame", tunable=True)
+    ] = (0.0, 0.0, 0.0)
+
+
+class RemusState(NamedTuple):
+    """Motion of the vehicle, its fins and its propeller."""
+
+    position: Vector3  #: centre of buoyancy (x, y, z) [m], earth frame
+    euler: Vector3  #: roll, pitch, yaw [rad]
+    nu: Vector6  #: (u, v, w, p, q, r) over ground [m/s, rad/s], body frame
+    actuator: Vector3  #: (delta_r, delta_s, n) [rad, rad, rad/s]
+    water: Vector3  #: velocity of the water at the end of the last step [m/s], earth frame
+
+
+def water_in_body(psi: float, water: Vector3) -> Vector3:
+    """Velocity of the water [m/s] in a frame that turns with the yaw psi [rad] only.
+
+    In the model of PythonVehicleSimulator a current does not see roll and pitch.
+    """
+    x, y, z = water
+    return x * cos(psi) + y * sin(psi), y * cos(psi) - x * sin(psi), z
+
+
+def through_water(state: RemusState) -> Vector6:
+    """(u, v, w, p, q, r) through the water [m/s, rad/s], body frame."""
+    u, v, w, p, q, r = state.nu
+    u_c, v_c, w_c = water_in_body(state.euler[2], state.water)
+    return u - u_c, v - v_c, w - w_c, p, q, r
+
+
+def tail_forces(tail: Tail, state: RemusState) -> Vector6:
+    """What fins and propeller give [N, N.m]; the propeller advances as fast as over ground."""
+    u, v, w, _, _, _ = through_water(state)
+    over_ground = state.nu[0] * state.nu[0] + state.nu[1] * state.nu[1] + state.nu[2] * state.nu[2]
+    return forces(tail, state.actuator, u, v, w, sqrt(over_ground))
+
+
+def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> Vector6:
+    """M d nu_r/dt + C(nu_r) nu_r + D(nu_r) nu_r + g(eta) = tau, solved for d nu/dt.
+
+    Args:
+        parameters: of the vehicle.
+        mass: of its hull.
+        state: of the vehicle.
+
+    Returns:
+        d/dt (u, v, w, p, q, r) over ground [m/s2, rad/s2], body frame.
+
+    """
+    hull, drag, tail = parameters.hull, parameters.drag, parameters.tail
+    nu_r = through_water(state)
+    u, v, w, p, q, r = nu_r
+    tau = tail_forces(tail, state)
+    c = coriolis(hull, mass, nu_r)
+    lift = lift_and_drag(hull, drag, tail.rho, u, v, w)
+    across, turning = cross_flow(hull, drag, tail.rho, v, r)
+    g = righting(hull, state.euler[0], state.euler[1])
+    M = mass.M
+    fade = exp(-drag.fading * sqrt(u * u + v * v + w * w))
+    upright = hull.mass * hull.gravity * hull.r_bg[2]
+    K_p = M[3, 3] * 2.0 * drag.zeta_roll * sqrt(upright / M[3, 3])
+    M_q = M[4, 4] * 2.0 * drag.zeta_pitch * sqrt(upright / M[4, 4])
+    force = Vector(
+        (
+            tau[0] + lift[0] - c[0] - M[0, 0] / drag.T_surge * fade * u,
+            tau[1] + across - c[1] - M[1, 1] / drag.T_sway * fade * v,
+            tau[2] + lift[2] - c[2] - M[2, 2] / drag.T_heave * w,
+            tau[3] - c[3] - K_p * p + g[0],
+            tau[4] - c[4] - M_q * q + g[1],
+            tau[5] + turning - c[5] - M[5, 5] / drag.T_yaw * r + g[2],
+        )
+    )
+    dnu = solve(M, force)
+    u_c, v_c, _ = water_in_body(state.euler[2], state.water)
+    return dnu[0] + r * v_c, dnu[1] - r * u_c, dnu[2], dnu[3], dnu[4], dnu[5]
+
+
+def euler_rates(phi: float, theta: float, p: float, q: float, r: float) -> Vector3:
+    """Rates of roll, pitch and yaw [rad/s]; those of roll and yaw have a pole at +-pi/2 of pitch.
+
+    Args:
+        phi, theta: roll and pitch [rad].
+        p, q, r: rates in the body frame [rad/s].
+
+    """
+    turn = sin(phi) * q + cos(phi) * r
+    return p + sin(theta) / cos(theta) * turn, cos(phi) * q - sin(phi) * r, turn / cos(theta)
+
+
+def follow(before: float, command: float, T: float, h: float) -> float:
+    """A fin or propeller of first order after an explicit step; it follows at once if T <= h.
+
+    Args:
+        before: angle [rad] or speed [rad/s] at the beginning of the step.
+        command: for it, held during the step.
+        T: time constant [s].
+        h: step [s].
+
+    """
+    return before + h / T * (command - before) if h < T else command
+
+
+def step(
+    parameters: Parameters, mass: Inertia, state: RemusState, command: Vector3, h: float
+) -> RemusState:
+    """One step of Euler's scheme under a held command, with the order of PythonVehicleSimulator.
+
+    The velocity advances with fins and propeller as they are at the beginning, the posture with the
+    velocity at the end.
+
+    Args:
+        parameters: of the vehicle.
+        mass: of its hull.
+        state: at the beginning of the step.
+        command: (delta_r, delta_s, n) [rad, rad, rad/s].
+        h: step [s].
+
+    """
+    dnu = accelerations(parameters, mass, state)
+    u, v, w = state.nu[0] + h * dnu[0], state.nu[1] + h * dnu[1], state.nu[2] + h * dnu[2]
+    p, q, r = state.nu[3] + h * dnu[3], state.nu[4] + h * dnu[4], state.nu[5] + h * dnu[5]
+    delta_r, delta_s, n = state.actuator
+    T_delta, T_n = parameters.T_delta, parameters.T_n
+    actuator = (
+        follow(delta_r, command[0], T_delta, h),
+        follow(delta_s, command[1], T_delta, h),
+        follow(n, command[2], T_n, h),
+    )
+    phi, theta, psi = state.euler
+    velocity = rotate(rotation_from_euler(phi, theta, psi), (u, v, w))
+    turn = euler_rates(phi, theta, p, q, r)
+    return RemusState(
+        add_scaled(state.position, h, velocity),
+        add_scaled(state.euler, h, turn),
+        (u, v, w, p, q, r),
+        limit_tail(parameters.tail, actuator),
+        state.water,
+    )
+
+
+def carried(state: RemusState, dwater: Vector3, h: float) -> RemusState:
+    """The state after a step in which the water has speeded up, from that after a step without.
+
+    As in :func:`auv_fmu.paper.plant.carried`: the vehicle is as heavy as the water that it
+    displaces, so its velocity over ground changes by that of the water, and that through the
+    water does not.
+
+    Args:
+        state: of the vehicle after the step, with the water as it was at the beginning.
+        dwater: acceleration of the water [m/s2], earth frame.
+        h: step [s].
+
+    """
+    if not (dwater[0] or dwater[1] or dwater[2]):
+        return state
+    x, y, z = water_in_body(state.euler[2], dwater)
+    u, v, w, p, q, r = state.nu
+    return RemusState(
+        add_scaled(state.position, 0.5 * h * h, dwater),
+        state.euler,
+        (u + h * x, v + h * y, w + h * z, p, q, r),
+        state.actuator,
+        add_scaled(state.water, h, dwater),
+    )
+
+
+def check_speed(state: RemusState) -> None:
+    """Refuse a motion for which the model does not hold.
+
+    Raises:
+        TooFast: it moves through the water faster than :data:`.tail.FASTEST`, or turns faster than
+            :data:`.tail.FASTEST_TURN`.
+
+    """
+    u, v, w, p, q, r = through_water(state)
+    speed = sqrt(u * u + v * v + w * w)
+    turn = sqrt(p * p + q * q + r * r)
+    if not (speed <= FASTEST and turn <= FASTEST_TURN):
+        raise TooFast(
+            f"the vehicle moves at {speed:.3g} m/s through the water and turns at {turn:.3g} "
+            f"rad/s; the model ends at {FASTEST:g} m/s and {FASTEST_TURN:g} rad/s: mend water, nu0 "
+            "or h_max"
+        )
+
+
+def begin(parameters: Parameters, water: Vector3) -> RemusState:
+    """State at the start, with fins amidships and a propeller at rest.
+
+    Args:
+        parameters: of the vehicle.
+        water: velocity of the water, beside `current` [m/s], earth frame.
+
+    """
+    x, y, z, phi, theta, psi = parameters.eta0
+    flow = add(parameters.current, water)
+    state = RemusState((x, y, z), (phi, theta, psi), parameters.nu0, (0.0, 0.0, 0.0), flow)
+    check_speed(state)
+    return state
+
+
+def advance(
+    parameters: Parameters,
+    state: RemusState,
+    command: Vector3,
+    water: Vector3,
+    dwater: Vector3,
+    h: float,
+) -> RemusState:
+    """State after a step under held inputs.
+
+    Args:
+        parameters: of the vehicle.
+        state: at the beginning.
+        command: (delta_r, delta_s, n) [rad, rad, rad/s].
+        water: velocity of the water at the beginning, beside `current` [m/s], earth frame.
+        dwater: its acceleration [m/s2], earth frame.
+        h: step [s].
+
+    """
+    flow = add(parameters.current, water)
+    state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
+    check_speed(state)
+    mass = inertia(parameters.hull)
+    state = carried(step(parameters, mass, state, command, h), dwater, h)
+    check_speed(state)
+    return state
+
+
+def control(state: RemusState, ell: float) -> tuple[Vector3, Vector3]:
+    """The control point [m] and its velocity [m/s], earth frame: (9) and (10).
+
+    Args:
+        state: of the vehicle.
+        ell: distance of the control point from the centre of buoyancy [m].
+
+    """
+    phi, theta, psi = state.euler
+    rotation = rotation_from_euler(phi, theta, psi)
+    return (
+        control_point(state.position, rotation, ell),
+        control_point_velocity(rotation, state.nu, ell),
+    )
