@@ -132,7 +132,8 @@ TYPES = (FLOAT, INT, BOOL, V3, V2, M33, M23, RECORD, MODE, PAIR)
 LETTERS = dict(zip("FIBVWMNREP", TYPES, strict=True))
 NAMES = {"$v": V3, "$r": RECORD}
 
-#: What an expression of a type can be. The first is one that needs no other.
+#: What an expression of a type can be. The first is one that needs no other. A letter after `~` is
+#: computed in some cases only: what `^` is before is refused there, for it needs a name.
 GRAMMAR = {
     FLOAT: "0.0 | -0.0 | 1.0 | 0.5 | 2.0 | -3.25 | 1e-9 | 1e300 | inf | pi | 1e-310",
     INT: "0 | 1 | 2 | 7 | -5 | 2147483647 | -2147483647",
@@ -147,7 +148,7 @@ GRAMMAR = {
 }
 DEEPER = {
     FLOAT: """
-        (F + F) | (F - F) | F * F | (F / F) | -F | (F % F) | (F // F) | (F if B else F) | (F + 2)
+        (F + F) | (F - F) | F * F | (F / F) | -F | (F % F) | (F // F) | (~F if B else ~F) | (F + 2)
         | (3 - F) | (I * F) | (I / I) | float(I) | V[0] | V[-1] | V[I % 4] | (V @ XS[1:4]) | V.sum()
         | max(V) | min(F, F, 1.0) | max(F, F) | M[I % 3, 1] | N[1, -1] | interpolate(F, XS, YS)
         | atan2(F, F) | copysign(F, F) | fmod(F, F) | pow(F, F) | abs(F) | fabs(F) | sin(F) | cos(F)
@@ -159,29 +160,29 @@ DEEPER = {
         | (+F) | max(each * F for each in V) | min(F - a for a in W) | max(k * F for k in range(3))
         | max(abs(x - F) for x in reversed(V)) | min(x * x_in for x, x_in in zip(V, XS))
         | mixed(F) | mixed(F, I, gain=F) | mixed(on=B, x=F, mode=E) | white_noise(w=V, x=F)
-        | white_noise(F) | spared(F) | P[I % 2].x | P[-1].bias | ((F, F) if B else (F, -0.0))[1]
-        | ((F, V), (F, V))[I % 2][0] | (R if R.on else R).x | (R, R)[SIZE - 1].v[I % 3] | (E * F)
-        | ((V if (F, F)[0] > F else XS[1:4]) @ V)
+        | white_noise(F) | spared(F) | P[I % 2].x | P[-1].bias | ((~F, ~F) if B else (~F, -0.0))[1]
+        | ((F, V), (F, V))[I % 2][0] | (~R if R.on else ~R).x | (R, R)[SIZE - 1].v[I % 3] | (E * F)
+        | ((~V if (F, F)[0] > F else XS[1:4]) @ V)
     """,
     INT: """
         (I + I) | (I - I) | I * I | (I // I) | (I % I) | abs(I) | min(I, I) | max(I, I, 2) | -I | 5
-        | (I if B else I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
+        | (~I if B else ~I) | int(F) | round(F) | floor(F) | ceil(F) | PRIMES[I % 4] | len($v)
         | int(B)
         | int(Mode.HIGH) | (I + Mode.LOW) | R.k | (I**2) | ((I % 7)**3) | (I**0) | PRIMES[SIZE]
         | (+I) | sum(k * I for k in range(3)) | sum(a > F for a in V) | sum(B for _ in PRIMES)
-        | sum(1 for a in V if a > F and B) | sum(k for k in PRIMES if k > I)
-        | sum(I for k, a in enumerate(W) if k * a > F) | max(k * I for k in PRIMES)
+        | sum(1 for a in V if a > F and ~B) | sum(k for k in PRIMES if k > I)
+        | sum(~I for k, a in enumerate(W) if k * a > F) | max(k * I for k in PRIMES)
         | min(k - I for k in range(SIZE + 1)) | int(E) | (E + I) | P[I % 2].k | len(PRIMES)
         | (I, I)[SIZE - 1] | (2147483647 - I) | (-2147483647 - I)
     """,
     BOOL: """
-        (F < F) | (F <= I) | (I > F) | (I >= I) | (F == F) | (I != I) | (B and B) | (B or B)
+        (F < F) | (F <= I) | (I > F) | (I >= I) | (F == F) | (I != I) | (B and ~B) | (B or ~B)
         | (not B) | isnan(F) | isfinite(F) | bool(F) | bool(I) | (R.mode == Mode.LOW) | R.on
-        | any(a > F for a in V) | all(a <= F for a in W) | any(k > I for k in PRIMES if B)
-        | all(1.0 / x > F for x in V if x != F) | any(all(a < each for a in W) for each in V)
-        | (F < F <= F) | (F < F / F < F) | (I <= I + 1 < F) | (F != max(F, F) > F)
-        | (I < V[I % 3] < I) | (E == Mode.LOW) | (E == E) | (E < I) | (E != E) | (B == B)
-        | (P if B else P)[0].on
+        | any(a > F for a in V) | all(a <= F for a in W) | any(k > ~I for k in PRIMES if B)
+        | all(1.0 / x > ~F for x in V if x != F) | any(all(a < each for a in W) for each in V)
+        | (F < F <= ~F) | (F < F / F < ~F) | (I <= I + 1 < ~F) | (F != max(F, F) > ~F)
+        | (I < V[I % 3] < ~I) | (E == Mode.LOW) | (E == E) | (E < I) | (E != E) | (B == B)
+        | (~P if B else ~P)[0].on
     """,
     V3: """
         (V + V) | (V - V) | (F * V) | (V * F) | (V / F) | (-V) | (V * 2) | (A @ V) | (M @ V)
@@ -190,16 +191,17 @@ DEEPER = {
         | Vector(one - other for one, other in zip(V, XS)) | Vector(x * F for x in V)
         | Vector(x_in - F for x_in in V) | Vector(F + k for k in range(SIZE + 1))
         | XS[SIZE - 1 : SIZE + 2]
-        | Vector([F, I, F]) | (Vector((F, F, F)) if Vector((F, F))[0] > F else V) | _both(V, F)[0]
+        | Vector([F, I, F]) | (Vector((~F, ~F, ~F)) if Vector((F, F))[0] > F else ~V)
+        | _both(V, F)[0]
         | Vector(k * x for k, x in zip(range(3, -9, -SIZE), V))
         | Vector((F,) * 3) | Vector([F] * (SIZE + 1)) | Vector((-0.0,) * 3) | P[I % 2].v
-        | Vector((F, *W)) | Vector((*(-V)[1:], F)) | Vector([*(W + YS[3:]), F])
-        | Vector((*V[:1], *W))
+        | ^Vector((F, *W)) | ^Vector((*(-V)[1:], F)) | ^Vector([*(W + YS[3:]), F])
+        | ^Vector((*V[:1], *W))
         | Vector(x for x in reversed(V)) | Vector(k * x for k, x in enumerate(V, 1))
         | Vector(k - F for k in reversed(range(SIZE + 1)))
         | Vector(Vector(x * x_in for x_in in V).sum() - x for x in V)
         | Vector(x_in * max(x * x_in for x in W) for x_in in V)
-        | Vector(F if any(a > each for a in W) else each for each in V)
+        | Vector(~F if any(a > each for a in W) else each for each in V)
     """,
     V2: """
         Vector((F, F)) | $v[1:] | (N @ V) | (W + YS[3:]) | Vector(a + k for k, a in enumerate(W))
@@ -210,24 +212,25 @@ DEEPER = {
         (M @ M) | (M + A) | (M - A.T) | M.T | (-M) | (F * M) | (M / F) | (N.T @ N)
         | M.replaced(I % 3, V) | Matrix((p + q * F for q in range(3)) for p in range(3))
         | Matrix((x * x_in + F for x_in in V) for x in V) | Matrix((x - F for x in V) for x in V)
-        | Matrix([V, (F, 0.0, 1.0), [1.0, F, I]]) | (Matrix((V, V, V)) if B else M)
-        | Matrix((V, *N))
+        | Matrix([V, (F, 0.0, 1.0), [1.0, F, I]]) | (Matrix((~V, ~V, ~V)) if B else ~M)
         | Matrix((x * x_in for x in V) for x_in in V) | Matrix(x * V for x in V)
         | Matrix((x * min(x - x_in for x in W) for x_in in V) for x in V)
     """,
     M23: "Matrix((V, V)) | (N @ A) | Matrix(((1.0, F, 0.0), (2.0, 0.5, I)))",
     RECORD: """
         Record(F, V, on=B) | Record(v=V, x=F, k=I) | $r._replace(x=F, mode=Mode.HIGH)
-        | (Record(F, V) if B else R) | (R if Record(F, V).x > F else Record(F, V, I, B))
-        | Record(F, (V if (F, F)[0] > F else XS[:3]), on=(B if B else $r.on))
-        | Record(*(F, V), k=I) | Record(F, *(V, I), bias=F) | $r._replace(v=V, mode=E) | P[I % 2]
-        | (P if B else P)[SIZE - 1] | (R, R)[I % 2] | Record(*$r) | Record(F, V, int(E), B, turned(E))
+        | (Record(~F, ~V) if B else ~R) | (~R if Record(F, V).x > F else Record(~F, ~V, ~I, ~B))
+        | Record(F, (~V if (F, F)[0] > F else XS[:3]), on=(~B if B else $r.on))
+        | ^Record(*(F, V), k=I) | ^Record(F, *(V, I), bias=F) | $r._replace(v=V, mode=E) | P[I % 2]
+        | (~P if B else ~P)[SIZE - 1] | (R, R)[I % 2] | Record(*$r)
+        | Record(F, V, int(E), B, turned(E))
     """,
     MODE: """
-        R.mode | Mode(I) | Mode((0, 1, 7)[I % 3]) | (E if B else E) | turned(E) | turned(E, F) | turned(x=F, mode=E) | (E, E)[I % 2]
+        R.mode | Mode(I) | Mode((0, 1, 7)[I % 3]) | (~E if B else ~E) | turned(E) | turned(E, F)
+        | turned(x=F, mode=E) | (E, E)[I % 2]
         | P[I % 2].mode
     """,
-    PAIR: "(R, R) | (P if B else P) | (R, P[1]) | (P[I % 2], $r._replace(x=F)) | (P[1], P[0])",
+    PAIR: "(R, R) | (~P if B else ~P) | (R, P[1]) | (P[I % 2], $r._replace(x=F)) | (P[1], P[0])",
 }
 
 #: Loops and the types of their variables, `#` with endings. The last may have no turns.
@@ -279,7 +282,7 @@ CASES = {
 }
 
 #: What is said of an assertion that does not hold.
-TEXTS = ("", ', "100 % {no}"', ', f"{F:g} and {{{I}}} at {F:.2f} %"')
+TEXTS = ("", ', "100 % {no}"', ', f"{~F:g} and {{{~I}}} at {~F:.2f} %"')
 
 Variables = dict[str, str]
 
@@ -409,7 +412,7 @@ class Program:
             if word == "elif" and self._random.random() < 0.6:
                 continue
             if word:
-                test = f" {self._expression(BOOL, known, 2)}" if word == "elif" else ""
+                test = f" {self._filled('~B', known, 2)}" if word == "elif" else ""
                 self._add(indent, f"{word}{test}:")
             self._branch(known, indent, depth)
         # What every branch that goes on has given a value has one after it.
@@ -438,7 +441,7 @@ class Program:
         name = self._new(kind)
         for case in [*chosen, *["_"] * is_complete]:
             can_be_guarded = case != "_" and self._random.random() < 0.3
-            guard = f" if {self._expression(BOOL, known, 1)}" if can_be_guarded else ""
+            guard = f" if {self._filled('~B', known, 1)}" if can_be_guarded else ""
             self._add(indent, f"    case {case.strip().replace('OR', '|')}{guard}:")
             self._branch(known, f"{indent}    ", depth)
             if self._random.random() < 0.1:
@@ -473,21 +476,21 @@ class Program:
         name = self._new(INT)
         self._add(indent, f"{name} = {self._random.randint(1, 4)}")
         known[name] = INT
-        test = self._expression(BOOL, known, 1)
+        test = self._filled("~B", known, 1)
         self._add(indent, f"while {name} > 0 and {test}:")
         self._add(indent, f"    {name} -= 1")
         inside = {n: hint for n, hint in known.items() if n != name}
         self._loop_body(inside, indent, depth)
 
     def _forever(self, known: Variables, indent: str, depth: int) -> None:
-        """A loop that only ends from within, where a variable has got its value."""
+        """A loop that only ends from within."""
         name, hint = self._new(INT), self._random.choice((FLOAT, V3))
         last = self._new(hint)
-        self._add(indent, f"{name} = 0")
+        self._add(indent, f"{name}, {last} = 0, {self._expression(hint, known, 1)}")
         self._add(indent, "while True:")
         self._add(indent, f"    {name} += 1")
         self._add(indent, f"    {last} = {self._expression(hint, known, 1)}")
-        self._add(indent, f"    if {name} > 3 or {self._expression(BOOL, known, 1)}:")
+        self._add(indent, f"    if {name} > 3 or {self._filled('~B', known, 1)}:")
         if self._random.random() < 0.2:
             self._return(known | {last: hint}, f"{indent}        ")
             self._add(indent, f"    if {name} > 2:")
@@ -537,26 +540,29 @@ class Program:
 
     # Expressions
 
-    def _expression(self, hint: str, known: Variables, depth: int) -> str:
+    def _expression(self, hint: str, known: Variables, depth: int, always: bool = True) -> str:
         names = [name for name, h in known.items() if h == hint]
         if names and (depth <= 0 or self._random.random() < 0.25):
             return self._random.choice(names)
         choices = (DEEPER if depth > 0 else GRAMMAR)[hint].split("|")
-        return self._filled(self._random.choice(choices).strip(), known, depth - 1)
+        free = [choice.strip() for choice in choices if always or "^" not in choice]
+        return self._filled(self._random.choice(free).strip("^"), known, depth - 1, always)
 
-    def _filled(self, text: str, known: Variables, depth: int) -> str:
+    def _filled(self, text: str, known: Variables, depth: int, always: bool = True) -> str:
         """A text with expressions for its letters, in which its own names mean something else."""
         own = {
             name for names in re.findall(r"\bfor (.+?) in\b", text) for name in names.split(", ")
         }
         free = {name: hint for name, hint in known.items() if name not in own - _FLOATS}
-        parts = re.split(r"(\$\w|\b[A-Z]\b)", text)
-        return "".join(self._part(part, free, depth) for part in parts)
+        parts = re.split(r"(\$\w|~?\b[A-Z]\b)", text)
+        return "".join(self._part(part, free, depth, always) for part in parts)
 
-    def _part(self, part: str, known: Variables, depth: int) -> str:
+    def _part(self, part: str, known: Variables, depth: int, always: bool) -> str:
         if part in NAMES:
             return self._random.choice([n for n, hint in known.items() if hint == NAMES[part]])
-        return self._expression(LETTERS[part], known, depth) if part in LETTERS else part
+        if (letter := part.strip("~")) in LETTERS:
+            return self._expression(LETTERS[letter], known, depth, always and letter == part)
+        return part
 
 
 #: Arguments whose names expressions have for the elements of a vector: these are floats, too.
