@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from fmus.language import tree
-from fmus.language.tree import Call, Expression, Function, Item, Local, Statement, StoreItem, int_of
+from fmus.language.tree import (
+    Call,
+    Expression,
+    Function,
+    Functions,
+    Item,
+    Local,
+    Statement,
+    StoreItem,
+    int_of,
+)
 from fmus.language.types import (
     FLOAT,
     INT,
@@ -20,17 +29,14 @@ from fmus.language.types import (
     vector,
 )
 
-if TYPE_CHECKING:
-    from fmus.language.build import Program
-
 
 def binary(
-    program: Program, operator: ast.operator, left: Expression, right: Expression
+    functions: Functions, operator: ast.operator, left: Expression, right: Expression
 ) -> Expression | None:
     """A sum, a difference, a product or a quotient; None: Python has none either.
 
     Args:
-        program: that gets the function.
+        functions: that get one more.
         operator: between two operands.
         left: the first one.
         right: the other; a number is a float.
@@ -41,25 +47,25 @@ def binary(
         name, sign = (
             ("plus", tree.ADD) if isinstance(operator, ast.Add) else ("minus", tree.SUBTRACT)
         )
-        return Call(_each(program, name, sign, one, other), (left, right))
+        return Call(_each(functions, name, sign, one, other), (left, right))
     if isinstance(operator, ast.MatMult):
-        return _product(program, left, right)
+        return _product(functions, left, right)
     if isinstance(operator, ast.Mult):
         array, number = (left, right) if is_algebraic(one) else (right, left)
         if is_algebraic(array.type) and is_number(number.type):
-            function = _each(program, "times", tree.MULTIPLY, array.type, FLOAT)
+            function = _each(functions, "times", tree.MULTIPLY, array.type, FLOAT)
             return Call(function, (array, number))
     if isinstance(operator, ast.Div) and is_algebraic(one) and is_number(other):
-        return Call(_each(program, "over", tree.DIVIDE, one, FLOAT), (left, right))
+        return Call(_each(functions, "over", tree.DIVIDE, one, FLOAT), (left, right))
     return None
 
 
-def negative(program: Program, operand: Expression) -> Expression:
+def negative(functions: Functions, operand: Expression) -> Expression:
     """A vector or a matrix with all signs changed."""
-    return Call(_each(program, "negative", tree.NEGATIVE, operand.type), (operand,))
+    return Call(_each(functions, "negative", tree.NEGATIVE, operand.type), (operand,))
 
 
-def _each(program: Program, name: str, operator: tree.Operator, *types: Type) -> Function:
+def _each(functions: Functions, name: str, operator: tree.Operator, *types: Type) -> Function:
     """The function of what an operator makes of each element of the first one."""
     given = dict(zip(("a", "b"), types))
 
@@ -74,7 +80,7 @@ def _each(program: Program, name: str, operator: tree.Operator, *types: Type) ->
             tree.Return(Local("a", types[0])),
         ]
 
-    return program.helper(name, types[:1], given, types[0], body)
+    return functions.helper(name, types[:1], given, types[0], body)
 
 
 def _at(name: str, type_: Type, places: Sequence[Expression]) -> Expression:
@@ -93,7 +99,7 @@ def _loops(counters: Sequence[Local], n: Sequence[int], inner: Statement) -> Seq
     return block
 
 
-def _product(program: Program, left: Expression, right: Expression) -> Expression | None:
+def _product(functions: Functions, left: Expression, right: Expression) -> Expression | None:
     one, other = left.type, right.type
     if not (is_algebraic(one) and is_algebraic(other)) or sizes(one)[-1] != sizes(other)[0]:
         return None
@@ -128,7 +134,7 @@ def _product(program: Program, left: Expression, right: Expression) -> Expressio
         return [tree.Reserve("c", returns), outer, tree.Return(Local("c", returns))]
 
     name = "product_at" if by_address else "product"
-    function = program.helper(name, (one, other), {"a": one, "b": other}, returns, body)
+    function = functions.helper(name, (one, other), {"a": one, "b": other}, returns, body)
     function.by_address = by_address
     return Call(function, (left, right))
 
@@ -140,7 +146,7 @@ def _is_stored(expression: Expression) -> bool:
     return isinstance(expression, (Local, tree.Constant))
 
 
-def transpose(program: Program, operand: Expression) -> Expression:
+def transpose(functions: Functions, operand: Expression) -> Expression:
     """A matrix with columns for rows."""
     rows, columns = sizes(operand.type)
     returns = matrix(columns, rows)
@@ -155,10 +161,12 @@ def transpose(program: Program, operand: Expression) -> Expression:
         ]
 
     types = (operand.type,)
-    return Call(program.helper("transpose", types, {"a": operand.type}, returns, body), (operand,))
+    return Call(
+        functions.helper("transpose", types, {"a": operand.type}, returns, body), (operand,)
+    )
 
 
-def sum_of(program: Program, owner: Expression) -> Expression:
+def sum_of(functions: Functions, owner: Expression) -> Expression:
     """The sum of a vector, from the first element to the last."""
 
     def body() -> Sequence[Statement]:
@@ -170,17 +178,17 @@ def sum_of(program: Program, owner: Expression) -> Expression:
             tree.Return(total),
         ]
 
-    function = program.helper("sum", (owner.type,), {"a": owner.type}, FLOAT, body)
+    function = functions.helper("sum", (owner.type,), {"a": owner.type}, FLOAT, body)
     return Call(function, (owner,))
 
 
 def replaced(
-    program: Program, owner: Expression, place: Expression, value: Expression
+    functions: Functions, owner: Expression, place: Expression, value: Expression
 ) -> Expression:
     """A copy with another element, or another row."""
     type_ = owner.type
     assert isinstance(type_, Array)
-    given = {"a": type_, "place": INT, "value": type_.item}
+    given: dict[str, Type] = {"a": type_, "place": INT, "value": type_.item}
 
     def body() -> Sequence[Statement]:
         at = tree.Operation(tree.PLACE, (Local("place", INT), int_of(type_.n)), INT)
@@ -189,11 +197,11 @@ def replaced(
             tree.Return(Local("a", type_)),
         ]
 
-    function = program.helper("replaced", (type_,), given, type_, body)
+    function = functions.helper("replaced", (type_,), given, type_, body)
     return Call(function, (owner, place, value))
 
 
-def extreme(program: Program, word: str, operand: Expression) -> Expression:
+def extreme(functions: Functions, word: str, operand: Expression) -> Expression:
     """The smallest or the largest element of a tuple of numbers."""
     type_ = operand.type
     assert isinstance(type_, Array)
@@ -209,7 +217,7 @@ def extreme(program: Program, word: str, operand: Expression) -> Expression:
             tree.Return(found),
         ]
 
-    function = program.helper(word, (type_,), {"a": type_}, type_.item, body)
+    function = functions.helper(word, (type_,), {"a": type_}, type_.item, body)
     return Call(function, (operand,))
 
 

@@ -108,7 +108,7 @@ _FOLDED: Mapping[type, Callable[[float, float], float]] = {
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: _power_of,
 }  # fmt: skip
 
-#: Makes a value one that can be read in each turn of a loop: the value, its text, and a word for it.
+#: Makes a value one that can be read in each turn of a loop, from its text, with a word for it.
 _Hold = Callable[[Expression, ast.expr, str], Expression]
 
 
@@ -157,7 +157,7 @@ class Program:
 
     def __init__(self) -> None:
         """Begin with nothing."""
-        self.functions: dict[Hashable, Function] = {}
+        self.functions = tree.Functions()
         self._begun: set[Hashable] = set()
         self._mistakes: dict[str, str] = {}
 
@@ -221,22 +221,6 @@ class Program:
         builder.build(lambda name: given[name] if unsized else UNKNOWN)
         self.functions[key] = made
         return made
-
-    def helper(
-        self,
-        name: str,
-        types: Sequence[Type],
-        arguments: Mapping[str, Type],
-        returns: Type,
-        body: Callable[[], Sequence[Statement]],
-    ) -> Function:
-        """A function of an operator, made once for some types."""
-        key = (name, *types)
-        if key not in self.functions:
-            made = Function("", name, dict(arguments), returns, sizes=types)
-            made.end(body())
-            self.functions[key] = made
-        return self.functions[key]
 
 
 def _place(line: str) -> tuple[str, int]:
@@ -1069,13 +1053,7 @@ class _Builder:
 
     # Loops
 
-    def _loop(
-        self,
-        target: ast.expr,
-        iterable: ast.expr,
-        counter: Local,
-        hold: _Hold,
-    ) -> _Loop:
+    def _loop(self, target: ast.expr, iterable: ast.expr, counter: Local, hold: _Hold) -> _Loop:
         """What a loop goes over.
 
         Args:
@@ -1086,51 +1064,23 @@ class _Builder:
 
         """
         called, call = self._called(iterable)
-        if call and called is range:
-            return self._range(target, call, counter, hold)
-        if call and called is reversed:
-            self._check_plain(call, "reversed", 1)
-            called, inner = self._called(call.args[0])
-            if inner and called is range:
-                return self._backward(target, inner, counter)
-        bound, n = self._items(target, iterable, counter, hold)
-        return _Loop(int_of(0), int_of(n), 1, n, bound)
+        if not call or called is not range:
+            bound, n = self._items(target, iterable, counter, hold)
+            return _Loop(int_of(0), int_of(n), 1, n, bound)
+        if not isinstance(target, ast.Name):
+            raise _Outside(target, "more than one name for the numbers of a range")
+        bounds = self._bounds(call)
+        first, last, step = map(_value, bounds)
+        if not step:
+            raise _Outside(call, "a step of a range that is not a constant other than 0")
+        start, stop = hold(bounds[0], call, "start"), hold(bounds[1], call, "stop")
+        turns = None if first is None or last is None else len(range(first, last, step))
+        is_wide = abs(step) > 1 and (last is None or abs(last + step) >= 2**31)
+        bound = [] if target.id == "_" else [(target.id, counter)]
+        return _Loop(start, stop, step, turns, bound, is_wide)
 
     def _called(self, node: ast.expr) -> tuple[Any, ast.Call | None]:
         return (self._meant(node.func), node) if isinstance(node, ast.Call) else (None, None)
-
-    def _range(
-        self,
-        target: ast.expr,
-        call: ast.Call,
-        counter: Local,
-        hold: _Hold,
-    ) -> _Loop:
-        if not isinstance(target, ast.Name):
-            raise _Outside(target, "more than one name for the numbers of a range")
-        start, stop, step = bounds = self._bounds(call)
-        numbers = [one.value if isinstance(one, Number) else None for one in bounds]
-        if not numbers[2]:
-            raise _Outside(call, "a step of a range that is not a constant other than 0")
-        start, stop = hold(start, call, "start"), hold(stop, call, "stop")
-        turns = None if None in numbers else len(range(*numbers))
-        far = numbers[1] is None or abs(numbers[1] + numbers[2]) >= 2**31
-        is_wide = abs(numbers[2]) > 1 and far
-        bound = [] if target.id == "_" else [(target.id, counter)]
-        return _Loop(start, stop, numbers[2], turns, bound, is_wide)
-
-    def _backward(self, target: ast.expr, call: ast.Call, counter: Local) -> _Loop:
-        """The numbers of a range from the last to the first."""
-        if not isinstance(target, ast.Name):
-            raise _Outside(target, "more than one name for the numbers of a range")
-        numbers = [one.value if isinstance(one, Number) else None for one in self._bounds(call)]
-        if None in numbers or not numbers[2]:
-            raise _Outside(call, "reversed of a range of other than constants")
-        back = range(*numbers)[::-1]
-        check_int(back.stop)
-        bound = [] if target.id == "_" else [(target.id, counter)]
-        is_wide = abs(back.step) > 1 and abs(back.stop + back.step) >= 2**31
-        return _Loop(int_of(back.start), int_of(back.stop), back.step, len(back), bound, is_wide)
 
     def _bounds(self, call: ast.Call) -> list[Expression]:
         """Where a range begins and ends, and its step."""
@@ -1145,36 +1095,36 @@ class _Builder:
     def _bound_of(self, node: ast.expr) -> Expression:
         """A bound of a range; what consists of constants is the number that it stands for."""
         value = self._size(node)
-        if value is not None:
-            check_int(value)
-            return int_of(value)
-        return self._integer(node, "a bound of a range")
+        if value is None:
+            return self._integer(node, "a bound of a range")
+        check_int(value)
+        return int_of(value)
 
     def _items(
-        self,
-        target: ast.expr,
-        iterable: ast.expr,
-        place: Expression,
-        hold: _Hold,
+        self, target: ast.expr, iterable: ast.expr, place: Expression, hold: _Hold
     ) -> tuple[list[tuple[str, Expression]], int]:
         """Names with their values at a place, and how many places there are."""
         called, call = self._called(iterable)
         if call and called in (zip, enumerate):
             return self._side_by_side(target, call, called, place, hold)
-        if call and called is range:
-            return self._numbers(target, call, place)
-        if call and called is reversed:
+        is_back = called is reversed
+        if call and is_back:
             self._check_plain(call, "reversed", 1)
-            value = hold(self._array(call.args[0]), call.args[0], "all")
-            assert isinstance(value.type, Array)
-            last = int_of(value.type.n - 1)
-            down = Operation(tree.COUNT_MULTIPLY, (place, int_of(-1)), INT)
-            item = Item(value, Operation(tree.COUNT_ADD, (last, down), INT))
-        else:
-            value = hold(self._array(iterable), iterable, "all")
-            assert isinstance(value.type, Array)
-            item = Item(value, place)
-        return [*self._taken_apart(target, item)], value.type.n
+            [iterable] = call.args
+            called, call = self._called(iterable)
+        if call and called is range:
+            first, stop, step = map(_value, self._bounds(call))
+            if first is None or stop is None or not step:
+                raise _Outside(call, "a range of other than constants, with something beside it")
+            numbers = range(first, stop, step)[:: -1 if is_back else 1]
+            if abs(step) * len(numbers) >= 2**31:
+                raise _Outside(call, "a range of so many numbers, with something beside it")
+            item = _count(numbers.start, place, numbers.step)
+            return [*self._taken_apart(target, item)], len(numbers)
+        value = hold(self._array(iterable), iterable, "all")
+        assert isinstance(value.type, Array)
+        at = _count(value.type.n - 1, place, -1) if is_back else place
+        return [*self._taken_apart(target, Item(value, at))], value.type.n
 
     def _array(self, node: ast.expr) -> Expression:
         value = self.expression(node)
@@ -1216,26 +1166,9 @@ class _Builder:
         if len(target.elts) != 2 or len(call.args) != 1:
             raise _Outside(target, "enumerate without two names")
         bound, n = self._items(target.elts[1], call.args[0], place, hold)
-        number_of = place
-        if first:
-            check_int(first + n)
-            number_of = Operation(tree.COUNT_ADD, (place, int_of(first)), INT)
-        return [*self._taken_apart(target.elts[0], number_of), *bound], n
-
-    def _numbers(
-        self, target: ast.expr, call: ast.Call, place: Expression
-    ) -> tuple[list[tuple[str, Expression]], int]:
-        """The numbers of a range that stands beside something else."""
-        numbers = [one.value if isinstance(one, Number) else None for one in self._bounds(call)]
-        first, stop, step = numbers
-        if first is None or stop is None or not step:
-            raise _Outside(call, "a range of other than constants within a zip")
-        n = len(range(first, stop, step))
-        if abs(step) * n >= 2**31:
-            raise _Outside(call, "a range of so many numbers within a zip")
-        moved = place if step == 1 else Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
-        item = Operation(tree.COUNT_ADD, (int_of(first), moved), INT) if first else moved
-        return [*self._taken_apart(target, item)], n
+        check_int(first + n)
+        counted = _count(first, place, 1)
+        return [*self._taken_apart(target.elts[0], counted), *bound], n
 
     # Expressions
 
@@ -1433,7 +1366,7 @@ class _Builder:
             return self._of_module(node)
         value = self.expression(node.value)
         if node.attr == "T" and is_algebraic(value.type) and len(sizes(value.type)) == 2:
-            return arrays.transpose(self.program, value)
+            return arrays.transpose(self.program.functions, value)
         if isinstance(value.type, Record) and value.type.made:
             for name, part in value.type.fields:
                 if name == node.attr:
@@ -1588,7 +1521,7 @@ class _Builder:
             self._number(one, value) if is_number(value.type) else value
             for one, value in ((node.left, left), (node.right, right))
         ]
-        found = arrays.binary(self.program, node.op, operands[0], operands[1])
+        found = arrays.binary(self.program.functions, node.op, operands[0], operands[1])
         if found is None:
             sign = ast.unparse(ast.BinOp(ast.Name("a"), node.op, ast.Name("b")))[2:-2]
             what = f"{left.type.word} {sign} {right.type.word} is not defined"
@@ -1606,7 +1539,7 @@ class _Builder:
             return Number(-node.operand.value, INT)
         operand = self.expression(node.operand)
         if is_algebraic(operand.type) and is_minus:
-            return arrays.negative(self.program, operand)
+            return arrays.negative(self.program.functions, operand)
         if not is_number(operand.type):
             raise _Outside(node, f"{operand.type.word} where a number is wanted")
         if not is_minus:
@@ -1675,7 +1608,9 @@ class _Builder:
 
     # Calls
 
-    def _call(self, node: ast.Call, wanted: Type | None) -> Expression:
+    def _call(  # noqa: PLR0911, for each kind of function
+        self, node: ast.Call, wanted: Type | None
+    ) -> Expression:
         local = node.func.id if isinstance(node.func, ast.Name) else ""
         if local in self.functions:
             if self.known is not None and local not in self.known:
@@ -1781,7 +1716,7 @@ class _Builder:
                 raise _Outside(node, f"{word} of {value.type.word}")
             if not is_number(value.type.item):
                 raise _Outside(node, f"{word} of {value.type.item.word}")
-            return arrays.extreme(self.program, word, value)
+            return arrays.extreme(self.program.functions, word, value)
         if not node.args:
             raise _Outside(node, f"{word} without arguments")
         values = [self.expression(argument) for argument in node.args]
@@ -2000,8 +1935,9 @@ class _Builder:
             """Pass what the loop goes over."""
             if isinstance(value, (tree.Constant, Number)):
                 return value
-            is_free = isinstance(value, Local) and value.name not in {*own, *given}
-            name = value.name if is_free else inner._unused(f"{first}_{word}")
+            name = value.name if isinstance(value, Local) else ""
+            if not name or name in {*own, *given}:
+                name = inner._unused(f"{first}_{word}")
             given[name] = value
             return Local(name, value.type)
 
@@ -2029,7 +1965,7 @@ class _Builder:
             raise _Outside(node, f"{type_.word} has no method {name} in the language")
         self._check_plain(node, name, 0 if name == "sum" else 2)
         if name == "sum":
-            return arrays.sum_of(self.program, owner)
+            return arrays.sum_of(self.program.functions, owner)
         assert isinstance(type_, Array)
         place = self.fitting(node.args[0], INT)
         value = (
@@ -2037,14 +1973,14 @@ class _Builder:
             if type_.item == FLOAT
             else self.fitting(node.args[1], type_.item)
         )
-        return arrays.replaced(self.program, owner, place, value)
+        return arrays.replaced(self.program.functions, owner, place, value)
 
     def _changed(self, node: ast.Call, owner: Expression) -> Expression:
         """A record with other values of some fields."""
         if node.args:
             raise _Outside(node, "_replace without names of fields")
-        assert isinstance(owner.type, Record)
         owner = self._held(owner, "all")
+        assert isinstance(owner.type, Record)
         given = {str(keyword.arg): keyword.value for keyword in node.keywords}
         values = []
         for name, part in owner.type.fields:
@@ -2085,13 +2021,17 @@ class _Builder:
         def body() -> Sequence[Statement]:
             k = Local("k", INT)
             known = self._is_one_of(k, [int_of(int(member)) for member in made])
-            parts = ["ValueError: ", (k, "d"), f" is not a valid {made.__qualname__}"]
+            parts: list[str | tuple[Expression, str]] = [
+                "ValueError: ",
+                (k, "d"),
+                f" is not a valid {made.__qualname__}",
+            ]
             return [
                 tree.If(Operation(tree.NOT, (known,), BOOL), [tree.Raise(parts)]),
                 tree.Return(Operation(tree.AS_INT, (k,), type_)),
             ]
 
-        of = self.program.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
+        of = self.program.functions.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
         return Call(of, (_as_int(given),))
 
     def _default(self, module: str, name: str, field: str, value: Any, wanted: Type) -> Expression:
@@ -2231,8 +2171,21 @@ def _first_name(target: ast.expr) -> str:
     return next(filter(None, names), "x")
 
 
+def _value(one: Expression) -> int | None:
+    """The int that is written out; None: it is computed."""
+    return one.value if isinstance(one, Number) else None
+
+
+def _count(first: int, place: Expression, step: int) -> Expression:
+    """The number of a range at a place."""
+    found = place
+    if step != 1:
+        found = Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
+    return Operation(tree.COUNT_ADD, (int_of(first), found), INT) if first else found
+
+
 def _is_fixed(value: Expression) -> bool:
-    """Whether a value is a number, a variable or a constant, or a part of one that is not sought."""
+    """Whether a value is a number, a variable or a constant, or a part of one at a known place."""
     if isinstance(value, Field):
         return _is_fixed(value.owner)
     if isinstance(value, Item):

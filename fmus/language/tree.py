@@ -11,7 +11,7 @@ class here, and for each of the operators.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -55,7 +55,7 @@ LESS, LESS_EQUAL, GREATER, GREATER_EQUAL, EQUAL, NOT_EQUAL = map(
 AND, OR, NOT = map(Operator, ("and", "or", "not"))
 ABS, MIN, MAX, INT_MIN, INT_MAX = map(Operator, ("abs", "min", "max", "int min", "int max"))
 
-#: Conversions: of an int to a float, of a number to a bool, of a whole float to an int, of any float
+#: Conversions: of an int to a float, of a number to a bool, of a whole float to an int, of a float
 #: to the nearest whole one, and of a bool or a member of an enumeration to the int that it is.
 TO_FLOAT, TO_BOOL, TO_INT, NEAREST, AS_INT = (
     Operator("float"), Operator("bool"), Operator("int", True), Operator("round"),
@@ -420,3 +420,23 @@ def may_fail(statement: Statement) -> bool:
 def int_of(value: int) -> Number:
     """An int that is written out."""
     return Number(value, INT)
+
+
+class Functions(dict[Hashable, Function]):
+    """Functions by what they were made from, each after those that it calls."""
+
+    def helper(
+        self,
+        name: str,
+        types: Sequence[Type],
+        arguments: Mapping[str, Type],
+        returns: Type,
+        body: Callable[[], Sequence[Statement]],
+    ) -> Function:
+        """A function of an operator, made once for some types."""
+        key = (name, *types)
+        if key not in self:
+            made = Function("", name, dict(arguments), returns, sizes=types)
+            made.end(body())
+            self[key] = made
+        return self[key]

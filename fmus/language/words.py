@@ -92,7 +92,7 @@ INSTEAD: Mapping[str, str] = {
     "min of a list": "leave its brackets out",
     "nonlocal": "return the value",
     "sum of a list": "leave its brackets out",
-    "sum of floats": "write Vector(... for ...).sum(): Python's sum rounds differently from 3.12 on",
+    "sum of floats": "write Vector(... for ...).sum(): Python's sum rounds otherwise from 3.12 on",
     "the name all": "write all(... for ...), or an and",
     "the name any": "write any(... for ...), or an or",
     "the name dict": "use a NamedTuple",

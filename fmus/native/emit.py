@@ -305,7 +305,9 @@ class Emitter:
         text, binding = self._bound(one, by_address)
         return text if binding >= within else f"({text})"
 
-    def _bound(self, one: Expression, at: str) -> tuple[str, int]:
+    def _bound(  # noqa: PLR0911, for each class
+        self, one: Expression, at: str
+    ) -> tuple[str, int]:
         """An expression, and how tightly its outermost operator binds."""
         if isinstance(one, Number):
             text = number_in_c(one.value)
@@ -360,7 +362,9 @@ class Emitter:
         text = f"{op.function}({', '.join(texts)})"
         return (f"{text} != 0", _EQUALITY) if one.type == BOOL else (text, _POSTFIX)
 
-    def _operation(self, one: Operation, at: str) -> tuple[str, int]:
+    def _operation(  # noqa: PLR0911, for each operator
+        self, one: Operation, at: str
+    ) -> tuple[str, int]:
         op = one.operator
         if op.function:
             return self._mathematics(one, op, at)
@@ -577,7 +581,7 @@ def _stores(statements: Sequence[Statement]) -> Iterator[str]:
 
 def _types(statements: Sequence[Statement]) -> dict[str, Type]:
     """The types of all variables that are given a value."""
-    found = {}
+    found: dict[str, Type] = {}
     for one in tree.statements_in(statements):
         if isinstance(one, tree.Store):
             found |= {name: value.type for name, value in one.values}

@@ -27,8 +27,8 @@ FLOORS = {
         "studies", "paper", "commands",
     ),
     "fmus": (
-        "ports", "components", "kinds", "discovery", "documentation", "script", "compilers",
-        "python", "trial", "native", "check", "build",
+        "ports", "language", "components", "kinds", "discovery", "documentation", "script",
+        "compilers", "python", "trial", "native", "check", "build",
     ),
 }  # fmt: skip
 

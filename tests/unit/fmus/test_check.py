@@ -34,6 +34,7 @@ def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, monkeypatch):
         ("return State(state.x -", "y = [1.0, 2.0]\n    return State(state.x ** 0.5 -"),
         ('Variable("m", "Value")', 'Variable("m", "Value", tunable=True)'),
         ("from math import expm1", "from beside import expm1, half"),
+        ("return Outputs(state.x)", "return Outputs(half(state.x))"),
     )
     (tmp_path / "beside.py").write_text(
         "from math import expm1\n\n\ndef half(x: float) -> float:\n    return sum((x, x)) / 4.0\n"

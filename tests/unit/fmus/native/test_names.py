@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 
 from fmus.compilers import SAME_NUMBERS, machines_compiler
 from fmus.discovery import source_of
-from fmus.native.packaging import sources
 from fmus.native.emit import Emitter
 from fmus.native.names import in_c
+from fmus.native.packaging import sources
 
 ZIG = (sys.executable, "-m", "ziglang", "cc", "-target")
 COMMANDS = {
@@ -32,10 +32,11 @@ COMMANDS = {
 _USE = """
 static double use_{i}(double {name}, Error *error) {{
     const struct {{ double {name}; }} it_{i} = {{.{name} = {name}}};
-    const double y_{i} = int_abs((int){name}, error) + math_sqrt({name}, error) + py_pow({name}, 2.0, error);
+    const double y_{i} = int_abs((int){name}, error) + py_pow({name}, 2.0, error);
     if (isfinite({name}) != 0 && isnan({name}) == 0 && isinf({name}) == 0) return INFINITY;
     for (int i_{i} = 0; i_{i} < 2; i_{i}++) raise_error(error, "%g", {name});
-    return y_{i} + it_{i}.{name} + fabs({name}) + int_of(trunc({name}), error) + place_in(2, 3, error) + NAN;
+    const int k_{i} = int_of(trunc({name}), error) + place_in(2, 3, error);
+    return y_{i} + it_{i}.{name} + fabs({name}) + k_{i} + math_sqrt({name}, error) + NAN;
 }}
 """
 

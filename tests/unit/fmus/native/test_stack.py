@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from fmus.language.build import program_of
 from fmus.native.stack import deepest
 from support.language import HEAD, module_of

@@ -157,9 +157,9 @@ def outputs(t: float) -> Outputs:
         ("def start", "def _start", "own_lag has update, but no start", ("update",)),
         (
             "def check",
-            "def test",
-            "own_lag.test is not one of the hooks check, start, derive",
-            ("test",),
+            "def chek",
+            "own_lag.chek is called by no function here; is it check?",
+            ("chek",),
         ),
         (
             "h: float",

@@ -1,4 +1,4 @@
-"""Each part of Python's syntax is translated, or refused with its line: none is left out of the C."""
+"""Each part of Python's syntax is translated, or refused with its line; none is left out."""
 
 from __future__ import annotations
 
@@ -88,10 +88,10 @@ OPERATORS = sorted(
 #: Parts of Python that the language has.
 TRANSLATED = frozenset(
     (
-        "AnnAssign", "Assert", "Assign", "Attribute", "AugAssign", "BinOp", "BoolOp", "Break", "Call",
-        "Compare", "Constant", "Continue", "For", "FunctionDef", "GeneratorExp", "If", "IfExp",
-        "Match", "Name", "Pass", "Raise", "Return", "Slice", "Starred", "Subscript", "Tuple", "UnaryOp",
-        "While",
+        "AnnAssign", "Assert", "Assign", "Attribute", "AugAssign", "BinOp", "BoolOp", "Break",
+        "Call", "Compare", "Constant", "Continue", "For", "FunctionDef", "GeneratorExp", "If",
+        "IfExp", "Match", "Name", "Pass", "Raise", "Return", "Slice", "Starred", "Subscript",
+        "Tuple", "UnaryOp", "While",
     )
 )  # fmt: skip
 
@@ -151,8 +151,8 @@ def test_each_operator_is_translated_or_refused(tmp_path, kind):
     said = said_of(text, tmp_path)
     assert all(re.match(r"own\.py:\d+: ", line) and kind.__name__ not in line for line in said)
     known = (
-        ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.USub, ast.UAdd, ast.Not,
-        ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq,
+        ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.USub, ast.UAdd,
+        ast.Not, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq,
     )  # fmt: skip
     assert bool(said) == (kind not in known)
 

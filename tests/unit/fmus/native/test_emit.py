@@ -514,7 +514,8 @@ CONSTRUCTS = {
     "match of an enumeration": (
         "def f(k: int, x: float) -> float:\n    mode = Mode.HEAT if k > 0 else Mode.OFF\n"
         "    match mode:\n        case Mode.OFF if x > 1.0:\n            y = 1.0 / x\n"
-        "        case Mode.OFF:\n            y = x\n        case Mode.HEAT:\n            y = 2.0 * x\n"
+        "        case Mode.OFF:\n            y = x\n"
+        "        case Mode.HEAT:\n            y = 2.0 * x\n"
         "    return y\n"
     ),
     "match of an int": (
@@ -535,13 +536,15 @@ CONSTRUCTS = {
     ),
     "defaults and names of arguments": (
         "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, float, float]:\n"
-        "    def g(a: float, b: float = 2.0, *, n: int = N) -> float:\n        return a * b + n * x\n"
+        "    def g(a: float, b: float = 2.0, *, n: int = N) -> float:\n"
+        "        return a * b + n * x\n"
         "    return g(x), g(b=x, a=1.0), _shifted(v, by=g(x, n=3)).sum() + _shifted(v)[1]\n"
     ),
     "loops that have ended": (
         "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, int, float]:\n"
         "    for k, a in enumerate(v, 1):\n        if a > x:\n            break\n"
-        "    y = a * k\n    for a in range(N):\n        y += a\n    for k in reversed(range(2, 9, 3)):\n"
+        "    y = a * k\n    for a in range(N):\n        y += a\n"
+        "    for k in reversed(range(2, 9, 3)):\n"
         "        y = y * 0.5 + k\n    for b in reversed(v):\n        y = y * x + b\n"
         "    return y, k + a, b\n"
     ),
@@ -549,8 +552,9 @@ CONSTRUCTS = {
         "def f(x: float, v: Annotated[Vector, 4], k: int) -> tuple[int, bool, bool, float, int]:\n"
         "    def near(a: float) -> bool:\n        return abs(a - x) < 1.0\n"
         "    n = sum(i for i, x in enumerate(v) if near(x) if x > 0.0) + sum(a > x for a in v)\n"
-        "    return (\n        n, any(1.0 / a > x for a in v if a < 2.0), all(near(a) for a in v),\n"
-        "        max(a * x for a in v) + min(x - i for i in range(N)), max(i * k for i in range(3, 0, -1))\n    )\n"
+        "    on = any(1.0 / a > x for a in v if a < 2.0)\n"
+        "    y = max(a * x for a in v) + min(x - i for i in range(N))\n"
+        "    return n, on, all(near(a) for a in v), y, max(i * k for i in range(3, 0, -1))\n"
     ),
     "a while that is left": (
         "def f(x: float, k: int) -> float:\n"
