@@ -304,6 +304,26 @@ def _stored(*nodes: ast.AST) -> list[str]:
     return found
 
 
+def _occurrences(*nodes: ast.AST) -> Iterator[tuple[str, bool]]:
+    """Names in the order of their use, and whether each is read."""
+    for node in nodes:
+        if isinstance(node, ast.Name):
+            yield node.id, isinstance(node.ctx, ast.Load)
+        elif isinstance(node, ast.Assign):
+            yield from _occurrences(node.value, *node.targets)
+        elif isinstance(node, ast.AugAssign):
+            yield from ((name, True) for name in _names(node.target))
+            yield from _occurrences(node.value)
+        elif isinstance(node, ast.AnnAssign):
+            yield from _occurrences(*filter(None, [node.value, node.target]))
+        elif isinstance(node, ast.For):
+            yield from _occurrences(node.iter, node.target, *node.body, *node.orelse)
+        elif isinstance(node, (ast.FunctionDef, ast.GeneratorExp)):
+            yield from ((name, True) for name in _free(node))
+        else:
+            yield from _occurrences(*ast.iter_child_nodes(node))
+
+
 def _names(node: ast.AST) -> set[str]:
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
 
@@ -685,7 +705,8 @@ class _Builder:
         if isinstance(pattern, ast.MatchAs) and pattern.pattern is None and pattern.name is None:
             return []
         if isinstance(pattern, ast.MatchOr):
-            return [value for one in pattern.patterns for value in self._cases(one)]
+            found = [self._cases(one) for one in pattern.patterns]
+            return [value for values in found for value in values] if all(found) else []
         if isinstance(pattern, ast.MatchValue):
             value = self.expression(pattern.value)
             if is_whole(value.type):
@@ -707,10 +728,10 @@ class _Builder:
         elif not _names(node.test) & {*_stored(*node.body)}:
             raise self._cannot(node, "a while that changes nothing in its condition")
         self._before = None
+        before = self._before_loop([node.test, *node.body])
         test: Expression = Number(True, BOOL)
         with self._noting():
             test = self.condition(node.test)
-        before = self._before_loop(node.body)
         body = self._block(node.body)
         self.known = None if is_endless and not _leaves(node.body) else before
         found.append(tree.While(test, body))
@@ -728,15 +749,16 @@ class _Builder:
                 return value
             return self._kept(value, f"{first}_{word}")
 
-        before = self._before_loop([node.target, *node.body])
         counter = Local(self._unused(f"{first}_at"), INT)
         try:
             loop = self._loop(node.target, node.iter, counter, hold)
         except (_Outside, _Follows):
+            before = self.known
             self._forget(node.target)
             self._block(node.body)
             self.known = before
             raise
+        before = self._before_loop([node.target, *node.body])
         made = loop.made(counter)
         turns = _Turns(made, counter)
         used = {*_free(*node.body), *_stored(*node.body), *(before or {})}
@@ -760,13 +782,20 @@ class _Builder:
         found.append(made)
 
     def _before_loop(self, nodes: Sequence[ast.AST]) -> _Known | None:
-        """What is known before a loop: names of earlier loops that it uses again begin anew."""
-        if self.known is not None:
-            again = {*_stored(*nodes)}
-            self.known = {
-                name: value for name, value in self.known.items()
-                if name not in again or not value[1] - {*self._loops}
-            }  # fmt: skip
+        """What is known before a loop that may use names of loops that are over again.
+
+        A name that it reads first keeps its value; one that it writes first begins anew.
+        """
+        first = dict(reversed([*_occurrences(*nodes)]))
+        again = {*_stored(*nodes)}
+        for name, (type_, loops) in [*(self.known or {}).items()]:
+            if name in again and loops and loops.isdisjoint(self._loops):
+                assert self.known is not None
+                if first[name]:
+                    self._local(nodes[0], name)
+                    self._know(name, type_)
+                else:
+                    self.known = {n: value for n, value in self.known.items() if n != name}
         return self.known
 
     # Functions within this one
@@ -947,7 +976,8 @@ class _Builder:
                 raise _Outside(node, "what returns nothing is used as a value")
             if known and known[0] == INT and getattr(value.type, "made", None):
                 value = _as_int(value)
-            if known and known[0] != value.type and not known[1]:
+            is_over = known and known[1] and known[1].isdisjoint(self._loops)
+            if known and known[0] != value.type and not is_over:
                 raise _Outside(node, self._other(name, known[0], value))
             stores.append((self._variable(name, value.type), value))
             self._know(name, value.type)

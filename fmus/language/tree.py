@@ -11,7 +11,7 @@ class here, and for each of the operators.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -78,10 +78,10 @@ class Expression:
 
     type: Type
 
-    @property
+    @cached_property
     def parts(self) -> Sequence[Expression]:
         """In the order in which they are computed."""
-        return ()
+        return [*_expressions_in(vars(self).values())]
 
     @cached_property
     def fails(self) -> bool:
@@ -122,6 +122,11 @@ class Constant(Expression):
     value: Any
     type: Type
 
+    @cached_property
+    def parts(self) -> Sequence[Expression]:
+        """There are none among its numbers, which may be many."""
+        return ()
+
 
 @dataclass(eq=False)
 class Field(Expression):
@@ -130,11 +135,6 @@ class Field(Expression):
     owner: Expression
     name: str
     type: Type
-
-    @property
-    def parts(self) -> Sequence[Expression]:
-        """Its owner."""
-        return (self.owner,)
 
 
 @dataclass(eq=False)
@@ -149,11 +149,6 @@ class Item(Expression):
         assert isinstance(self.owner.type, Array)
         self.type = self.owner.type.item
 
-    @property
-    def parts(self) -> Sequence[Expression]:
-        """The owner and the place."""
-        return self.owner, self.place
-
 
 @dataclass(eq=False)
 class Make(Expression):
@@ -161,11 +156,6 @@ class Make(Expression):
 
     type: Type
     values: Sequence[Expression]
-
-    @property
-    def parts(self) -> Sequence[Expression]:
-        """The values."""
-        return self.values
 
 
 @dataclass(eq=False)
@@ -175,11 +165,6 @@ class Operation(Expression):
     operator: Operator
     operands: Sequence[Expression]
     type: Type
-
-    @property
-    def parts(self) -> Sequence[Expression]:
-        """The operands."""
-        return self.operands
 
     @cached_property
     def fails(self) -> bool:
@@ -199,11 +184,6 @@ class Choice(Expression):
         """Find its type."""
         self.type = self.one.type
 
-    @property
-    def parts(self) -> Sequence[Expression]:
-        """All three."""
-        return self.test, self.one, self.other
-
 
 @dataclass(eq=False)
 class Call(Expression):
@@ -215,11 +195,6 @@ class Call(Expression):
     def __post_init__(self) -> None:
         """Find its type."""
         self.type = self.function.returns
-
-    @property
-    def parts(self) -> Sequence[Expression]:
-        """The arguments."""
-        return self.arguments
 
     @cached_property
     def fails(self) -> bool:
@@ -380,20 +355,16 @@ def blocks_of(statement: Statement) -> Sequence[Sequence[Statement]]:
 
 def expressions_of(statement: Statement) -> Iterator[Expression]:
     """The expressions of a statement, but not those of its blocks."""
-    if isinstance(statement, Store):
-        yield from (value for _, value in statement.values)
-    elif isinstance(statement, StoreItem):
-        yield from (*statement.places, statement.value)
-    elif isinstance(statement, Do):
-        yield statement.call
-    elif isinstance(statement, (If, While)):
-        yield statement.test
-    elif isinstance(statement, For):
-        yield from (statement.start, statement.stop)
-    elif isinstance(statement, Return) and statement.value is not None:
-        yield statement.value
-    elif isinstance(statement, Raise):
-        yield from (part[0] for part in statement.parts if not isinstance(part, str))
+    yield from _expressions_in(vars(statement).values())
+
+
+def _expressions_in(values: Iterable[Any]) -> Iterator[Expression]:
+    """The expressions among the attributes of a node, also within its lists."""
+    for value in values:
+        if isinstance(value, Expression):
+            yield value
+        elif isinstance(value, (list, tuple)):
+            yield from _expressions_in(value)
 
 
 def expressions_in(expression: Expression) -> Iterator[Expression]:

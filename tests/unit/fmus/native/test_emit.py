@@ -548,6 +548,18 @@ CONSTRUCTS = {
         "        y = y * 0.5 + k\n    for b in reversed(v):\n        y = y * x + b\n"
         "    return y, k + a, b\n"
     ),
+    "names of loops that are over": (
+        "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, int, int]:\n"
+        "    for k in range(3):\n        pass\n    while k > -3:\n        k -= 2\n"
+        "    n = k\n    for i in range(2):\n        for a in v:\n            x += a\n"
+        "        for a in range(i + 1):\n            n += a\n"
+        "    for j in range(4):\n        if x > j:\n            j = 7\n        n += j\n"
+        "    return x, n, j\n"
+    ),
+    "match with another way for all others": (
+        "def f(k: int, x: float) -> float:\n    match k:\n        case 1 | _ if x > 1.0:\n"
+        "            x = 2.0\n        case 1 | _:\n            x = 1.0 / x\n    return x\n"
+    ),
     "sums and tests in loops": (
         "def f(x: float, v: Annotated[Vector, 4], k: int) -> tuple[int, bool, bool, float, int]:\n"
         "    def near(a: float) -> bool:\n        return abs(a - x) < 1.0\n"
@@ -737,6 +749,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("for k, a in zip(range(int(y)), v): y += k", "a range of other than constants"),
         ("for k, a in zip(range(-(2**31), 2**31, 3), v): y += k", "2147483648 is an int"),
         ("for k, a in zip(range(-2147483647, 2147483647), v): y += k", "a range of so many"),
+        ("for k in range(3): k = 0.5 * y", "k is an int and gets a float"),
         ("for v in v: y += v", "v is a Vector of 3 and gets a float: use another name"),
         ("y = interpolate(y, (0, 1), (10, 20))", "a tuple of 2 with other than floats"),
         ("y = {1: y}[1]", "a dict is not in the language of equations; use a NamedTuple"),
