@@ -444,7 +444,7 @@ class Program:
             guard = f" if {self._filled('~B', known, 1)}" if can_be_guarded else ""
             self._add(indent, f"    case {case.strip().replace('OR', '|')}{guard}:")
             self._branch(known, f"{indent}    ", depth)
-            if self._random.random() < 0.1:
+            if case != "_" and self._random.random() < 0.1:
                 self._return(known, f"{indent}        ")
             else:
                 self._add(indent, f"        {name} = {self._expression(kind, known, 1)}")
@@ -592,6 +592,8 @@ def numbers_for(random: Random, types: Sequence[object]) -> list[float]:
             found.append(random.choice(odd) if random.random() < 0.2 else random.uniform(-4.0, 4.0))
         elif word == "a bool":
             found.append(random.randint(0, 1))
+        elif made := getattr(shape, "made", None):
+            found.append(random.choice([*made]))
         else:
             edge = random.choice((2**31 - 1, -(2**31), 46_341, random.randint(-70_000, 70_000)))
             found.append(edge if random.random() < 0.15 else random.randint(-1, 3))
