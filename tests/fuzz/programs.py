@@ -59,6 +59,7 @@ XS = Vector((-2.0, -0.5, 0.0, 1.0, 4.0))
 YS = Vector((3.0, -1.0, -0.0, 0.5, 0.25))
 A = Matrix(((2.0, -1.0, 0.5), (-0.0, 1.5, -0.25), (1.0, 0.0, 3.0)))
 THREE = XS[2:]
+TWO = Record(1.0, THREE), Record(-0.0, YS[:3], bias=0.0)
 PRIMES = (2, 3, 5, 7)
 TABLE = ((1, 50.0), (2, -0.5), (0, -0.0))
 SIZE = 2
@@ -142,9 +143,9 @@ GRAMMAR = {
     V2: "YS[:2]",
     M33: "A",
     M23: "Matrix((XS[:3], YS[1:4]))",
-    RECORD: "Record(1.0, XS[:3])",
+    RECORD: "TWO[1]",
     MODE: "Mode.OFF | Mode.LOW | Mode.HIGH | Mode.LEAST",
-    PAIR: "(Record(1.0, XS[:3]), Record(-0.0, YS[:3], bias=0.0))",
+    PAIR: "TWO",
 }
 DEEPER = {
     FLOAT: """
@@ -310,7 +311,7 @@ class Program:
             "r": RECORD,
         }
         variables = dict(arguments)
-        self._block(variables, "    ", self._random.randint(3, 8), depth=0)
+        self._block(variables, "    ", self._random.randint(3, 6), depth=0)
         self._return(variables, "    ")
         for line, known in self._returns.items():
             values = (n if n in known else _simple(hint) for n, hint in variables.items())
@@ -338,8 +339,9 @@ class Program:
             choices += [self._several, self._several]
             choices += [self._call] * (self._random.random() < 0.3)
             if depth < 3:
-                choices += [self._if, self._for, self._while, self._local, self._match]
-                choices += [self._forever]
+                choices += [self._if, self._for, self._while, self._local]
+            if depth < 2:
+                choices += [self._match, self._forever]
             self._random.choice(choices)(known, indent, depth)
             if loop and self._random.random() < 0.1:
                 self._add(indent, f"if {self._expression(BOOL, known, 1)}:")
@@ -362,7 +364,7 @@ class Program:
 
     def _assign(self, known: Variables, indent: str, depth: int) -> None:
         hint = self._random.choice(TYPES)
-        value, name = self._expression(hint, known, 3), self._new(hint)
+        value, name = self._expression(hint, known, self._random.randint(1, 3)), self._new(hint)
         said = f": {hint}" * (self._random.random() < 0.1)
         self._add(indent, f"{name}{said} = {value}")
         known[name] = hint
@@ -429,13 +431,13 @@ class Program:
             known[name] = hint
 
     def _branch(self, known: Variables, indent: str, depth: int) -> None:
-        self._block(dict(known), f"{indent}    ", self._random.randint(1, 3), depth + 1)
+        self._block(dict(known), f"{indent}    ", self._random.randint(1, 2), depth + 1)
 
     def _match(self, known: Variables, indent: str, depth: int) -> None:
         hint = self._random.choice((INT, MODE))
         cases = CASES[hint].split("|")
         self._add(indent, f"match {self._expression(hint, known, 2)}:")
-        chosen = self._random.sample(cases, self._random.randint(1, len(cases)))
+        chosen = self._random.sample(cases, self._random.randint(1, 3))
         is_complete = self._random.random() < 0.7
         kind = self._random.choice((FLOAT, INT))
         name = self._new(kind)
@@ -499,7 +501,7 @@ class Program:
         known[last] = hint
 
     def _loop_body(self, inside: Variables, indent: str, depth: int) -> None:
-        self._block(dict(inside), f"{indent}    ", self._random.randint(1, 3), depth + 1, loop=True)
+        self._block(dict(inside), f"{indent}    ", self._random.randint(1, 2), depth + 1, loop=True)
 
     def _local(self, known: Variables, indent: str, depth: int) -> None:
         hint = self._random.choice((FLOAT, INT, V3, RECORD))
