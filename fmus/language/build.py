@@ -13,7 +13,7 @@ import operator
 import sys
 import tokenize
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from enum import IntEnum
 from functools import cache
@@ -304,26 +304,6 @@ def _stored(*nodes: ast.AST) -> list[str]:
     return found
 
 
-def _occurrences(*nodes: ast.AST) -> Iterator[tuple[str, bool]]:
-    """Names in the order of their use, and whether each is read."""
-    for node in nodes:
-        if isinstance(node, ast.Name):
-            yield node.id, isinstance(node.ctx, ast.Load)
-        elif isinstance(node, ast.Assign):
-            yield from _occurrences(node.value, *node.targets)
-        elif isinstance(node, ast.AugAssign):
-            yield from ((name, True) for name in _names(node.target))
-            yield from _occurrences(node.value)
-        elif isinstance(node, ast.AnnAssign):
-            yield from _occurrences(*filter(None, [node.value, node.target]))
-        elif isinstance(node, ast.For):
-            yield from _occurrences(node.iter, node.target, *node.body, *node.orelse)
-        elif isinstance(node, (ast.FunctionDef, ast.GeneratorExp)):
-            yield from ((name, True) for name in _free(node))
-        else:
-            yield from _occurrences(*ast.iter_child_nodes(node))
-
-
 def _names(node: ast.AST) -> set[str]:
     return {part.id for part in ast.walk(node) if isinstance(part, ast.Name)}
 
@@ -362,19 +342,18 @@ def _is_text(node: ast.stmt) -> bool:
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
-def _leaves(body: Sequence[ast.stmt]) -> bool:
-    """Whether a loop may be left by `break`."""
-    return any(
-        isinstance(node, ast.Break)
-        or (isinstance(node, (ast.If, ast.Match)) and _leaves(_inside(node)))
-        for node in body
-    )
-
-
-def _inside(node: ast.If | ast.Match) -> list[ast.stmt]:
-    if isinstance(node, ast.If):
-        return [*node.body, *node.orelse]
-    return [statement for case in node.cases for statement in case.body]
+def _is_of_loops(name: str, *nodes: ast.AST) -> bool:
+    """Whether a name occurs only in loops that give it a value."""
+    for node in nodes:
+        if isinstance(node, ast.For) and name in _names(node.target):
+            occurs = name in _free(node.iter)
+        elif isinstance(node, (ast.FunctionDef, ast.expr)):
+            occurs = name in (*_free(node), *_stored(node))
+        else:
+            occurs = not _is_of_loops(name, *ast.iter_child_nodes(node))
+        if occurs:
+            return False
+    return True
 
 
 def _constant(node: ast.expr) -> Any:
@@ -483,6 +462,8 @@ class _Builder:
         self._taken: set[str] = set()
         #: Loops around the statement, and those whose counter could be their variable.
         self._loops: list[_Turns] = []
+        #: What is known where each of them is left by `break`.
+        self._ends: list[_Known | None] = []
         self._counted: list[_Turns] = []
         #: Variables of the function around this one that only functions called here need.
         self._closure: dict[str, Expression] = {}
@@ -645,6 +626,7 @@ class _Builder:
         found.append(tree.Return(value))
 
     def _break_statement(self, node: ast.Break, found: list[Statement]) -> None:
+        self._ends[-1] = _both(self._ends[-1], self.known)
         self.known = None
         found.append(tree.Break())
 
@@ -729,12 +711,14 @@ class _Builder:
         elif not _names(node.test) & {*_stored(*node.body)}:
             raise self._cannot(node, "a while that changes nothing in its condition")
         self._before = None
-        before = self._before_loop([node.test, *node.body])
+        before = self._before_loop(node.body)
         test: Expression = Number(True, BOOL)
         with self._noting():
             test = self.condition(node.test)
+        self._ends.append(None)
         body = self._block(node.body)
-        self.known = None if is_endless and not _leaves(node.body) else before
+        end = self._ends.pop()
+        self.known = end if is_endless else before
         found.append(tree.While(test, body))
 
     def _for_statement(self, node: ast.For, found: list[Statement]) -> None:
@@ -759,7 +743,7 @@ class _Builder:
             self._block(node.body)
             self.known = before
             raise
-        before = self._before_loop([node.target, *node.body])
+        before = self._before_loop(node.body, _names(node.target))
         made = loop.made(counter)
         turns = _Turns(made, counter)
         used = {*_free(*node.body), *_stored(*node.body), *(before or {})}
@@ -776,27 +760,28 @@ class _Builder:
         if counts and not loop.is_wide and not {*counts} & {*(before or {}), *_stored(*node.body)}:
             self._counted.append(turns)
         self._loops.append(turns)
+        self._ends.append(None)
         body = self._block(node.body)
+        self._ends.pop()
         self._loops.pop()
         made.body = [*stores, *body]
-        self.known = {**before, **of_loop} if before is not None and loop.turns else before
+        self.known = before
+        if before is not None:
+            after = {**before, **of_loop}
+            self.known = after if loop.turns else _both(before, after)
         found.append(made)
 
-    def _before_loop(self, nodes: Sequence[ast.AST]) -> _Known | None:
-        """What is known before a loop that may use names of loops that are over again.
-
-        A name that it reads first keeps its value; one that it writes first begins anew.
-        """
-        first = dict(reversed([*_occurrences(*nodes)]))
-        again = {*_stored(*nodes)}
+    def _before_loop(self, body: Sequence[ast.stmt], own: Set[str] = frozenset()) -> _Known | None:
+        """What is known before a loop, whose body may give names of earlier loops other values."""
+        again = {*_stored(*body)} - own
         for name, (type_, loops) in [*(self.known or {}).items()]:
             if name in again and loops and loops.isdisjoint(self._loops):
                 assert self.known is not None
-                if first[name]:
-                    self._local(nodes[0], name)
-                    self._know(name, type_)
-                else:
+                if self.node is not None and _is_of_loops(name, *self.node.body):
                     self.known = {n: value for n, value in self.known.items() if n != name}
+                else:
+                    self._local(body[0], name)
+                    self._know(name, type_)
         return self.known
 
     # Functions within this one

@@ -267,8 +267,12 @@ def _finding(script: Path, folder: Path, seed: int) -> str:
     for fmu in (folder / "checked").glob("*.fmu"):
         if flaws := validate_fmu(str(fmu)):
             return f"{fmu.name}: {flaws}"
-    here = platforms("2", None)
-    plan, traces = [*range(seed, seed + 6)], []
+    return difference(script, folder, range(seed, seed + 6))
+
+
+def difference(script: Path, folder: Path, plan: Sequence[int]) -> str:
+    """Where the two kinds of a component differ, with a random step for each number of a plan."""
+    here, traces = platforms("2", None), []
     for kind in (
         PythonKind(best_loader()),
         NativeKind("2", here, compiler_for(here), lambda line: None),

@@ -19,7 +19,7 @@ from fmus.compilers import SAME_NUMBERS
 from fmus.language.build import program_of
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from fmus.language.tree import Function
-from fmus.language.types import FLOAT, INT, Array, Record, Scalar, Type, parts_of, type_of
+from fmus.language.types import FLOAT, Array, Record, Scalar, Type, parts_of, type_of
 from fmus.native.emit import Emitter, members
 from fmus.native.names import RUNTIME, in_c
 from fmus.ports.groups import hints_of
@@ -198,5 +198,4 @@ def sizes_of(function: FunctionType) -> list[Any]:
     """The types of all numbers that a function takes."""
     hints = hints_of(function)
     hints.pop("return")
-    found = [part for hint in hints.values() for _, part in _leaves(type_of(hint), "")]
-    return [INT if part.made else part for part in found]
+    return [part for hint in hints.values() for _, part in _leaves(type_of(hint), "")]

@@ -556,6 +556,16 @@ CONSTRUCTS = {
         "    for j in range(4):\n        if x > j:\n            j = 7\n        n += j\n"
         "    return x, n, j\n"
     ),
+    "loops that may give earlier names another value": (
+        "def f(x: float, n: int, v: Annotated[Vector, 3]) -> tuple[float, int, float, float]:\n"
+        "    for k in range(3):\n        x += k\n    for k in range(n % 3):\n        x += k\n"
+        "    for a in v:\n        if a > x:\n            break\n"
+        "    for _ in range(n % 2):\n        for a in v:\n            x += a\n"
+        "    n = 0\n    while True:\n        y = x * 0.5\n        n += 1\n        if y < n:\n"
+        "            break\n        x -= 7.0\n        if n > 9:\n            y = x\n"
+        "            break\n"
+        "    return x, k, a, y\n"
+    ),
     "match with another way for all others": (
         "def f(k: int, x: float) -> float:\n    match k:\n        case 1 | _ if x > 1.0:\n"
         "            x = 2.0\n        case 1 | _:\n            x = 1.0 / x\n    return x\n"
@@ -698,7 +708,7 @@ def test_python_and_c_agree_bit_for_bit(
     function = f"f{[*CONSTRUCTS].index(name)}"
     types = sizes_of(both.functions[function])
 
-    @given(st.tuples(*(KINDS[shape.word] for shape in types)))
+    @given(st.tuples(*(st.sampled_from([*t.made]) if t.made else KINDS[t.word] for t in types)))
     @settings(max_examples=40, deadline=None)
     def agree(numbers: tuple[float, ...]) -> None:
         python, c = both.python(function, numbers), both.c(function, numbers)
