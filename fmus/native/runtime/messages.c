@@ -15,15 +15,15 @@ static uint64_t hash(string text) {
 }
 
 /* Logs a message only the first time that its key, or else its text, occurs. */
-static void log_once(instance *it, message *said, int status, string key) {
-    uint64_t sum = hash(key != NULL ? key : said->text);
+static void log_once(instance *it, message *text, int status, string key) {
+    uint64_t sum = hash(key != NULL ? key : text->text);
     for (size_t i = 0; i < it->n_logged; i++) {
         if (it->logged[i] == sum) return;
     }
     if (it->n_logged == MOST_MESSAGES) return;
     it->logged[it->n_logged++] = sum;
-    if (it->n_logged == MOST_MESSAGES) append_text(said, "; further messages are not logged");
-    log_message(it, status, said->text);
+    if (it->n_logged == MOST_MESSAGES) append_text(text, "; further messages are not logged");
+    log_message(it, status, text->text);
 }
 
 static void refuse(call *this, int status, message *why, string key) {
