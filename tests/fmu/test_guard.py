@@ -22,6 +22,7 @@ from typing import Any
 import fmpy
 import pytest
 
+from fmus.python.callbacks import LONGEST_MESSAGE
 from fmus.python.own import build_script
 from fmus.python.packaging import loader_compiler
 from support.fmi3 import Fmi3Library
@@ -210,6 +211,16 @@ def test_folder_without_a_slave_is_null_with_one_message(python, resources, file
     assert message.status in (ERROR, Status.Fatal)
     with instance(python):
         pass  # The sound one still works.
+
+
+def test_long_reason_is_cut_between_characters(python, resources):
+    """And a percent sign is doubled, as in all formats."""
+    (resources / "slavemodule.txt").write_text("guarded_k")
+    said = "100 % %d %% " + "ü" * 2000
+    (resources / "guarded_k.py").write_text(f"raise ValueError({said!r})", encoding="utf-8")
+    message = refused(python, location=resources.as_uri().encode())
+    whole = f"fmi2Instantiate: ValueError: {said}"
+    assert message.text == whole[:LONGEST_MESSAGE].replace("%", "%%")
 
 
 @pytest.mark.parametrize(

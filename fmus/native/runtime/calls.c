@@ -64,8 +64,8 @@ static int check_place(call *this, void **state, entry **before) {
     return *state == NULL || (*before = lock_state(this, *state)) != NULL;
 }
 
-/* Hands a state over to the host, replacing one that it already had; NULL: it could not be made, for
- * want of memory if the call has not been refused. */
+/* Hands a state over to the host, replacing one that it already had; NULL: it could not be made,
+ * for want of memory if the call has not been refused. */
 static void hand_over(call *this, void *made, void **state, entry *before) {
     if (before != NULL && made != NULL) {
         free_saved(this->instance, before->thing);

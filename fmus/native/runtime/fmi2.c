@@ -1,6 +1,7 @@
 /* The functions of FMI 2.0, and the one file to compile: it includes all others.
  */
 #include "component.h"
+#include "fmi2.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -12,22 +13,6 @@
 #define FMI2(name) name
 #endif
 
-enum { CO_SIMULATION = 1 };
-
-/* A kind of fmi2GetRealStatus. */
-enum { LAST_SUCCESSFUL_TIME = 2 };
-
-typedef void (*fmi2_logger)(void *, string, int, string, string, ...);
-
-/* fmi2CallbackFunctions, of which only the logger is used. */
-typedef struct {
-    fmi2_logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*step_finished)(void *, int);
-    void *environment;
-} callbacks;
-
 static const names version = {
     .types = {"Real", "Integer", "Boolean", "Enumeration"},
     .enumerations_are_integers = 1,
@@ -38,7 +23,6 @@ static const names version = {
 enum { FIRST_REFERENCE = 0 };
 
 #include "component.c"
-#include "model_exchange.h"
 
 /* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
 static void call_logger(const logger *host, string name, int status, string category, string text) {
@@ -65,13 +49,9 @@ EXPORT string FMI2(fmi2GetVersion)(void) { return "2.0"; }
 
 EXPORT void *FMI2(fmi2Instantiate)(string name, int type, string guid, string location,
                                    const callbacks *functions, int visible, int logging) {
-    logger host = {NULL, NULL};
-    if (functions != NULL) {
-        host = (logger){(void (*)(void))functions->logger, functions->environment};
-    }
     return instantiate("fmi2Instantiate",
                        type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only", name,
-                       guid, host, logging);
+                       guid, logger_of(functions), logging);
 }
 
 EXPORT void FMI2(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }

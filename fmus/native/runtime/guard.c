@@ -6,14 +6,17 @@
 
 static void give_way(void) { wait_a_moment(); }
 
-/* Whether a call may come in the mode of the instance; else it fails. */
-static int check_mode(call *this) {
+static int fail_in_mode(call *this) {
     static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
     message why;
-    if (this->allowed & WHEN(this->instance->run.mode)) return 1;
     compose(&why, "%s is not allowed when %s", this->function, names[this->instance->run.mode]);
     fail(this, &why);
     return 0;
+}
+
+/* Whether a call may come in the mode of the instance; else it fails. */
+static int check_mode(call *this) {
+    return this->allowed & WHEN(this->instance->run.mode) || fail_in_mode(this);
 }
 
 /* Lets the next call of the instance begin; the status of this one. */

@@ -120,12 +120,10 @@ static void unlock_entry(entry *it) { put_shared(&it->thread, NULL); }
 /* The entry of a handle, which no other thread has locked; NULL, and what is wrong: there is none,
  * or this thread is in a call of it already. */
 static entry *lock_entry(void *handle, thing_kind kind, string *wrong) {
-    static const string not_alive[] = {"not a live instance of this FMU",
-                                       "not a live state of this FMU"};
     size_t place = (uintptr_t)handle & (MOST_ENTRIES - 1);
     entry *chunk = get_shared(&chunks[place >> CHUNK_BITS]);
     entry *it = chunk == NULL ? NULL : &chunk[place & (CHUNK_SIZE - 1)];
-    *wrong = not_alive[kind];
+    *wrong = kind == INSTANCE ? "not a live instance of this FMU" : "not a live state of this FMU";
     while (is_alive(it, handle)) {
         if (swap_shared(&it->thread, NULL, this_thread())) {
             if (is_alive(it, handle) && it->kind == kind) return it;

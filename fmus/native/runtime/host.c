@@ -1,5 +1,5 @@
-/* The host's arguments and its logger. Errors are logged even where logging is off, as FMI 2.0.4 and
- * 3.0.3 have it. */
+/* The host's arguments and its logger. Errors are logged even where logging is off, as FMI 2.0.4
+ * and 3.0.3 have it. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>

@@ -91,11 +91,12 @@ static int check_value(const port *port, double number, message *why) {
     if (port->type == BOOLEAN && !is_truth(number)) {
         return compose(why, "%s: must be a Boolean", port->name);
     }
-    return port->causality == OUTPUT ? check_finite(port, number, why) : check_range(port, number, why);
+    return port->causality == OUTPUT ? check_finite(port, number, why)
+                                     : check_range(port, number, why);
 }
 
 static int check_values(const double values[], size_t n, const uint32_t references[],
-                       message *why) {
+                        message *why) {
     for (size_t i = 0; i < n; i++) {
         if (!check_value(port_at(references[i]), values[i], why)) return 0;
     }

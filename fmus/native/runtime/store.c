@@ -169,8 +169,8 @@ static void note_change(instance *it, int inputs, int parameters) {
     }
 }
 
-/* The values of a call, which the instance keeps until all of them are found good: all are taken, or
- * none. They are set one by one between the beginning and the end of a setting. */
+/* The values of a call, which the instance keeps until all of them are found good: all are taken,
+ * or none. They are set one by one between the beginning and the end of a setting. */
 typedef struct {
     call *call;
     int good;

@@ -8,15 +8,11 @@
 #include "../../native/runtime/host.c"
 #include "../../native/runtime/handles.c"
 #include "../../native/runtime/calls.c"
-#include "../../native/runtime/model_exchange.h"
 
 #include "python.c"
 #include "preflight.c"
 #include "location.c"
 #include "guard.c"
-
-/* A kind of fmi2GetRealStatus. */
-enum { LAST_SUCCESSFUL_TIME = 2 };
 
 /* What PythonFMU answers to one of its functions. */
 #define TO_PYTHONFMU(call, name, parameters, arguments)                                          \

@@ -47,7 +47,6 @@ static void log_queue(instance *it) {
 
 /* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
 static void call_logger(const logger *host, string name, int status, string category, string text) {
-    typedef void (*fmi2_logger)(void *, string, int, string, string, ...);
     char *format = malloc(2 * strlen(text) + 1);
     if (format == NULL) return;
     copy_doubled(format, text, '%');
@@ -79,13 +78,9 @@ static void log_of_slave(void *environment, string name, int status, string cate
 
 static instance *new_instance(string name, const callbacks *functions, int logging) {
     instance *it = calloc(1, sizeof *it);
-    logger host = {NULL, NULL};
     if (it == NULL) return NULL;
     it->heard = (callbacks){.logger = log_of_slave, .environment = it};
-    if (functions != NULL) {
-        host = (logger){(void (*)(void))functions->logger, functions->environment};
-    }
-    if (listen(&it->host, name, host, logging)) return it;
+    if (listen(&it->host, name, logger_of(functions), logging)) return it;
     free(it);
     return NULL;
 }

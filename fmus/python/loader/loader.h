@@ -11,24 +11,12 @@
 
 #include "../../native/runtime/platform.h"
 
+#include "../../native/runtime/fmi2.h"
 #include "../../native/runtime/modes.h"
 #include "../../native/runtime/text.c"
 
-/* FMI */
-
-enum { CO_SIMULATION = 1 };
-
 typedef void *component;
 typedef unsigned int reference;
-
-/* fmi2CallbackFunctions, of which only the logger is used. */
-typedef struct {
-    void (*logger)(void *, string, int, string, string, ...);
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*step_finished)(void *, int);
-    void *environment;
-} callbacks;
 
 /* Python */
 

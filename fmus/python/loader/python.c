@@ -174,8 +174,7 @@ static void give_way(void) {
     py.PyEval_RestoreThread(thread);
 }
 
-/* Waits until no other thread makes an instance, of any FMU, which changes sys.path. The interpreter
- * lock is given away meanwhile: a thread that makes one needs it. */
+/* Waits until no other thread makes an instance, of any FMU, which changes sys.path. */
 static void begin_making(void) {
     while (process.making > 0 && process.family == getpid() &&
            !pthread_equal(process.maker, pthread_self())) {
