@@ -16,7 +16,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from enum import IntEnum
-from functools import cache
+from functools import cache, partial
 from importlib.util import resolve_name
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, ModuleType
@@ -201,7 +201,11 @@ class Program:
             TypeError: it is none, or calls itself.
 
         """
-        hints = hints_of(function)
+        path, line = str(inspect.getsourcefile(function)), function.__code__.co_firstlineno
+        try:
+            hints = hints_of(function)
+        except Exception as error:
+            raise TypeError(f"{path}:{line}: {type(error).__name__}: {error}") from None
         hints.pop("return", None)
         unsized = any(map(has_no_size, hints.values()))
         key = (function, *types) if unsized else function
@@ -209,16 +213,14 @@ class Program:
             return self.functions[key]
         if key in self._begun:
             raise TypeError(f"{function.__name__} calls itself")
-        self._begun.add(key)
-        path = str(inspect.getsourcefile(function))
-        node = _definition(path, function.__code__.co_firstlineno)
+        node = _definition(path, line)
         if node is None:
-            line = function.__code__.co_firstlineno
             raise TypeError(f"{path}:{line}: {function.__name__} is not made by def in a module")
         made = Function(function.__module__, function.__name__, {}, sizes=types if unsized else ())
         builder = _Builder(self, path, function.__globals__, made, node)
         given = dict(zip((argument.arg for argument in _arguments(node)), types))
-        builder.build(lambda name: given[name] if unsized else UNKNOWN)
+        self._begun.add(key)
+        builder.build(lambda name: given.get(name) or builder.sizeless(name))
         self.functions[key] = made
         return made
 
@@ -269,14 +271,17 @@ def _origins(module: ModuleType) -> Mapping[str, str]:
 
 def _home(module: ModuleType, name: str) -> str:
     """The module that a constant was defined in, seen from one that uses it."""
-    try:
-        origin = _origins(module).get(name)
-    except (OSError, TypeError, ImportError):
-        return module.__name__
-    if origin is None or origin == "math":
-        return origin or module.__name__
-    found = sys.modules.get(origin)
-    return _home(found, name) if found else origin
+    seen: list[ModuleType] = []
+    while module not in seen:
+        seen.append(module)
+        try:
+            origin = _origins(module).get(name)
+        except (OSError, TypeError, ImportError, SyntaxError):
+            break
+        if origin == "math":
+            return origin
+        module = sys.modules.get(origin or "", module)
+    return module.__name__
 
 
 def _is_at_hand(function: FunctionType, path: str, module: str) -> bool:
@@ -316,6 +321,7 @@ def _free(*nodes: ast.AST) -> list[str]:
             found += [node.id] if isinstance(node.ctx, ast.Load) else []
         elif isinstance(node, ast.FunctionDef):
             own = {argument.arg for argument in _arguments(node)} | {*_stored(*node.body)}
+            found += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
             found += [name for name in _free(*node.body) if name not in own]
         elif isinstance(node, ast.GeneratorExp):
             first, *others = node.generators
@@ -410,7 +416,7 @@ class _Callable(NamedTuple):
     Attributes:
         function: as a tree; it gets what it captures after its arguments.
         names: of its arguments.
-        positional: how many of them may be given by their place.
+        unnamed, positional: how many of them must, and may, be given by their place.
         defaults: values of some of them.
         captured: names in the function around it.
 
@@ -418,6 +424,7 @@ class _Callable(NamedTuple):
 
     function: Function
     names: Sequence[str]
+    unnamed: int
     positional: int
     defaults: Mapping[str, Expression]
     captured: Sequence[str] = ()
@@ -581,6 +588,8 @@ class _Builder:
     def _block(self, nodes: Sequence[ast.stmt]) -> list[Statement]:
         found: list[Statement] = []
         for node in nodes:
+            if self.known is None:
+                break  # no step of the program comes here
             before = len(found)
             self._before = found
             with _Noting(self, node):
@@ -608,7 +617,7 @@ class _Builder:
     def _expr_statement(self, node: ast.Expr, found: list[Statement]) -> None:
         if not isinstance(node.value, ast.Call):
             raise self._cannot(node, word_of(node))
-        found.append(tree.Do(self.expression(node.value)))
+        found.append(tree.Do(self.expression(node.value, NOTHING)))
 
     def _return_statement(self, node: ast.Return, found: list[Statement]) -> None:
         assert self.node is not None
@@ -703,7 +712,7 @@ class _Builder:
     def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
         if node.orelse:
             raise _Outside(node.orelse[0], self._foreign("else of a while"))
-        is_endless = isinstance(node.test, ast.Constant) and node.test.value is True
+        is_endless = isinstance(node.test, ast.Constant) and node.test.value in (True, 1)
         inside = [n for statement in node.body for n in ast.walk(statement)]
         if is_endless:
             if not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in inside):
@@ -797,33 +806,42 @@ class _Builder:
             if self._counts[name] > (name not in self.made.arguments):
                 raise _Outside(node, f"{name}, which {node.name} uses, is changed")
         inner = self._inner(node.name, own, node)
-        inner.build(
-            lambda name: self._sizeless(node, name),
-            {name: self._local(node, name).type for name in captured},
-        )
+        inner.build(inner.sizeless, {name: self._local(node, name).type for name in captured})
         arguments = _arguments(node)
         n = len(arguments) - len(node.args.kwonlyargs)
         defaults = [*zip(arguments[n - len(node.args.defaults) : n], node.args.defaults)]
         defaults += [(a, d) for a, d in zip(node.args.kwonlyargs, node.args.kw_defaults) if d]
         given = {}
         for argument, default in defaults:
-            if _names(default) & self.names:
+            wanted = inner.made.arguments[argument.arg]
+            value = self._sometimes(partial(self.fitting, wanted=wanted), default)
+            if value.fails or _names(default) & {*self.names, *self.functions}:
                 raise _Outside(default, f"the default value of {argument.arg} is no constant")
-            given[argument.arg] = self.fitting(default, inner.made.arguments[argument.arg])
+            given[argument.arg] = value
         names = [argument.arg for argument in arguments]
-        called = _Callable(inner.made, names, n, given, captured)
+        unnamed = len(node.args.posonlyargs)
+        called = _Callable(inner.made, names, unnamed, n, given, captured)
         self.functions = {**self.functions, node.name: called}
         self.program.functions["inner", inner.made] = inner.made
         self._know(node.name, NOTHING)
 
-    def _sizeless(self, node: ast.FunctionDef, name: str) -> Type:
+    def sizeless(self, name: str) -> Type:
+        """Refuse an argument of any size where it has none."""
+        assert self.node is not None
         what = "a Vector or Matrix has no size here: write Annotated[Vector, 3]"
-        raise _Outside(node, f"the argument {name} of {node.name}: {what}")
+        raise _Outside(self.node, f"the argument {name} of {self.node.name}: {what}")
 
     def _captured(self, names: Sequence[str]) -> list[str]:
         """The variables among some names, and those that local functions among them capture."""
+        self._check_functions(names)
         found = [n for name in names for n in (name, *self._captured_by(name))]
         return [n for n in dict.fromkeys(found) if n in self.names and n not in self.functions]
+
+    def _check_functions(self, names: Sequence[str]) -> None:
+        """Refuse local functions that may not have been defined."""
+        for name in names:
+            if name in self.functions and name not in (self.known or self.functions):
+                raise _Outside(ast.Pass(), f"{name} may have no value here")
 
     def _captured_by(self, name: str) -> Sequence[str]:
         return self.functions[name].captured if name in self.functions else ()
@@ -926,7 +944,7 @@ class _Builder:
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
         """A name for what is taken apart: the name of the function it comes from."""
         name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
-        return name.lstrip("_") or "all"
+        return _stem(name) or "all"
 
     def _take_apart(self, target: ast.expr, value: Expression) -> list[Statement]:
         made = list(self._taken_apart(target, value))
@@ -958,8 +976,6 @@ class _Builder:
         stores = []
         for name, value in values:
             known = (self.known or {}).get(name)
-            if value.type == NOTHING:
-                raise _Outside(node, "what returns nothing is used as a value")
             if known and known[0] == INT and getattr(value.type, "made", None):
                 value = _as_int(value)
             is_over = known and known[1] and known[1].isdisjoint(self._loops)
@@ -1011,8 +1027,6 @@ class _Builder:
         """A value in a variable of its own."""
         if self._before is None:
             raise _Outside(ast.Pass(), "this is computed only in some cases: give it a name before")
-        if value.type == NOTHING:
-            raise _Outside(ast.Pass(), "what returns nothing is used as a value")
         found = self._unused(name)
         self._before.append(tree.Store([(found, value)]))
         return Local(found, value.type)
@@ -1026,11 +1040,15 @@ class _Builder:
             raise self._cannot(node, "a raise without a text")
         kind = self._meant(call.func)
         is_known = is_class(kind, BaseException) and issubclass(kind, _EXCEPTIONS)
-        if not is_known or kind.__str__ is not BaseException.__str__:
+        changed = [
+            value for one in getattr(kind, "__mro__", ()) if one is not Refusal
+            for value in vars(one).values() if isinstance(value, FunctionType)
+        ]  # fmt: skip
+        if not is_known or changed or kind.__str__ is not BaseException.__str__:
             self.known = None
             what = ast.unparse(call.func)
             raise _Outside(node, f"{what} is not an exception: write raise Refusal(...)")
-        head = "" if kind is Refusal else f"{kind.__name__}: "
+        head = "" if issubclass(kind, Refusal) else f"{kind.__name__}: "
         try:
             found.append(tree.Raise([head, *self._message(call.args[0])]))
         finally:
@@ -1053,7 +1071,7 @@ class _Builder:
     def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
         """A value in a text, and its format."""
         value = self.expression(part.value)
-        if part.conversion not in (-1, ord("s")):
+        if part.conversion not in ((-1,) if part.format_spec else (-1, ord("s"))):
             raise _Outside(part.value, f"!{chr(part.conversion)} in a text: leave it out")
         if any(isinstance(x, ast.FormattedValue) for x in getattr(part.format_spec, "values", ())):
             raise _Outside(part.value, "a format that is computed")
@@ -1092,7 +1110,8 @@ class _Builder:
         start, stop = hold(bounds[0], call, "start"), hold(bounds[1], call, "stop")
         turns = None if first is None or last is None else len(range(first, last, step))
         is_wide = abs(step) > 1 and (last is None or abs(last + step) >= 2**31)
-        bound = [] if target.id == "_" else [(target.id, counter)]
+        number: Expression = Operation(tree.NARROW, (counter,), INT) if is_wide else counter
+        bound = [] if target.id == "_" else [(target.id, number)]
         return _Loop(start, stop, step, turns, bound, is_wide)
 
     def _called(self, node: ast.expr) -> tuple[Any, ast.Call | None]:
@@ -1162,6 +1181,8 @@ class _Builder:
         if called is enumerate:
             words = [one for one in call.keywords if one.arg == "start"]
             begin = [*call.args[1:], *(one.value for one in words)]
+            if len(begin) > 1:
+                raise _Outside(call, "enumerate with more than a start")
             if begin:
                 number = self._size(begin[0])
                 if number is None:
@@ -1211,6 +1232,8 @@ class _Builder:
             self._depth -= 1
         if found.type == UNKNOWN:
             raise _Follows
+        if found.type == NOTHING != wanted:
+            raise _Outside(node, "what returns nothing is used as a value")
         return found
 
     def fitting(self, node: ast.expr, wanted: Type | None) -> Expression:
@@ -1329,12 +1352,7 @@ class _Builder:
         return self._local(node, node.id)
 
     def _local(self, node: ast.AST, name: str) -> Expression:
-        if self.known is None:
-            types = [type_ for one, type_ in self._variables if one == name]
-            if not types:
-                raise _Follows
-            return Local(self._variables[name, types[-1]], types[-1])
-        if name not in self.known:
+        if self.known is None or name not in self.known:
             raise _Outside(node, f"{name} may have no value here")
         type_, loops = self.known[name]
         for turns in loops - {*self._loops}:
@@ -1399,6 +1417,8 @@ class _Builder:
             return self._element(node, node.slice, value)
         if getattr(value.type, "made", None) is not Matrix:
             raise _Outside(node, f"two subscripts of {value.type.word}")
+        if len(node.slice.elts) != 2:
+            raise _Outside(node, f"{len(node.slice.elts)} subscripts of {value.type.word}")
         for place in node.slice.elts:
             if isinstance(place, ast.Slice):
                 raise _Outside(node, "a slice of a Matrix: its column j is A.T[j], its row i A[i]")
@@ -1934,15 +1954,16 @@ class _Builder:
         inner = self._inner(f"each{self._parts}", own)
         given: dict[str, Expression] = {}
         inside = [name for name in _free(node.elt, *generator.ifs) if name not in own]
+        self._check_functions(inside)
         for name in dict.fromkeys(inside):
             if name in self.names and name not in self.functions:
                 given[name] = self._local(node, name)
         inner.names = {*given, *own}
         inner._start({name: value.type for name, value in given.items()})
         for name in dict.fromkeys(n for one in inside for n in self._captured_by(one)):
-            if name in given:
+            if name in given and name not in self._closure:
                 continue
-            argument = inner._unused(name) if name in own else name
+            argument = inner._unused(name) if name in {*own, *given} else name
             given[argument] = self._closed(node, name)
             inner._closure[name] = Local(argument, given[argument].type)
         counter = Local(inner._unused(f"{first}_at"), INT)
@@ -2032,7 +2053,12 @@ class _Builder:
     def _member(self, node: ast.Call, made: Any) -> Expression:
         """The member of an enumeration that an int stands for."""
         self._check_plain(node, made.__name__, 1)
-        given, type_ = self._integer(node.args[0], made.__name__), enumeration(made)
+        type_ = enumeration(made)
+        given = self.expression(node.args[0])
+        if given.type == type_:
+            return given
+        if given.type != INT:
+            raise _Outside(node, f"{made.__name__} of {given.type.word}: it takes an int")
 
         def body() -> Sequence[Statement]:
             k = Local("k", INT)
@@ -2048,7 +2074,7 @@ class _Builder:
             ]
 
         of = self.program.functions.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
-        return Call(of, (_as_int(given),))
+        return Call(of, (given,))
 
     def _default(self, module: str, name: str, field: str, value: Any, wanted: Type) -> Expression:
         if isinstance(wanted, (Array, Record)):
@@ -2075,7 +2101,8 @@ class _Builder:
             zip(names[code.co_argcount - len(defaults) : code.co_argcount], defaults)
         )
         values |= called.__kwdefaults__ or {}
-        given = self._given(node, names, code.co_argcount, types, {*values})
+        by_place = (code.co_posonlyargcount, code.co_argcount)
+        given = self._given(node, names, by_place, types, {*values})
         for name, value in values.items():
             if name not in given:
                 wanted = types[name] if name in types else type_of_value(value, name)
@@ -2093,8 +2120,9 @@ class _Builder:
 
     def _call_of(self, node: ast.Call, called: _Callable) -> Expression:
         """A call of a local function."""
+        by_place = (called.unnamed, called.positional)
         given = self._given(
-            node, called.names, called.positional, called.function.arguments, {*called.defaults}
+            node, called.names, by_place, called.function.arguments, {*called.defaults}
         )
         given = {**called.defaults, **given}
         values = [given[name] for name in called.names]
@@ -2105,7 +2133,7 @@ class _Builder:
         self,
         node: ast.Call,
         names: Sequence[str],
-        positional: int,
+        by_place: tuple[int, int],
         types: Mapping[str, Type],
         optional: set[str],
     ) -> dict[str, Expression]:
@@ -2115,8 +2143,8 @@ class _Builder:
         places = names[: len(values)]
         missing = {*names} - {*places} - {*words} - optional
         if (
-            len(values) > positional or missing or {*words} - {*names} or {*words} & {*places}
-            or len(words) < len(node.keywords)
+            len(values) > by_place[1] or missing or {*words} & {*places}
+            or {*words} - {*names[by_place[0] :]} or len(words) < len(node.keywords)
         ):  # fmt: skip
             raise _Outside(node, f"arguments other than {', '.join(names)}")
         found = dict(zip(places, values))
@@ -2181,8 +2209,14 @@ def _both(one: _Known | None, other: _Known | None) -> _Known | None:
 
 def _first_name(target: ast.expr) -> str:
     """The first name in a target, by which what belongs to its loop is named."""
-    names = (part.id.lstrip("_") for part in ast.walk(target) if isinstance(part, ast.Name))
+    names = (_stem(part.id) for part in ast.walk(target) if isinstance(part, ast.Name))
     return next(filter(None, names), "x")
+
+
+def _stem(name: str) -> str:
+    """A name without what it begins with; empty: it is none then."""
+    found = name.lstrip("_")
+    return found if found.isidentifier() else ""
 
 
 def _value(one: Expression) -> int | None:

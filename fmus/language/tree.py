@@ -69,6 +69,9 @@ MATHEMATICS = {
     if not about.factor
 }
 
+#: The counter of a loop that may pass the largest int, in a turn, where it does not.
+NARROW = Operator("narrow")
+
 #: The place in an array that an int stands for, which may be below 0; the second is the length.
 PLACE = Operator("place", True)
 

@@ -197,17 +197,28 @@ def type_of(hint: Any) -> Type:
 
 def enumeration(made: type[IntEnum]) -> Scalar:
     """The type of the members of an enumeration."""
+    for one in made.__mro__[: made.__mro__.index(IntEnum)]:
+        _check_plain(one)
     return Scalar(f"a {made.__name__}", made)
 
 
 @cache
 def _record(made: Any) -> Record:
-    own = {name for name, value in vars(made).items() if inspect.isfunction(value)}
-    special = sorted(name for name in own if re.fullmatch(r"__\w+__", name))
-    changed = [name for name in special if vars(made)[name].__module__ == made.__module__]
-    if changed:
-        raise TypeError(f"{place_of(made)}{changed[0]} in the class {made.__name__}: leave it out")
-    return Record(tuple((n, _field(made, n, hint)) for n, hint in hints_of(made).items()), made)
+    _check_plain(made)
+    hints = hints_of(made)
+    if made.__bases__[0] is not tuple or [*hints] != [*made._fields]:
+        what = f"the class {made.__name__} is no NamedTuple with a type for each field"
+        raise TypeError(f"{place_of(made)}{what}")
+    return Record(tuple((name, _field(made, name, hint)) for name, hint in hints.items()), made)
+
+
+def _check_plain(made: type) -> None:
+    """Refuse a class that changes what Python does with its values."""
+    for name, value in vars(made).items():
+        of = getattr(value, "__func__", value)
+        is_own = getattr(of, "__module__", "") == made.__module__ and callable(of)
+        if is_own and re.fullmatch(r"__\w+__|_missing_", name) and not isinstance(value, type):
+            raise TypeError(f"{place_of(made)}{name} in the class {made.__name__}: leave it out")
 
 
 def _field(made: type, name: str, hint: Any) -> Type:

@@ -145,7 +145,7 @@ def strip_sphinx_marks(text: str) -> str:
 
 def closed(text: str) -> str:
     """A text that does not end the comment it stands in."""
-    return text.replace("*/", "* /")
+    return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def _comment(text: str) -> list[str]:
@@ -172,16 +172,10 @@ class Emitter:
         self._types: dict[Type, str] = {}
         self._constants: dict[tuple[Type, str], str] = {}
         self._wrappers: dict[str, str] = {}
-        #: Counters that may pass the largest int, for whose type they are cast.
-        self.wide = {
-            one.counter
-            for function in self._functions
-            for one in tree.statements_in(function.body)
-            if isinstance(one, tree.For) and one.is_wide
-        }
         #: Names of variables, which nothing else has.
         self._variables = {in_c(name) for one in self._functions for name in _variables(one)}
-        self._taken: set[str] = set()
+        #: Names of structures, functions and constants, and of functions of `math` that raise.
+        self._taken = {f"math_{name}" for name in FUNCTIONS}
         self._names: dict[Function, str] = {}
         for function in self._functions:
             for type_ in (*function.arguments.values(), function.returns):
@@ -303,6 +297,8 @@ class Emitter:
     def expression(self, one: Expression, within: int = _TERNARY, by_address: str = "") -> str:
         """An expression as an operand of what binds so tightly."""
         text, binding = self._bound(one, by_address)
+        if binding != _POSTFIX:
+            text = text.replace(_BREAK, " ")
         return text if binding >= within else f"({text})"
 
     def _bound(  # noqa: PLR0911, for each class
@@ -315,8 +311,6 @@ class Emitter:
         if isinstance(one, tree.Text):
             return quoted(one.value).replace(" ", _KEPT), _POSTFIX
         if isinstance(one, Local):
-            if one.name in self.wide:
-                return f"(int){in_c(one.name)}", _UNARY
             return (f"(*{in_c(one.name)})" if one.name == at else in_c(one.name)), _POSTFIX
         if isinstance(one, tree.Constant):
             return self._constant(one), _POSTFIX
@@ -370,7 +364,9 @@ class Emitter:
             return self._mathematics(one, op, at)
         if op in _INFIX:
             sign, binding = _INFIX[op]
-            left, right = (self.expression(p, binding + i, at) for i, p in enumerate(one.parts))
+            # Compilers want brackets around a comparison within another one.
+            both = (_SUM, _SUM) if binding < _SUM else (binding, binding + 1)
+            left, right = (self.expression(*each, at) for each in zip(one.parts, both))
             return f"{left} {sign} {right}", binding
         if op in _CALLED:
             texts = [self.expression(part, _TERNARY, at) for part in one.parts]
@@ -388,7 +384,7 @@ class Emitter:
             return f"{self.expression(part, _RELATION, at)} != {zero}", _EQUALITY
         if op == tree.NEGATIVE:
             return f"-{self.expression(part, _POSTFIX, at)}", _UNARY
-        sign = {tree.NOT: "!", tree.TO_FLOAT: "(double)"}[op]
+        sign = {tree.NOT: "!", tree.TO_FLOAT: "(double)", tree.NARROW: "(int)"}[op]
         return f"{sign}{self.expression(part, _UNARY, at)}", _UNARY
 
     # Functions
@@ -404,6 +400,8 @@ class Emitter:
         name = self._names[function]
         head = f"static {self.declared(function.returns)}{name}({_list(given) or 'void'}) {{"
         body = _Body(self, function).block(function.body, {*function.arguments}, INDENT)
+        if function.returns != NOTHING and not _ends(function.body):
+            body.append(f"{INDENT}{_Body(self, function).left()}")
         return "\n".join([*_comment(function.doc), *lines_of(head, ""), *body, "}"])
 
 
@@ -472,7 +470,7 @@ class _Body:
             yield f"{indent}{type(one).__name__.lower()};"
         elif isinstance(one, tree.Raise):
             yield from lines_of(self._raised(one), indent)
-            yield f"{indent}{self._left()}"
+            yield f"{indent}{self.left()}"
         elif isinstance(one, tree.If):
             yield from lines_of(f"if ({self._text(one.test)}) {{", indent)
             yield from self.block(one.body, known, inner)
@@ -535,7 +533,7 @@ class _Body:
             return
         yield from lines_of(text, indent)
 
-    def _left(self) -> str:
+    def left(self) -> str:
         """The statement that ends the function after an error."""
         returns = self._function.returns
         if returns == NOTHING:
@@ -557,6 +555,14 @@ class _Body:
             arguments.append(text)
         told = quoted(form).replace(" ", _KEPT)
         return f"raise_error({_list(['error', told, *arguments])});"
+
+
+def _ends(body: Sequence[Statement]) -> bool:
+    """Whether each way through a block ends the function."""
+    last = body[-1] if body else None
+    if isinstance(last, tree.If):
+        return _ends(last.body) and _ends(last.orelse)
+    return isinstance(last, (tree.Return, tree.Raise))
 
 
 def _used(one: Statement, deep: bool = True) -> set[str]:

@@ -18,7 +18,9 @@ _TAKEN = frozenset(
         # keywords that Python lacks
         "auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float",
         "goto", "inline", "int", "long", "register", "restrict", "short", "signed", "sizeof",
-        "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile",
+        "static", "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "asm",
+        "typeof", "alignas", "alignof", "constexpr", "nullptr", "static_assert", "thread_local",
+        "typeof_unqual", "true", "false",
         # of C++, which some compile these sources with, and macros of some compilers
         "bool", "catch", "delete", "friend", "linux", "namespace", "new", "operator", "private",
         "protected", "public", "template", "this", "throw", "unix", "using", "virtual",
@@ -39,6 +41,7 @@ _MACROS = re.compile(r"[A-Z][A-Z0-9_]{3,}|MASK_\w+")
 _LIBRARY = re.compile(
     r"(aligned|at|clock|cpu|fmi2|fmi3|function|getdate|int|is|max|mem|open|posix|pthread|quick|rlim|sched"
     r"|sig|stack|str|sys|syscall|timer|timespec|u|uint|va)_\w+|[a-z]+_([a-z]|unlocked|explicit)"
+    r"|model_\w+|choices_of_\w+|members_\d+"
 )
 
 #: Names of structures: of classes, and of tuples, which are joined from those of their parts.
