@@ -526,11 +526,12 @@ class _Builder:
     def _end(self, body: Sequence[Statement]) -> None:
         """Give the function its body; the name of a loop that is not needed after it counts."""
         for turns in self._counted:
-            first, *others = turns.loop.body
-            assert isinstance(first, tree.Store)
-            if not turns.escapes:
-                turns.loop.counter = turns.counter.name = first.values[0][0]
-                turns.loop.body = others
+            loop, counter = turns.loop, turns.counter
+            for one in loop.body if not turns.escapes else ():
+                if isinstance(one, tree.Store) and one.values[0][1] is counter:
+                    loop.counter = counter.name = one.values[0][0]
+                    loop.body = [other for other in loop.body if other is not one]
+                    break
         self.made.end(body)
 
     def _check_head(self, node: ast.FunctionDef) -> None:
@@ -2155,13 +2156,11 @@ class _Noting:
         if error is None:
             return False
         builder = self._builder
-        builder.has_mistakes = True
-        if isinstance(error, _Outside):
-            line = getattr(error.node, "lineno", getattr(self._node, "lineno", 0))
+        if isinstance(error, (_Outside, TypeError)):
+            node = error.node if isinstance(error, _Outside) else self._node
+            line = getattr(node, "lineno", getattr(self._node, "lineno", 0))
             builder.program.refuse(f"{builder.path}:{line}: ", str(error))
-        elif isinstance(error, TypeError):
-            line = getattr(self._node, "lineno", 0)
-            builder.program.refuse(f"{builder.path}:{line}: ", str(error))
+            builder.has_mistakes = True
         elif not isinstance(error, _Follows):
             return False
         if self._node is not None:

@@ -8,14 +8,16 @@ functions that are written here go over it number by number: ints of 32 bits are
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
+from operator import itemgetter
 from string import Formatter
 from textwrap import wrap
 
+from fmus.language import tree
 from fmus.language.build import Program, Untranslatable
-from fmus.language.tree import Function
+from fmus.language.tree import Call, Expression, Function, Make
 from fmus.language.types import (
     FLOAT,
     Array,
@@ -28,7 +30,6 @@ from fmus.language.types import (
 )
 from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, members, quoted
 from fmus.native.names import in_c
-from fmus.native.stack import NUMBER, deepest
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
@@ -45,6 +46,9 @@ _HEAD = """\
 #: Bytes that the equations may take of a thread's stack, of which macOS gives 512 kB: the host and
 #: the runtime take some, too.
 _MOST_ON_STACK = 384 * 1024
+
+#: Bytes that a number takes, alone in a structure.
+_NUMBER = 8
 
 _P, _S, _I = (
     "const model_parameters *parameters",
@@ -91,8 +95,8 @@ def translated(definition: Definition) -> str:
     if deep and bytes_on_stack > _MOST_ON_STACK:
         raise Untranslatable(
             f"{deep.name} and the functions that it calls hold "
-            f"{bytes_on_stack // NUMBER} numbers at once; C takes at most "
-            f"{_MOST_ON_STACK // NUMBER}, which lie on a thread's stack"
+            f"{bytes_on_stack // _NUMBER} numbers at once; C takes at most "
+            f"{_MOST_ON_STACK // _NUMBER}, which lie on a thread's stack"
         )
     emitter = Emitter(program.functions.values())
     glue = _glue(emitter, program, said)
@@ -321,3 +325,51 @@ def _moves(
 def _is_even(type_: Type) -> bool:
     """Whether a type is a number, or an array of what is even."""
     return isinstance(type_, Scalar) or (isinstance(type_, Array) and _is_even(type_.item))
+
+
+def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
+    """The most bytes that lie on a thread's stack in a call from outside, and the call of what.
+
+    Structures are passed and returned by value, so a function that adds large vectors keeps each
+    sum there. Nothing calls itself, and all sizes are fixed: what lies there at most can be added
+    up. Compilers keep no more than this, but for a tenth, and less if they optimise.
+
+    Args:
+        functions: each after those that it calls.
+
+    """
+    depths: dict[Function, int] = {}
+    for function in functions:
+        own, deeper = 0, 0
+        variables: dict[str, Type] = {}
+        for one in tree.statements_in(function.body):
+            if isinstance(one, tree.Reserve):
+                variables[one.name] = one.type
+            elif isinstance(one, tree.Store):
+                variables |= {name: value.type for name, value in one.values}
+            for each in tree.expressions_of(one):
+                own += _held(each)
+                calls = (part for part in tree.expressions_in(each) if isinstance(part, Call))
+                deeper = max([deeper, *(depths[call.function] for call in calls)])
+        own += sum(map(_result, variables.values()))
+        depths[function] = _passed(function) + own + deeper
+    found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
+    return max(found, key=itemgetter(0), default=(0, None))
+
+
+def _result(type_: Type) -> int:
+    """The bytes of a structure; a number lies in a register."""
+    return 0 if isinstance(type_, Scalar) else _NUMBER * count(type_)
+
+
+def _passed(function: Function) -> int:
+    """The bytes of the arguments that a function takes by value."""
+    given = function.arguments.items()
+    return sum(_result(type_) for name, type_ in given if name != function.by_address)
+
+
+def _held(one: Expression, within: bool = False) -> int:
+    """The bytes of the structures that an expression makes, and that are returned to it."""
+    is_made = isinstance(one, Make)
+    own = _result(one.type) if isinstance(one, Call) or (is_made and not within) else 0
+    return own + sum(_held(part, is_made) for part in one.parts)

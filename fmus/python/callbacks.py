@@ -1,9 +1,11 @@
-"""The values of an instance, what PythonFMU calls to pass them, and how a refusal is told.
+"""The values of an instance, what PythonFMU calls to pass them, and how calls are refused.
 
 No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. Nor
-can PythonFMU be told that a call was refused; it answers fmi2OK. The native loader is told by a log
-entry of its own category, and answers fmi2Discard or fmi2Error to that very call. Without a loader
-every step after a refusal is discarded, until a reset or a state that is restored.
+does PythonFMU learn that a call was refused; it answers fmi2OK. The native loader learns it by a
+log entry of its own category, and answers fmi2Discard or fmi2Error to that very call. Without a
+loader every step after a call that failed is discarded, until a reset or a state that is restored.
+
+Verbs are those of `fmus/native/runtime/host.h`: check, refuse, fail, log.
 """
 
 from __future__ import annotations
@@ -189,12 +191,12 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
         self._mode = INSTANTIATED
         #: Whether a value has changed that the state at the start time depends on.
         self._stale = False
-        self._said: set[str] = set()
+        self._logged: set[str] = set()
         #: Whether inputs change the outputs, and what is derived, before the next step.
         self._outputs_follow = self._derived_follows = True
         self._has_loader = has_loader(self.resources)
-        #: What no answer has told, where there is no loader.
-        self._untold = ""
+        #: Why a call failed, which PythonFMU has answered with fmi2OK; without a loader only.
+        self._failure = ""
 
     @abstractmethod
     def _refresh(self) -> str:
@@ -215,22 +217,20 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     # Refusals and messages
 
-    def _fail(self, why: str) -> None:
-        """Answer fmi2Error: the call is not possible now, or not at all."""
-        self._refuse(Fmi2Status.error, why)
-
-    def _refuse(self, status: Fmi2Status, why: str) -> None:
-        self._answer(status, why)
-        if not self._has_loader:
-            self._untold = self._untold or why
-
-    def _answer(self, status: Fmi2Status, why: str, key: str | None = None) -> None:
-        self.say(why, status, key)
+    def _refuse(self, status: Fmi2Status, why: str, key: str | None = None) -> None:
+        """Answer the call with a status, and log why."""
+        self.log_once(why, status, key)
         if self._has_loader:
             self.log("", status, ANSWER)
 
-    def _tell_time(self, time: float) -> None:
-        """Tell the native loader a time that the arguments of the call do not lead to."""
+    def _fail(self, why: str, status: Fmi2Status = Fmi2Status.error) -> None:
+        """Refuse a call that changes the run: without a loader, all steps from now on."""
+        self._refuse(status, why)
+        if not self._has_loader:
+            self._failure = self._failure or why
+
+    def _pass_time(self, time: float) -> None:
+        """Let the native loader know a time that the arguments of the call do not lead to."""
         if self._has_loader:
             self.log(pack(">d", time).hex(), Fmi2Status.ok, ANSWER)
 
@@ -240,21 +240,21 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             return str(error)
         return f"{place(error)}{type(error).__name__}: {error}"
 
-    def say(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
+    def log_once(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
         """Log a message only the first time that its key, or else its text, occurs.
 
         The host adds the name of the instance.
         """
-        said = (key or message)[:LONGEST_MESSAGE]
-        if said in self._said or len(self._said) >= MOST_MESSAGES:
+        key = (key or message)[:LONGEST_MESSAGE]
+        if key in self._logged or len(self._logged) >= MOST_MESSAGES:
             return
-        self._said.add(said)
-        if len(self._said) == MOST_MESSAGES:
+        self._logged.add(key)
+        if len(self._logged) == MOST_MESSAGES:
             message += "; further messages are not logged"
         # FMI defines a log message as a format: a host would take a % for a directive.
         self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
 
-    def _follows(self, call: str, mode: str) -> bool:
+    def _check_mode(self, call: str, mode: str) -> bool:
         """Whether a call comes in the one mode that it is allowed in; else it fails."""
         if self._mode != mode:
             self._fail(f"{call} is not allowed when {self._mode}")
@@ -269,7 +269,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
                 self._refresh_outputs(vrs)
             return self._get(vrs, "Real")
         if not store.fresh and (why := self._refresh()):
-            self._answer(Fmi2Status.error, why)
+            self._refuse(Fmi2Status.error, why)
         # PythonFMU reads the list and lets go of it, so it need not be a copy.
         return store.outputs if store.only_outputs else store.outputs[: len(vrs)]
 
@@ -314,7 +314,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
 
     def _refresh_outputs(self, vrs: list[int]) -> None:
         if not self._store.all_outputs.isdisjoint(vrs) and (why := self._refresh()):
-            self._answer(Fmi2Status.error, why)
+            self._refuse(Fmi2Status.error, why)
 
     def _get(self, vrs: list[int], fmi_type: str) -> list[Any]:
         values: list[Value] = []
@@ -322,14 +322,14 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             try:
                 values.append(self._store.get(reference, fmi_type))
             except Refusal as refusal:
-                self._answer(Fmi2Status.error, str(refusal))
+                self._refuse(Fmi2Status.error, str(refusal))
                 values.append(MISSING[fmi_type])
         return values
 
     def _set(self, vrs: list[int], values: Sequence[Any], fmi_type: str) -> None:
         """Take all values of a call, or none."""
         if self._mode == TERMINATED:
-            self._follows(f"fmi2Set{fmi_type}", STEPPING)
+            self._check_mode(f"fmi2Set{fmi_type}", STEPPING)
             return
         try:
             ports = [self._store.port(reference, fmi_type) for reference in vrs]
@@ -344,7 +344,7 @@ class Callbacks(Fmi2Slave):  # type: ignore[misc]
             # A run with another parameter than the host asked for must not begin.
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
             self._store.fault = True
-            self._refuse(Fmi2Status.error if begins else Fmi2Status.discard, self.describe(error))
+            self._fail(self.describe(error), Fmi2Status.error if begins else Fmi2Status.discard)
 
     def _take(self, ports: list[Port], vrs: list[int], values: Sequence[Value]) -> None:
         store = self._store

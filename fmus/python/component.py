@@ -106,7 +106,7 @@ class Component(Callbacks):
     def setup_experiment(
         self, start_time: float, stop_time: float | None = None, tolerance: float | None = None
     ) -> None:
-        if self._follows("fmi2SetupExperiment", INSTANTIATED):
+        if self._check_mode("fmi2SetupExperiment", INSTANTIATED):
             if isfinite(start_time):
                 if stop_time is None or not stop_time > start_time:
                     stop_time = inf
@@ -120,12 +120,12 @@ class Component(Callbacks):
         self._latest_end = latest_end(start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
-        if self._follows("fmi2EnterInitializationMode", INSTANTIATED):
+        if self._check_mode("fmi2EnterInitializationMode", INSTANTIATED):
             self._mode = INITIALISING
             self._stale, self._store.fresh = True, False
 
     def exit_initialization_mode(self) -> None:
-        if self._follows("fmi2ExitInitializationMode", INITIALISING):
+        if self._check_mode("fmi2ExitInitializationMode", INITIALISING):
             why = self._refresh()
             if why:
                 self._fail(why)
@@ -215,7 +215,7 @@ class Component(Callbacks):
         state, derived = store.state, store.derived
         outputs, draws = store.outputs, store.draws
         try:
-            if 0.0 < h <= self._longest_step and isfinite(t) and not self._untold:
+            if 0.0 < h <= self._longest_step and isfinite(t) and not self._failure:
                 n = 1
             else:
                 n = self._internal_steps(t, h)
@@ -240,27 +240,27 @@ class Component(Callbacks):
                 store.noise.take_back()
             what = self.describe(error)
             store.fault = True
-            said = f"step refused at t = {t:g} s: {what}"
-            self._answer(Fmi2Status.discard, said, key=what)
+            why = f"step refused at t = {t:g} s: {what}"
+            self._refuse(Fmi2Status.discard, why, key=what)
             return False
         store.state, store.derived = state, derived
         store.outputs, store.draws = outputs, draws
         store.time, store.held = end, self._is_sampled
         store.fresh = self._is_prompt or self._is_sampled
         if end != t + h:
-            self._tell_time(end)
+            self._pass_time(end)
         return True
 
     def _fail_step(self, t: float, end: float) -> bool:
         """Fail a step in another mode, or beyond the stop time."""
-        if self._follows("fmi2DoStep", STEPPING):
+        if self._check_mode("fmi2DoStep", STEPPING):
             stop = self._store.stop_time
             self._fail(f"step from {t:g} s to {end:g} s: the stop time is {stop:g} s")
         return False
 
     def _internal_steps(self, t: float, h: float) -> int:
-        if self._untold:
-            raise Refusal(self._untold)
+        if self._failure:
+            raise Refusal(self._failure)
         if not isfinite(t) or not isfinite(h):
             raise Refusal(f"time {t} and step {h} must be finite")
         if h < 0.0:
@@ -328,12 +328,12 @@ class Component(Callbacks):
         self._set_experiment(wanted["start_time"], wanted["stop_time"])
         store.time = wanted["time"]
         store.noise, store.draws, store.fault = noise, wanted["draws"], wanted["fault"]
-        self._mode, self._untold = wanted["mode"], ""
+        self._mode, self._failure = wanted["mode"], ""
         # Before the first step all follows from parameters and inputs, and is computed once more.
         self._stale = self._mode == INITIALISING
         store.fresh = not self._stale and (state is None or wanted["fresh"])
         store.held = wanted["held"]
-        self._tell_time(store.time)
+        self._pass_time(store.time)
 
     _fmu_state_to_bytes = staticmethod(to_bytes)
     _fmu_state_from_bytes = staticmethod(from_bytes)

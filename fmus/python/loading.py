@@ -30,7 +30,7 @@ from typing import Any, Callable, TypeVar
 
 from pythonfmu.enums import Fmi2Status
 
-#: Category of a log entry that tells the native loader the status of the call.
+#: Category of a log entry by which the native loader learns the status of the call.
 ANSWER = "answer"
 
 #: The answer instead of values that could not be read.
@@ -70,7 +70,7 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
     # A search that finds no class ends in the module's attribute with the empty name.
     module[""] = slave
     if found is module:
-        _let_speak_clearly(slave)
+        _make_encodable(slave)
         return
     found.clear()
     # What is one reference short is given back, what has one too many is relieved of it.
@@ -86,7 +86,7 @@ def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(path))
 
 
-def _let_speak_clearly(slave: Any) -> None:
+def _make_encodable(slave: Any) -> None:
     """Make a class of slaves log and return only text that can be encoded."""
     log, get_string = slave.log, slave.get_string
 
@@ -165,7 +165,7 @@ def caught(slave: Slave) -> Slave:
         try:
             return bool(do_step(self, current_time, step_size))
         except BaseException as error:
-            _tell(self, error, f"step refused at t = {current_time:g} s: ")
+            _log_error(self, error, f"step refused at t = {current_time:g} s: ")
             return False
 
     slave.do_step = do_caught_step  # type: ignore[attr-defined]
@@ -179,7 +179,7 @@ def _catching(method: Callable[..., Any], name: str) -> Callable[..., Any]:
             return method(self, *arguments)
         except BaseException as error:
             if not hasattr(self, "_raised"):
-                _tell(self, error)
+                _log_error(self, error)
             self._raised = True
             if has_loader(self.resources):
                 self.log("", Fmi2Status.error, ANSWER)
@@ -188,7 +188,7 @@ def _catching(method: Callable[..., Any], name: str) -> Callable[..., Any]:
     return call
 
 
-def _tell(slave: Any, error: BaseException, what: str = "") -> None:
+def _log_error(slave: Any, error: BaseException, what: str = "") -> None:
     text = f"{what}{place(error)}{type(error).__name__}: {error}"
     # FMI defines a log message as a format: a host would take a % for a directive.
     slave.log(text.replace("%", "%%"), Fmi2Status.error)

@@ -9,7 +9,7 @@ that derives something of its state, may restart, and splits its steps becomes
             if not good: state = restarted(self.parameters, state, inputs)
             derived = good, state, derive(self.parameters, state, inputs)
         good, state, known = derived
-        if not good: self.say(RESTARTED.format(t=t), warning, RESTARTED)
+        if not good: self.log_once(RESTARTED.format(t=t), warning, RESTARTED)
         for i in range(n):
             if known is None: known = derive(self.parameters, state, inputs)
             state = update(self.parameters, state, known, inputs, t + i * h, h)
@@ -153,7 +153,7 @@ def _advance(said: Behaviour) -> Iterator[str]:
     if said.hooks["credible"]:
         # It is told before `derive`, which may refuse the step.
         yield from _guarded(said, "None")
-        yield "if not good: self.say(RESTARTED.format(t=t), warning, RESTARTED)"
+        yield "if not good: self.log_once(RESTARTED.format(t=t), warning, RESTARTED)"
         derived = "known"
     t, indent = "t", ""
     if said.h_max is not None:

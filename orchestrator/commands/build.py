@@ -110,8 +110,7 @@ def add_new(parser: argparse.ArgumentParser) -> None:
         dest="network",
         type=Path,
         metavar="FILE",
-        help="start from the neural network in an .onnx or .npz file: dense layers with tanh, "
-        "relu, sigmoid or no activation",
+        help="start from the neural network of dense layers in an .onnx or .npz file",
     )
     component.set_defaults(action=_component)
     controller = kinds.add_parser(

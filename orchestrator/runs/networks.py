@@ -2,6 +2,9 @@
 
 A file is an .onnx, or an .npz with the arrays `W1`, `b1`, `W2`, `b2` ... (a row of W is a neuron)
 and `activations`, one name a layer; without these, hidden layers have tanh and the last one none.
+
+An .onnx is a graph of operators. What these mean is held against the ONNX standard: `_OPERATORS`
+computes what each does to arrays, and anything else is refused with the operator's name.
 """
 
 from __future__ import annotations
@@ -9,7 +12,7 @@ from __future__ import annotations
 import math
 import re
 import textwrap
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from keyword import iskeyword
@@ -21,8 +24,23 @@ import numpy as np
 from fmus.ports.port import FAULT, H_MAX, TIME
 from orchestrator.machine.errors import InputError, escape_unprintable, reason
 
-#: What a layer may do with each of its sums, by the names in files.
-ACTIVATIONS = ("none", "tanh", "relu", "sigmoid")
+#: What a layer may do with each of its sums z, in the language of equations; {} are numbers.
+_ACTIVATIONS = {
+    "none": "z",
+    "tanh": "tanh(z)",
+    "relu": "z if z > 0.0 else 0.0",
+    # Of two forms the one whose exp cannot be too large.
+    "sigmoid": "1.0 / (1.0 + exp(-z)) if z >= 0.0 else exp(z) / (1.0 + exp(z))",
+    "softplus": "max(z, 0.0) + log1p(exp(-abs(z)))",
+    "elu": "z if z > 0.0 else {} * expm1(z)",
+    "leaky relu": "z if z > 0.0 else {} * z",
+    "clip": "min(max(z, {}), {})",
+    "at least": "max(z, {})",
+    "at most": "min(z, {})",
+}
+
+#: Those without numbers, by the names in an .npz.
+ACTIVATIONS = tuple(name for name, text in _ACTIVATIONS.items() if "{" not in text)
 
 #: More numbers than the text of a component should hold.
 MOST_WEIGHTS = 100_000
@@ -30,17 +48,32 @@ MOST_WEIGHTS = 100_000
 #: More than the language of equations takes in a matrix.
 MOST_OF_A_LAYER = 65_536
 
-#: More numbers in a row than a graph is evaluated for.
+#: Inputs and neurons: each takes up to 8 of the numbers that a call of C may hold.
 MOST_NEURONS = 4096
 
-#: What ONNX calls them.
-_OF_ONNX = {"Tanh": "tanh", "Relu": "relu", "Sigmoid": "sigmoid"}
+#: The largest number of single precision, which stands for no bound.
+_FLOAT_MAX = float(np.finfo(np.float32).max)
+
+#: The activations of ONNX, and where their numbers are: attributes or inputs, and their defaults.
+_OF_ONNX: dict[str, tuple[str, dict[str, float]]] = {
+    "Tanh": ("tanh", {}),
+    "Relu": ("relu", {}),
+    "Sigmoid": ("sigmoid", {}),
+    "Softplus": ("softplus", {}),
+    "Elu": ("elu", {"alpha": 1.0}),
+    "LeakyRelu": ("leaky relu", {"alpha": 0.01}),
+    "Clip": ("clip", {"min": -_FLOAT_MAX, "max": _FLOAT_MAX}),
+    "Max": ("at least", {"bound": -_FLOAT_MAX}),
+    "Min": ("at most", {"bound": _FLOAT_MAX}),
+}
 
 #: The types that it has numbers of, by its own numbers of them.
-_FLOATS = {1: np.float32, 11: np.float64}
+_FLOAT = 1
+_FLOATS = {_FLOAT: np.float32, 11: np.float64}
+_INTEGERS = {6: np.int32, 7: np.int64}
 
-#: Earlier ones have other operators by the same names.
-_OLDEST_OPSET = 7
+#: Earlier ones have other operators by the same names; later ones are not known here.
+_OLDEST_OPSET, _NEWEST_OPSET = 7, 28
 
 #: Ports that every component has, or any may have.
 _PORTS_OF_ALL = (FAULT.name, H_MAX, TIME.name)
@@ -54,6 +87,13 @@ class Dense(NamedTuple):
     W: Any  #: array of neurons by inputs
     b: Any  #: array of neurons
     activation: str
+    numbers: Sequence[float] = ()  #: of the activation
+
+    @property
+    def is_activation(self) -> bool:
+        """Whether its sums are its inputs."""
+        n, m = self.W.shape
+        return n == m and np.array_equal(self.W, np.eye(n)) and not self.b.any()
 
 
 class Network(NamedTuple):
@@ -98,7 +138,9 @@ def read_network(path: Path) -> Network:
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     try:
-        network = readers[path.suffix](path)
+        # A division by 0 gives a weight that is not finite.
+        with np.errstate(all="ignore"):
+            network = readers[path.suffix](path)
         _check(network)
     except InputError as error:
         raise InputError(f"{path}: {error}") from None
@@ -115,23 +157,21 @@ def _check(network: Network) -> None:
                 f"layer {i} gives {one.W.shape[0]} numbers, and layer {i + 1} takes "
                 f"{other.W.shape[1]}"
             )
-    for i, layer in enumerate(network.layers, start=1):
-        if layer.W.size > MOST_OF_A_LAYER:
-            raise InputError(
-                f"layer {i} has {layer.W.size} weights; a layer may have {MOST_OF_A_LAYER}"
-            )
+    sizes = [0 if layer.is_activation else layer.W.size for layer in network.layers]
+    for i, (layer, size) in enumerate(zip(network.layers, sizes, strict=True), start=1):
+        if size > MOST_OF_A_LAYER:
+            raise InputError(f"layer {i} has {size} weights; a layer may have {MOST_OF_A_LAYER}")
         if layer.b.shape != layer.W.shape[:1]:
             raise InputError(f"layer {i} has {layer.W.shape[0]} neurons and {layer.b.size} biases")
-        if layer.activation not in ACTIVATIONS:
-            raise InputError(
-                f"layer {i} has the activation {layer.activation!r}; there are "
-                f"{', '.join(ACTIVATIONS)}"
-            )
-        if not (np.isfinite(layer.W).all() and np.isfinite(layer.b).all()):
-            raise InputError(f"layer {i} has a weight that is not finite")
-    weights = sum(layer.W.size for layer in network.layers)
-    if weights > MOST_WEIGHTS:
-        raise InputError(f"it has {weights} weights; a component may have {MOST_WEIGHTS}")
+        if not all(np.isfinite(array).all() for array in (layer.W, layer.b, layer.numbers)):
+            raise InputError(f"layer {i} has a number that is not finite")
+    if sum(sizes) > MOST_WEIGHTS:
+        raise InputError(f"it has {sum(sizes)} weights; a component may have {MOST_WEIGHTS}")
+    neurons = network.n_inputs + sum(len(layer.W) for layer in network.layers)
+    if neurons > MOST_NEURONS:
+        raise InputError(
+            f"it has {neurons} inputs and neurons; a component may have {MOST_NEURONS}"
+        )
 
 
 def _from_npz(path: Path) -> Network:
@@ -149,6 +189,11 @@ def _from_npz(path: Path) -> Network:
         activations = said or ["tanh"] * (n - 1) + ["none"]
         if len(activations) != n:
             raise InputError(f"it has {n} layers and {len(activations)} activations")
+        for i, name in enumerate(activations, start=1):
+            if name not in ACTIVATIONS:
+                raise InputError(
+                    f"layer {i} has the activation {name!r}; there are {', '.join(ACTIVATIONS)}"
+                )
         layers = [
             Dense(file[f"W{i}"].astype(float), file[f"b{i}"].astype(float), activations[i - 1])
             for i in range(1, n + 1)
@@ -159,43 +204,60 @@ def _from_npz(path: Path) -> Network:
 def _from_onnx(path: Path) -> Network:
     try:
         # An extra: few need it.
-        import onnx  # noqa: PLC0415
+        import onnx.inliner  # noqa: PLC0415
     except ImportError:
         raise InputError(
             "reading it needs the package onnx: pip install 'auv-fmu[networks]'"
         ) from None
     model = onnx.load(str(path))
-    # It refuses shapes and types that do not fit.
-    onnx.shape_inference.infer_shapes(model, check_type=True, strict_mode=True)
-    versions = {entry.domain: entry.version for entry in model.opset_import}
-    if versions.get("", 0) < _OLDEST_OPSET:
-        raise InputError(f"it has no opset of ONNX from {_OLDEST_OPSET} on")
-    to_array, graph = onnx.numpy_helper.to_array, model.graph
+    if model.functions:
+        model = onnx.inliner.inline_local_functions(model)
+    graph, to_array = model.graph, onnx.numpy_helper.to_array
+    for each in (*model.opset_import, *graph.node):
+        each.domain = "" if each.domain == "ai.onnx" else each.domain
+    opset = max((entry.version for entry in model.opset_import if not entry.domain), default=0)
+    if not _OLDEST_OPSET <= opset <= _NEWEST_OPSET:
+        raise InputError(
+            f"it has the opset {opset} of ONNX; export it with one of {_OLDEST_OPSET} to "
+            f"{_NEWEST_OPSET}"
+        )
     constants = {tensor.name: to_array(tensor) for tensor in graph.initializer}
     given = [value for value in graph.input if value.name not in constants]
-    if len(given) != 1 or len(graph.output) != 1:
-        raise InputError(
-            f"it has {len(given)} inputs and {len(graph.output)} outputs; one each is wanted"
-        )
-    layers = _Layers(given[0].name, _input_shape(given[0], onnx.TensorProto), constants)
-    for node in graph.node:
+    for what, values in (("input", given), ("output", graph.output)):
+        if len(values) != 1:
+            names = ", ".join(value.name for value in values) or "none"
+            raise InputError(
+                f"its {what}s are {names}; one is wanted: cut it out by onnx.utils.extract_model"
+            )
+    shape = _one_row(given[0])
+    nodes = [*_without_scalers(graph.node, onnx.helper)]
+    del graph.node[:]
+    graph.node.extend(nodes)
+    # These refuse what the standard does not allow, such as shapes and types that do not fit.
+    model = onnx.shape_inference.infer_shapes(
+        model, check_type=True, strict_mode=True, data_prop=True
+    )
+    onnx.checker.check_model(model)
+    graph = model.graph
+    shapes = dict(map(_known_shape, (*graph.input, *graph.value_info, *graph.output)))
+    layers, output = _Layers(given[0].name, shape, constants, shapes), graph.output[0].name
+    for node in _needed(graph):
         attributes = {a.name: onnx.helper.get_attribute_value(a) for a in node.attribute}
         if "value" in attributes:
             attributes["value"] = to_array(attributes["value"])
         try:
-            if node.domain not in ("", "ai.onnx"):
+            if node.domain:
                 raise InputError(f"{node.domain} is not supported")
-            layers.evaluate(node.op_type, node.input, node.output[0], attributes)
+            layers.evaluate(node.op_type, node.input, node.output, attributes)
         except (InputError, ValueError, TypeError, IndexError) as error:
             raise InputError(f"operator {node.op_type}: {reason(error)}") from None
-    outputs = graph.output[0].name
-    return Network(layers.up_to(outputs), given[0].name, outputs)
+    return Network(layers.up_to(output), given[0].name, output)
 
 
-def _input_shape(given: Any, types: Any) -> tuple[int, ...]:
-    """The shape of the input of a graph: one row, where it has several dimensions."""
+def _one_row(given: Any) -> tuple[int, ...]:
+    """Declare the input of a graph for one row, where it has several dimensions: its shape."""
     declared = given.type.tensor_type
-    if declared.elem_type not in (types.FLOAT, types.DOUBLE):
+    if declared.elem_type not in _FLOATS:
         raise InputError(f"its input {given.name} is not of the type float or double")
     sizes = [dimension.dim_value for dimension in declared.shape.dim]
     batch, *others = sizes if len(sizes) > 1 else (1, *sizes)
@@ -205,7 +267,43 @@ def _input_shape(given: Any, types: Any) -> tuple[int, ...]:
             f"its input {given.name} has the shape [{shown}]; export it for one row of n numbers: "
             "[1, n]"
         )
-    return (1, *others) if len(sizes) > 1 else (*others,)
+    if len(sizes) == 1:
+        return (*others,)
+    declared.shape.dim[0].dim_value = 1
+    return (1, *others)
+
+
+def _without_scalers(nodes: Sequence[Any], make: Any) -> Iterator[Any]:
+    """The same nodes, with Sub and Mul in place of the Scaler of scikit-learn."""
+    for node in nodes:
+        if (node.domain, node.op_type) != ("ai.onnx.ml", "Scaler"):
+            yield node
+            continue
+        [scaled] = node.output
+        offset, scale, moved = (f"{scaled}.{name}" for name in ("offset", "scale", "moved"))
+        for said in node.attribute:
+            tensor = make.make_tensor("value", _FLOAT, [len(said.floats)], said.floats)
+            yield make.make_node("Constant", [], [f"{scaled}.{said.name}"], value=tensor)
+        yield make.make_node("Sub", [node.input[0], offset], [moved])
+        yield make.make_node("Mul", [moved, scale], [scaled])
+
+
+def _known_shape(value: Any) -> tuple[str, tuple[int, ...] | None]:
+    """What a value is called, and its shape; None: it is not known before a run."""
+    declared = value.type.tensor_type
+    sizes = [size.dim_value if size.HasField("dim_value") else -1 for size in declared.shape.dim]
+    is_known = declared.HasField("shape") and -1 not in sizes
+    return value.name, tuple(sizes) if is_known else None
+
+
+def _needed(graph: Any) -> Sequence[Any]:
+    """The nodes that the output depends on, but not those of which only a shape is asked."""
+    names, nodes = {graph.output[0].name}, []
+    for node in reversed(graph.node):
+        if names.intersection(node.output):
+            nodes.append(node)
+            names.update(() if node.op_type == "Shape" else node.input)
+    return nodes[::-1]
 
 
 class _Value(NamedTuple):
@@ -224,22 +322,33 @@ class _Layers:
     operator that keeps it affine is evaluated at each of them. An activation ends a layer.
     """
 
-    def __init__(self, inputs: str, shape: tuple[int, ...], constants: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        inputs: str,
+        shape: tuple[int, ...],
+        constants: Mapping[str, Any],
+        shapes: Mapping[str, tuple[int, ...] | None],
+    ) -> None:
         self._layers: list[Dense] = []
-        self._known = {name: _Value(_numbers(array)) for name, array in constants.items()}
-        self._known[inputs] = self._begun(shape)
+        self._shapes = shapes
+        self._constants = constants
+        self._known = {inputs: self._begun(shape)}
 
     def up_to(self, name: str) -> list[Dense]:
         """All layers up to a value."""
         rest = self._ended(self._variable(name), "none")
-        if not np.array_equal(rest.W, np.eye(*rest.W.shape)) or rest.b.any():
+        if not rest.is_activation:
             return [*self._layers, rest]
         if not self._layers:
             raise InputError("it has no dense layers")
         return self._layers
 
     def evaluate(
-        self, name: str, inputs: Sequence[str], output: str, attributes: Mapping[str, Any]
+        self,
+        name: str,
+        inputs: Sequence[str],
+        outputs: Collection[str],
+        attributes: Mapping[str, Any],
     ) -> None:
         """Find what an operator gives.
 
@@ -248,20 +357,69 @@ class _Layers:
             IndexError, TypeError, ValueError: its inputs or attributes do not fit.
 
         """
-        if name in _OF_ONNX:
-            self._known[output] = self._closed(inputs[0], _OF_ONNX[name])
-            return
-        if name not in _OPERATORS:
-            supported = ", ".join((*_OPERATORS, *_OF_ONNX))
+        [output, *_] = outputs
+        for one in {*inputs} & self._constants.keys():
+            self._known.setdefault(one, _Value(_numbers(self._constants[one])))
+        if name == "Shape":
+            value = self._shape(inputs[0], **attributes)
+        elif name in _OF_ONNX:
+            value = self._activated(name, inputs, attributes)
+        elif name not in _OPERATORS:
+            supported = ", ".join((*_OPERATORS, *_OF_ONNX, "Shape"))
             raise InputError(f"not supported; layers may consist of {supported}")
-        operator = _OPERATORS[name]
+        elif name == "BatchNormalization" and len(outputs) > 1:
+            raise InputError("more than one output is not supported; export it for inference")
+        else:
+            value = self._computed(_OPERATORS[name], inputs, attributes)
+        shape, standard = value.offset.shape, self._shapes.get(output)
+        if standard not in (None, shape):
+            raise InputError(f"its result has the shape {shape}, and not {standard}")
+        self._known[output] = value
+
+    def _shape(self, name: str, start: int = 0, end: int | None = None) -> _Value:
+        """The shape of a value as numbers."""
+        shape = self._known[name].offset.shape if name in self._known else self._shapes.get(name)
+        if shape is None:
+            raise InputError(f"the shape of {name} is not known before a run")
+        return _Value(np.array(shape, dtype=np.int64)[start:end])
+
+    def _activated(self, name: str, inputs: Sequence[str], attributes: Mapping[str, Any]) -> _Value:
+        """What an activation gives. Its numbers may be attributes, or inputs after the first."""
+        word, defaults = _OF_ONNX[name]
+        if name in ("Max", "Min"):
+            # What depends on the input may stand anywhere.
+            inputs = sorted(inputs, key=lambda one: not self._is_variable(one))
+        if len(inputs) > 1 + len(defaults):
+            raise InputError("more than two inputs are not supported")
+        shapes = [self._known[one].offset.shape for one in inputs if one]
+        if np.broadcast_shapes(*shapes) != shapes[0]:
+            raise InputError("its inputs have shapes that do not fit")
+        said = {
+            place: self._number(one)
+            for place, one in zip(defaults, inputs[1:], strict=False)
+            if one
+        }
+        numbers = {**defaults, **attributes, **said}
+        return self._closed(inputs[0], word, tuple(numbers.values()))
+
+    def _number(self, name: str) -> float:
+        """A constant whose numbers are all the same."""
+        if self._is_variable(name):
+            raise InputError(_PRODUCT)
+        numbers = np.unique(self._known[name].offset)
+        if len(numbers) != 1:
+            raise InputError(f"{name} has {len(numbers)} different numbers; one is supported")
+        return float(numbers[0])
+
+    def _computed(
+        self, operator: _Operator, inputs: Sequence[str], attributes: Mapping[str, Any]
+    ) -> _Value:
+        """What an operator gives that keeps its inputs constant or affine."""
         function = partial(operator.function, **attributes)
-        for missing in {*inputs} - {*self._known, ""}:
-            raise InputError(f"its input {missing!r} is not supported")
         places = [i for i, one in enumerate(inputs) if one and self._is_variable(one)]
         factors = [i for i in places if i in operator.factors]
         if len(factors) > 1 or not {*places} <= {*operator.factors, *operator.terms}:
-            raise InputError("more than one of its inputs depends on the network's")
+            raise InputError(_PRODUCT)
         for i in factors if operator.is_sum else ():
             if self._known[inputs[i]].is_sum:
                 # The product of the weights of two layers may be many more numbers.
@@ -269,8 +427,7 @@ class _Layers:
         values = [self._known[one] if one else None for one in inputs]
         offset = _numbers(function(*(value and value.offset for value in values)))
         if not places:
-            self._known[output] = _Value(offset)
-            return
+            return _Value(offset)
         variable = [self._variable(inputs[i]) for i in places]
         if (size := offset.size * len(variable[0].slopes)) > MOST_NEURONS**2:
             raise InputError(f"{size} weights are too many")
@@ -286,11 +443,11 @@ class _Layers:
                 still[i] = slope
             slopes.append(function(*still))
         is_sum = any(value.is_sum for value in variable) or bool(factors and operator.is_sum)
-        self._known[output] = _Value(
-            offset, np.stack(slopes).astype(float), len(self._layers), is_sum
-        )
+        return _Value(offset, np.stack(slopes).astype(float), len(self._layers), is_sum)
 
     def _is_variable(self, name: str) -> bool:
+        if name not in self._known:
+            raise InputError(f"its input {name} is not supported")
         return self._known[name].slopes is not None
 
     def _variable(self, name: str) -> _Value:
@@ -302,15 +459,14 @@ class _Layers:
             raise InputError(f"{name} comes from an earlier layer: the network has branches")
         return value
 
-    def _ended(self, value: _Value, activation: str) -> Dense:
-        return Dense(
-            value.slopes.reshape(len(value.slopes), -1).T, value.offset.ravel(), activation
-        )
+    def _ended(self, value: _Value, activation: str, numbers: Sequence[float] = ()) -> Dense:
+        W = value.slopes.reshape(len(value.slopes), -1).T
+        return Dense(W, value.offset.ravel(), activation, numbers)
 
-    def _closed(self, name: str, activation: str) -> _Value:
+    def _closed(self, name: str, activation: str, numbers: Sequence[float] = ()) -> _Value:
         """End a layer; what it gives has the shape of its sums."""
         value = self._variable(name)
-        self._layers.append(self._ended(value, activation))
+        self._layers.append(self._ended(value, activation, numbers))
         return self._begun(value.offset.shape)
 
     def _begun(self, shape: tuple[int, ...]) -> _Value:
@@ -321,11 +477,15 @@ class _Layers:
         return _Value(np.zeros(shape), np.eye(n).reshape(n, *shape), len(self._layers))
 
 
+#: What may be neither a constant nor affine.
+_PRODUCT = "it multiplies, divides or selects by what depends on the input"
+
+
 def _numbers(array: Any) -> Any:
     """Numbers of single precision in double precision; integers as they are."""
     array = np.asarray(array)
     if array.dtype.kind not in "biu" and array.dtype not in (np.float32, np.float64):
-        raise InputError(f"constants of the type {array.dtype} are not supported")
+        raise InputError(f"numbers of the type {array.dtype} are not supported; export it in float")
     return array.astype(float) if array.dtype.kind == "f" else array
 
 
@@ -364,10 +524,11 @@ def _divide(a: Any, b: Any) -> Any:
 
 
 def _cast(x: Any, *, to: int, saturate: int = 1, round_mode: str = "") -> Any:
-    """To single or double precision, for which the other two attributes have no meaning."""
-    if to not in _FLOATS:
+    """Between types for which the other two attributes have no meaning."""
+    types = _FLOATS if x.dtype.kind == "f" else {**_FLOATS, **_INTEGERS}
+    if to not in types:
         raise InputError("only a cast to float or double is supported")
-    return x.astype(_FLOATS[to])
+    return x.astype(types[to])
 
 
 def _dropout(x: Any, ratio: Any = None, training_mode: Any = None, *, seed: int = 0) -> Any:
@@ -401,6 +562,40 @@ def _identity(x: Any) -> Any:
     return x
 
 
+def _concat(*arrays: Any, axis: int) -> Any:
+    return np.concatenate(arrays, axis)
+
+
+def _expand(x: Any, shape: Any) -> Any:
+    return np.broadcast_to(x, np.broadcast_shapes(x.shape, tuple(shape)))
+
+
+def _gather(x: Any, indices: Any, *, axis: int = 0) -> Any:
+    return np.take(x, indices, axis)
+
+
+def _batch_normalization(
+    x: Any,
+    scale: Any,
+    bias: Any,
+    mean: Any,
+    var: Any,
+    *,
+    epsilon: float = float(np.float32(1e-5)),
+    momentum: float = 0.9,
+    spatial: int = 1,
+    training_mode: int = 0,
+) -> Any:
+    if training_mode or not spatial:
+        raise InputError("training_mode and spatial = 0 are not supported")
+    if {each.shape for each in (scale, bias, mean, var)} != {x.shape[1:2]}:
+        raise InputError("its inputs have shapes that do not fit")
+    scale, bias, mean, var = (
+        each.reshape(-1, *(1,) * (x.ndim - 2)) for each in (scale, bias, mean, var)
+    )
+    return (x - mean) * (scale / np.sqrt(var + epsilon)) + bias
+
+
 class _Operator(NamedTuple):
     """An operator, and where its inputs may depend on those of the network."""
 
@@ -417,10 +612,14 @@ _OPERATORS = {
     "Sub": _Operator(np.subtract, terms=(0, 1)),
     "Mul": _Operator(np.multiply, (0, 1)),
     "Div": _Operator(_divide, (0,)),
+    "BatchNormalization": _Operator(_batch_normalization, (0,), (2, 3)),
+    "Concat": _Operator(_concat, terms=range(MOST_NEURONS)),
     "Constant": _Operator(_constant),
     "Cast": _Operator(_cast, (0,)),
     "Dropout": _Operator(_dropout, (0,)),
+    "Expand": _Operator(_expand, (0,)),
     "Flatten": _Operator(_flatten, (0,)),
+    "Gather": _Operator(_gather, (0,)),
     "Identity": _Operator(_identity, (0,)),
     "Reshape": _Operator(_reshape, (0,)),
     "Squeeze": _Operator(_squeeze, (0,)),
@@ -439,8 +638,8 @@ def component_text(name: str, network: Network, source: str) -> str:
 
     """
     sizes = [network.n_inputs, *(len(layer.W) for layer in network.layers)]
-    used = {layer.activation for layer in network.layers} - {"none"}
-    names = sorted(_IMPORTS[word] for word in used & _IMPORTS.keys())
+    network_text = _forward(network)
+    names = sorted({*re.findall(r"\b(exp|expm1|log1p|tanh)\(", network_text)})
     imports = [f"from math import {', '.join(names)}"] if names else []
     head = [
         f'"""{name}: a neural network of dense layers, {" - ".join(map(str, sizes))}.\n\n'
@@ -459,8 +658,7 @@ def component_text(name: str, network: Network, source: str) -> str:
             outputs=network.output_port,
             m=network.n_outputs,
         ),
-        *(_FUNCTIONS[word] for word in sorted(used & _FUNCTIONS.keys())),
-        _forward(network),
+        network_text,
     ]
     return "\n\n\n".join(["\n\n".join(head), *body]) + "\n"
 
@@ -478,6 +676,8 @@ def _port(name: str, otherwise: str) -> str:
 
 
 def _constants(i: int, layer: Dense) -> Iterator[str]:
+    if layer.is_activation:
+        return
     rows = ",\n".join(_lines(row) for row in layer.W)
     yield f"W{i} = Matrix(\n    (\n{textwrap.indent(rows, ' ' * 8)},\n    )\n)  # fmt: skip"
     yield f"b{i} = Vector(\n{textwrap.indent(_lines(layer.b), ' ' * 4)}\n)  # fmt: skip"
@@ -507,19 +707,6 @@ def outputs(inputs: Inputs) -> Outputs:
     """What it answers to its inputs."""
     return Outputs(_network(inputs.{inputs}))'''
 
-_FUNCTIONS = {
-    "relu": """def _relu(x: float) -> float:
-    return x if x > 0.0 else 0.0""",
-    "sigmoid": """def _sigmoid(x: float) -> float:
-    # Of two forms the one whose exp cannot be too large.
-    return 1.0 / (1.0 + exp(-x)) if x >= 0.0 else exp(x) / (1.0 + exp(x))""",
-}
-
-#: What they take from math.
-_IMPORTS = {"sigmoid": "exp", "tanh": "tanh"}
-
-_CALLS = {"tanh": "tanh", "relu": "_relu", "sigmoid": "_sigmoid"}
-
 
 def _forward(network: Network) -> str:
     n, m = network.n_inputs, network.n_outputs
@@ -529,9 +716,11 @@ def _forward(network: Network) -> str:
     ]
     given = "x"
     for i, layer in enumerate(network.layers, start=1):
-        lines.append(f"    z{i} = W{i} @ {given} + b{i}")
-        given = f"z{i}"
+        if not layer.is_activation:
+            lines.append(f"    z{i} = W{i} @ {given} + b{i}")
+            given = f"z{i}"
         if layer.activation != "none":
-            lines.append(f"    a{i} = Vector({_CALLS[layer.activation]}(z) for z in z{i})")
+            text = _ACTIVATIONS[layer.activation].format(*map(repr, layer.numbers))
+            lines.append(f"    a{i} = Vector({text} for z in {given})")
             given = f"a{i}"
     return "\n".join([*lines, f"    return {given}"])

@@ -22,6 +22,7 @@ from typing import Any
 import fmpy
 import pytest
 
+from fmus.python.callbacks import LONGEST_MESSAGE
 from fmus.python.own import build_script
 from fmus.python.packaging import loader_compiler
 from support.fmi3 import Fmi3Library
@@ -210,6 +211,16 @@ def test_folder_without_a_slave_is_null_with_one_message(python, resources, file
     assert message.status in (ERROR, Status.Fatal)
     with instance(python):
         pass  # The sound one still works.
+
+
+def test_long_reason_is_cut_between_characters(python, resources):
+    """And a percent sign is doubled, as in all formats."""
+    (resources / "slavemodule.txt").write_text("guarded_k")
+    said = "100 % %d %% " + "ü" * 2000
+    (resources / "guarded_k.py").write_text(f"raise ValueError({said!r})", encoding="utf-8")
+    message = refused(python, location=resources.as_uri().encode())
+    whole = f"fmi2Instantiate: ValueError: {said}"
+    assert message.text == whole[:LONGEST_MESSAGE].replace("%", "%%")
 
 
 @pytest.mark.parametrize(
@@ -445,8 +456,8 @@ def test_logger_that_calls_back_is_refused(host: Host, capfd):
     assert host.call("fmi2Reset") == OK
 
 
-def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(host: Host):
-    """Also where the logger calls back: the instance is let go, and its values are as they stay."""
+def test_messages_of_a_call_are_told_in_their_order(host: Host):
+    """Also where the logger calls back, which changes no value of the call."""
     unknown = range(UNKNOWN, UNKNOWN + 5)
     answers = []
     host.when_told = lambda: answers.append(host.step(0.0, 0.02))
@@ -459,6 +470,22 @@ def test_messages_of_a_call_are_told_in_their_order_after_all_is_done(host: Host
     assert values[0] > 0.0
     assert values[1:] == [0.0] * 5
     assert host.step(0.0, 0.02) == OK
+
+
+def test_thread_waits_until_the_logger_has_come_back(host: Host):
+    answers: list[Status] = []
+    meanwhile: list[Status] = []
+    thread = threading.Thread(target=lambda: answers.append(host.call("fmi2Reset")))
+
+    def hear() -> None:
+        thread.start()
+        thread.join(0.05)
+        meanwhile.extend(answers)
+
+    host.when_told = hear
+    in_error(host)
+    thread.join()
+    assert (meanwhile, answers) == ([], [OK])
 
 
 def at_once(*tasks: Callable[[], object]) -> None:

@@ -79,14 +79,6 @@ def test_all_fmus_run_side_by_side_in_a_c_host(dist: Path, tmp_path: Path, with_
 
 
 @needs_libpython
-def test_logger_that_does_not_come_back_leaves_the_instance_to_all_threads(dist, tmp_path):
-    """It leaves by longjmp, as an exception of C++ would, past PythonFMU and Python."""
-    program = host(tmp_path, "leaving", *FINDS_LIBPYTHON)
-    process = run(program, *unpacked(dist, tmp_path)[:2])
-    assert (process.stdout, process.returncode) == ("left 52 times\n", 0), process.stderr
-
-
-@needs_libpython
 def test_host_that_ends_python_first_lets_its_instances_go_in_silence(dist, tmp_path):
     """All else is an error that says what has happened."""
     program = host(tmp_path, "ending")

@@ -13,6 +13,7 @@ import pytest
 
 from fmus.compilers import machines_compiler
 from fmus.discovery import components
+from fmus.kinds import FMI_VERSIONS
 from fmus.language.build import Untranslatable
 from fmus.native.translator import translated
 from fmus.script import source_of_script
@@ -27,17 +28,20 @@ TESTS = Path(__file__).parents[1]
 _DRIVE = """\
 import sys, threading
 from pathlib import Path
+from support.fmi3 import Fmi3Library
 from support.raw import Library, initialised
 done = []
 
 def drive():
-    library = Library(Path(sys.argv[1]))
+    library = (Fmi3Library if sys.argv[2] == "3" else Library)(Path(sys.argv[1]))
     with initialised(library) as host:
         state = host.get_state()
         for k in range(3):
             assert host.step(0.02 * k, 0.02) == 0
         content = host.content()
         assert host.set_state(state) == 0
+        status, again = host.deserialised(content)
+        assert status == host.set_state(again) == 0
         host.values()
         assert host.step(-1.0, -1.0) == 2
         assert host.free_state(state) == 0
@@ -179,6 +183,38 @@ def outputs(state: State) -> Outputs:
     return Outputs(state.x[0][0])
 """,
     ),
+    "a state that is not credible": (
+        {"state": "Vector, N"},
+        _START.replace("{n}", "N")
+        + """\
+RESTARTED = "restarted at {t:g} s"
+
+
+def credible(state: State) -> bool:
+    \"\"\"Whether a step may begin with it; hardly ever.\"\"\"
+    return state.x[0] > 1.0
+
+
+def restarted(state: State) -> State:
+    \"\"\"What it is then.\"\"\"
+    return State(0.5 * state.x)
+
+
+def derive(state: State) -> Annotated[Vector, N]:
+    \"\"\"From the state.\"\"\"
+    return 2.0 * state.x
+
+
+def update(state: State, derived: Annotated[Vector, N]) -> State:
+    \"\"\"State after a step.\"\"\"
+    return State(state.x + derived)
+
+
+def outputs(derived: Annotated[Vector, N], inputs: Inputs) -> Outputs:
+    \"\"\"What is seen.\"\"\"
+    return Outputs(derived[0] + inputs.u)
+""",
+    ),
     "ports": (
         {"inputs": "Vector, N", "outputs": "Vector, N", "parameters": "Vector, N",
          "start": "Vector(0.0 for _ in range(N))"},
@@ -211,8 +247,8 @@ def is_taken(folder: Path, what: str, n: int) -> bool:
     return True
 
 
-def drive(folder: Path) -> None:
-    command = [sys.executable, "-X", "faulthandler", "-c", _DRIVE, str(folder)]
+def drive(folder: Path, version: str = "2") -> None:
+    command = [sys.executable, "-X", "faulthandler", "-c", _DRIVE, str(folder), version]
     environment = {**os.environ, "PYTHONPATH": str(TESTS)}
     process = subprocess.run(
         command, env=environment, capture_output=True, text=True, check=False, timeout=120
@@ -220,7 +256,11 @@ def drive(folder: Path) -> None:
     assert process.returncode == 0, process.stderr[-2000:]
 
 
-@pytest.mark.parametrize("what", ["additions", *slow(*(w for w in LARGE if w != "additions"))])
+#: What stands for the others in quick tests.
+QUICK = ("a state that is not credible",)
+
+
+@pytest.mark.parametrize("what", [*QUICK, *slow(*(w for w in LARGE if w not in QUICK))])
 def test_the_largest_that_is_taken_runs_with_512_kb(tmp_path: Path, what: str):
     if what == "ports":
         least = most = 400  # the descriptions of more take minutes
@@ -230,8 +270,10 @@ def test_the_largest_that_is_taken_runs_with_512_kb(tmp_path: Path, what: str):
     while most - least > max(1, least // 32):
         n = (least + most) // 2
         least, most = (n, most) if is_taken(tmp_path, what, n) else (least, n)
-    fmu = build_own(script(tmp_path, what, least), tmp_path / "fmu", kind="native")
-    drive(Path(fmpy.extract(str(fmu), tmp_path / "unpacked")))
+    for version in FMI_VERSIONS:
+        own = script(tmp_path, what, least)
+        fmu = build_own(own, tmp_path / f"fmu{version}", kind="native", fmi=version)
+        drive(Path(fmpy.extract(str(fmu), tmp_path / f"unpacked{version}")), version)
 
 
 @pytest.mark.parametrize("name", ["AuvPlant", *slow(*(n for n in components() if n != "AuvPlant"))])

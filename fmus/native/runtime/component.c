@@ -6,10 +6,9 @@
 #include "instance.h"
 #include "ports.h"
 
-#include "arguments.c"
-#include "listener.c"
-
+#include "host.c"
 #include "handles.c"
+#include "calls.c"
 #include "messages.c"
 #include "noise.c"
 #include "store.c"
@@ -17,3 +16,8 @@
 #include "bytes.c"
 #include "state.c"
 #include "guard.c"
+
+/* Functions of FMI take more than a component has to know. */
+#if defined(__GNUC__)
+#pragma GCC diagnostic ignored "-Wunused-parameter"
+#endif

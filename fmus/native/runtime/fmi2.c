@@ -1,37 +1,17 @@
 /* The functions of FMI 2.0, and the one file to compile: it includes all others.
- *
- * Where FMI2_FUNCTION_PREFIX is defined, as the standard has it, it stands before the names of the
- * functions, so that several FMUs can be linked into one program.
  */
 #include "component.h"
+#include "fmi2.h"
 
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #if defined(FMI2_FUNCTION_PREFIX) && !defined(FMI2_OVERRIDE_FUNCTION_PREFIX)
-#define PASTE(prefix, name) prefix##name
-#define PREFIXED(prefix, name) PASTE(prefix, name)
 #define FMI2(name) PREFIXED(FMI2_FUNCTION_PREFIX, name)
 #else
 #define FMI2(name) name
 #endif
-
-enum { CO_SIMULATION = 1 };
-
-/* A kind of fmi2GetRealStatus. */
-enum { LAST_SUCCESSFUL_TIME = 2 };
-
-typedef void (*fmi2_logger)(void *, string, int, string, string, ...);
-
-/* fmi2CallbackFunctions, of which only the logger is used. */
-typedef struct {
-    fmi2_logger logger;
-    void *(*allocate)(size_t, size_t);
-    void (*release)(void *);
-    void (*step_finished)(void *, int);
-    void *environment;
-} callbacks;
 
 static const names version = {
     .types = {"Real", "Integer", "Boolean", "Enumeration"},
@@ -43,27 +23,16 @@ static const names version = {
 enum { FIRST_REFERENCE = 0 };
 
 #include "component.c"
-#include "model_exchange.h"
-
-/* Functions of FMI take more than a component has to know. */
-#if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wunused-parameter"
-#endif
 
 /* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
-static void deliver(const logger *host, string instance_name, int status, string category,
-                    string text) {
-    char format[2 * MOST_TEXT + 1], *end = format;
-    for (; *text != '\0'; text++) {
-        if (*text == '%') *end++ = '%';
-        *end++ = *text;
-    }
-    *end = '\0';
-    ((fmi2_logger)host->function)(host->environment, instance_name, status, category, format);
+static void call_logger(const logger *host, string name, int status, string category, string text) {
+    char format[2 * MOST_TEXT + 1];
+    copy_doubled(format, text, '%');
+    ((fmi2_logger)host->function)(host->environment, name, status, category, format);
 }
 
 /* A function that does something unless anything is wrong with its arguments. */
-#define ANSWER(name, allowed, wrong, parameters, action)                                         \
+#define FUNCTION(name, allowed, wrong, parameters, action)                                         \
     EXPORT int FMI2(name) parameters {                                                           \
         call this = begin(c, #name, allowed);                                                    \
         if (GOES_ON(this, wrong)) {                                                              \
@@ -80,33 +49,29 @@ EXPORT string FMI2(fmi2GetVersion)(void) { return "2.0"; }
 
 EXPORT void *FMI2(fmi2Instantiate)(string name, int type, string guid, string location,
                                    const callbacks *functions, int visible, int logging) {
-    logger host = {NULL, NULL};
-    if (functions != NULL) {
-        host = (logger){(void (*)(void))functions->logger, functions->environment};
-    }
     return instantiate("fmi2Instantiate",
                        type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only", name,
-                       guid, host, logging);
+                       guid, logger_of(functions), logging);
 }
 
 EXPORT void FMI2(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }
 
-ANSWER(fmi2Reset, MASK_Reset, NULL, (void *c), reset(&this))
-ANSWER(fmi2SetDebugLogging, MASK_SetDebugLogging, NULL,
+FUNCTION(fmi2Reset, MASK_Reset, NULL, (void *c), reset(&this))
+FUNCTION(fmi2SetDebugLogging, MASK_SetDebugLogging, wrong_texts(n, categories),
        (void *c, int on, size_t n, const string categories[]),
        choose_messages(&this, on, n, categories))
 
 /* Modes and steps */
 
-ANSWER(fmi2SetupExperiment, MASK_SetupExperiment, NULL,
+FUNCTION(fmi2SetupExperiment, MASK_SetupExperiment, NULL,
        (void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop),
        set_experiment(&this, start, has_stop ? stop : INFINITY))
-ANSWER(fmi2EnterInitializationMode, MASK_EnterInitializationMode, NULL, (void *c),
+FUNCTION(fmi2EnterInitializationMode, MASK_EnterInitializationMode, NULL, (void *c),
        enter_initialisation(&this))
-ANSWER(fmi2ExitInitializationMode, MASK_ExitInitializationMode, NULL, (void *c),
+FUNCTION(fmi2ExitInitializationMode, MASK_ExitInitializationMode, NULL, (void *c),
        exit_initialisation(&this))
-ANSWER(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
-ANSWER(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int no_set),
+FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
+FUNCTION(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int no_set),
        take_step(&this, time, step))
 
 /* Values */
@@ -115,7 +80,7 @@ ANSWER(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int no
     for (size_t i = 0; i < n; i++) action
 
 #define GET(name, type, action)                                                                  \
-    ANSWER(name, MASK_Get, wrong_values(n, r, v),                                                \
+    FUNCTION(name, MASK_Get, wrong_values(n, r, v),                                                \
            (void *c, const uint32_t r[], size_t n, type v[]), action)
 #define GET_EACH(name, type, get)                                                                \
     GET(name, type, {                                                                            \
@@ -123,7 +88,7 @@ ANSWER(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int no
         FOR_EACH(v[i] = get(&this, r[i]));                                                       \
     })
 #define SET(name, type, wrong, action)                                                           \
-    ANSWER(name, MASK_Set, wrong,                                                                \
+    FUNCTION(name, MASK_Set, wrong,                                                                \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
 #define SET_EACH(name, c_type, type, number)                                                     \
     SET(name, c_type, wrong_values(n, r, v), {                                                   \
@@ -148,29 +113,22 @@ SET(fmi2SetString, string, wrong_strings(n, r, v), set_unknown(&this, "String", 
 
 /* States */
 
-ANSWER(fmi2GetFMUstate, MASK_FMUstate, NULL, (void *c, void **state), get_state(&this, state))
-ANSWER(fmi2SetFMUstate, MASK_FMUstate, NULL, (void *c, void *state), set_state(&this, state))
-ANSWER(fmi2FreeFMUstate, MASK_FMUstate, NULL, (void *c, void **state), free_state(&this, state))
-ANSWER(fmi2SerializedFMUstateSize, MASK_FMUstate, NULL, (void *c, void *state, size_t *size),
+FUNCTION(fmi2GetFMUstate, MASK_FMUstate, NULL, (void *c, void **state), get_state(&this, state))
+FUNCTION(fmi2SetFMUstate, MASK_FMUstate, NULL, (void *c, void *state), set_state(&this, state))
+FUNCTION(fmi2FreeFMUstate, MASK_FMUstate, NULL, (void *c, void **state), free_state(&this, state))
+FUNCTION(fmi2SerializedFMUstateSize, MASK_FMUstate, NULL, (void *c, void *state, size_t *size),
        size_of_state(&this, state, size))
-ANSWER(fmi2SerializeFMUstate, MASK_FMUstate, NULL,
+FUNCTION(fmi2SerializeFMUstate, MASK_FMUstate, NULL,
        (void *c, void *state, char bytes[], size_t size),
        serialise_state(&this, state, (unsigned char *)bytes, size))
-ANSWER(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
+FUNCTION(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
        (void *c, const char bytes[], size_t size, void **state),
        deserialise_state(&this, (const unsigned char *)bytes, size, state))
 
 /* What is not supported, or hardly */
 
-static int not_supported(call *this, int status) {
-    message said;
-    compose(&said, "FMI function not supported: %s", this->function);
-    tell(this->instance, status, said.text);
-    return status;
-}
-
-#define NOT_SUPPORTED(name, wrong, answer, parameters)                                           \
-    ANSWER(name, MASK_NotSupported, wrong, parameters, this.status = not_supported(&this, answer))
+#define NOT_SUPPORTED(name, wrong, status, parameters)                                           \
+    FUNCTION(name, MASK_NotSupported, wrong, parameters, refuse_unsupported(&this, status))
 
 NOT_SUPPORTED(fmi2GetDirectionalDerivative, NULL, FMI_ERROR,
               (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,
@@ -181,12 +139,10 @@ NOT_SUPPORTED(fmi2GetRealOutputDerivatives, NULL, FMI_ERROR,
               (void *c, const uint32_t r[], size_t n, const int order[], double v[]))
 NOT_SUPPORTED(fmi2CancelStep, NULL, FMI_ERROR, (void *c))
 
-static string wrong_place_of(const void *value) { return value == NULL ? "NULL" : NULL; }
-
-NOT_SUPPORTED(fmi2GetStatus, wrong_place_of(v), FMI_ERROR, (void *c, int kind, int *v))
-NOT_SUPPORTED(fmi2GetIntegerStatus, wrong_place_of(v), FMI_DISCARD,
+NOT_SUPPORTED(fmi2GetStatus, wrong_place(v), FMI_ERROR, (void *c, int kind, int *v))
+NOT_SUPPORTED(fmi2GetIntegerStatus, wrong_place(v), FMI_DISCARD,
               (void *c, int kind, int *v))
-NOT_SUPPORTED(fmi2GetStringStatus, wrong_place_of(v), FMI_DISCARD,
+NOT_SUPPORTED(fmi2GetStringStatus, wrong_place(v), FMI_DISCARD,
               (void *c, int kind, string *v))
 
 #define OF_MODEL_EXCHANGE(name, parameters)                                                      \
@@ -194,18 +150,18 @@ NOT_SUPPORTED(fmi2GetStringStatus, wrong_place_of(v), FMI_DISCARD,
 
 MODEL_EXCHANGE_FUNCTIONS(OF_MODEL_EXCHANGE)
 
-ANSWER(fmi2GetRealStatus, MASK_Get, wrong_place_of(v), (void *c, int kind, double *v), {
+FUNCTION(fmi2GetRealStatus, MASK_Get, wrong_place(v), (void *c, int kind, double *v), {
     if (kind == LAST_SUCCESSFUL_TIME) {
         *v = time_of(&this);
     } else {
         this.status = FMI_DISCARD;
-        tell(this.instance, FMI_DISCARD, "Invalid status inquiry for fmi2GetRealStatus");
+        log_message(this.instance, FMI_DISCARD, "Invalid status inquiry for fmi2GetRealStatus");
     }
 })
 
 /* No answer: with "true" hosts would end the run as a success, and with "false" FMPy would repeat a
  * refused step without end. */
-ANSWER(fmi2GetBooleanStatus, MASK_Get, wrong_place_of(v), (void *c, int kind, int *v), {
+FUNCTION(fmi2GetBooleanStatus, MASK_Get, wrong_place(v), (void *c, int kind, int *v), {
     *v = 0;
     this.status = FMI_DISCARD;
 })

@@ -1,8 +1,5 @@
 /* The functions of FMI 3.0, and the one file to compile: it includes all others.
  *
- * Where FMI3_FUNCTION_PREFIX is defined, as the standard has it, it stands before the names of the
- * functions, so that several FMUs can be linked into one program.
- *
  * What co-simulation without events, clocks and derivatives does not need is not supported,
  * and answered with fmi3Error.
  */
@@ -21,16 +18,9 @@ enum { FIRST_REFERENCE = 1 };
 #include "component.c"
 
 #if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
-#define PASTE(prefix, name) prefix##name
-#define PREFIXED(prefix, name) PASTE(prefix, name)
 #define FMI3(name) PREFIXED(FMI3_FUNCTION_PREFIX, name)
 #else
 #define FMI3(name) name
-#endif
-
-/* Functions of FMI take more than a component has to know. */
-#if defined(__GNUC__)
-#pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif
 
 /* fmi3Boolean and fmi3Clock. A host may pass any byte, where a bool is 0 or 1. */
@@ -41,18 +31,13 @@ enum { TIME = FIRST_REFERENCE + N_PORTS };
 
 /* Messages */
 
-typedef void (*log_message)(void *environment, int status, string category, string text);
+typedef void (*fmi3_logger)(void *environment, int status, string category, string text);
 
 /* A # stands before the reference of a variable, unless it is doubled. */
-static void deliver(const logger *host, string instance_name, int status, string category,
-                    string text) {
-    char doubled[2 * MOST_TEXT + 1], *end = doubled;
-    for (; *text != '\0'; text++) {
-        if (*text == '#') *end++ = '#';
-        *end++ = *text;
-    }
-    *end = '\0';
-    ((log_message)host->function)(host->environment, status, category, doubled);
+static void call_logger(const logger *host, string name, int status, string category, string text) {
+    char doubled[2 * MOST_TEXT + 1];
+    copy_doubled(doubled, text, '#');
+    ((fmi3_logger)host->function)(host->environment, status, category, doubled);
 }
 
 /* Turns the named categories on or off, and leaves the others as they are; no names: all of them. */
@@ -63,7 +48,7 @@ static void switch_categories(call *this, int on, size_t n, const string names[]
     for (size_t i = 0; i < ALL; i++) {
         int named = n == 0;
         for (size_t k = 0; k < n && !named; k++) named = strcmp(names[k], CATEGORIES[i]) == 0;
-        if (named ? on : wanted(&this->instance->host, FMI_OK, CATEGORIES[i])) {
+        if (named ? on : is_wanted(&this->instance->host, FMI_OK, CATEGORIES[i])) {
             chosen[n_chosen++] = CATEGORIES[i];
         }
     }
@@ -83,7 +68,7 @@ EXPORT string FMI3(fmi3GetVersion)(void) { return "3.0"; }
 EXPORT void *FMI3(fmi3InstantiateCoSimulation)(
     string name, string token, string resources, boolean visible, boolean logging,
     boolean event_mode_used, boolean early_return_allowed, const uint32_t intermediate[],
-    size_t n_intermediate, void *environment, log_message log, void (*update)(void)) {
+    size_t n_intermediate, void *environment, fmi3_logger log, void (*update)(void)) {
     return instantiate("fmi3InstantiateCoSimulation",
                        event_mode_used ? "this FMU has no event mode" : NULL, name, token,
                        (logger){(void (*)(void))log, environment}, logging != 0);
@@ -93,14 +78,14 @@ static const char ANOTHER_TYPE[] = "this FMU is for co-simulation only";
 
 EXPORT void *FMI3(fmi3InstantiateModelExchange)(string name, string token, string resources,
                                                 boolean visible, boolean logging,
-                                                void *environment, log_message log) {
+                                                void *environment, fmi3_logger log) {
     return instantiate("fmi3InstantiateModelExchange", ANOTHER_TYPE, name, token,
                        (logger){(void (*)(void))log, environment}, logging != 0);
 }
 
 EXPORT void *FMI3(fmi3InstantiateScheduledExecution)(
     string name, string token, string resources, boolean visible, boolean logging,
-    void *environment, log_message log, void (*update)(void *), void (*lock)(void),
+    void *environment, fmi3_logger log, void (*update)(void *), void (*lock)(void),
     void (*unlock)(void)) {
     return instantiate("fmi3InstantiateScheduledExecution", ANOTHER_TYPE, name, token,
                        (logger){(void (*)(void))log, environment}, logging != 0);
@@ -341,12 +326,7 @@ STATE_FUNCTION(fmi3DeserializeFMUState,
 
 static int unsupported(void *handle, string function) {
     call this = begin(handle, function, MASK_NotSupported);
-    if (GOES_ON(this, NULL)) {
-        message why;
-        compose(&why, "FMI function not supported: %s", function);
-        tell(this.instance, FMI_ERROR, why.text);
-        this.status = FMI_ERROR;
-    }
+    if (GOES_ON(this, NULL)) refuse_unsupported(&this, FMI_ERROR);
     return end(&this);
 }
 

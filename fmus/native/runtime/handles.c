@@ -5,10 +5,13 @@
  * what is alive, without looking where a wrong address points to. (Where a pointer has 32 bits, a
  * number comes again after some thousand.)
  *
- * A call holds the entry of its instance, or state, from its beginning to its end. Entries stay
+ * A call locks the entry of its instance, or state, from its beginning to its end. Entries stay
  * where they are, so that they can be looked up while others come and go.
  */
 #include <stdlib.h>
+
+/* Of the runtime: lets other threads go on for a moment. */
+static void give_way(void);
 
 /* The lower bits of a handle are its place among the entries, the others the serial number. */
 enum { PLACE_BITS = 20, CHUNK_BITS = 10 };
@@ -18,21 +21,15 @@ enum { PLACE_BITS = 20, CHUNK_BITS = 10 };
 
 typedef enum { INSTANCE, STATE } thing_kind;
 
-typedef struct entry entry;
 struct entry {
     shared handle; /* NULL: free */
-    shared thread; /* that holds it; NULL: none; LOGGER: none, and its logger was called */
+    shared thread; /* that has locked it; NULL: none */
     size_t place;
     thing_kind kind;
     void *thing;
     entry *owner, *states;  /* of a state; of an instance */
     entry *next, *previous; /* states of the same owner; free entries */
-    void *teller;           /* the thread that has called the logger */
-    uintptr_t depth;        /* of its stack then */
 };
-
-static char logger_place;
-#define LOGGER ((void *)&logger_place)
 
 /* Most processes need no more than the first chunk. Place 0 holds nothing: no handle is NULL. */
 static entry first_chunk[CHUNK_SIZE];
@@ -45,7 +42,7 @@ static size_t n_entries;
 static uint64_t serial;
 
 static void lock_table(void) {
-    while (!swap_shared(&table_thread, NULL, this_thread())) wait_a_moment();
+    while (!swap_shared(&table_thread, NULL, this_thread())) give_way();
 }
 
 static void unlock_table(void) { put_shared(&table_thread, NULL); }
@@ -118,70 +115,46 @@ static int is_alive(entry *it, void *handle) {
     return it != NULL && get_shared(&it->handle) == handle && handle != NULL;
 }
 
-/* Lets the entry of an instance go while its logger is called. */
-static APART void let_go_to_logger(entry *it) {
-    it->teller = this_thread();
-    it->depth = DEPTH();
-    put_shared(&it->thread, LOGGER);
-}
+static void unlock_entry(entry *it) { put_shared(&it->thread, NULL); }
 
-/* Holds an entry whose logger was called, unless the logger calls now, which `inside` tells: the
- * stack reaches down to it. To one that was left, by longjmp or an exception of C++, it does not. */
-static APART int take_from_logger(entry *it, int *inside) {
-    if (!swap_shared(&it->thread, LOGGER, this_thread())) return 0;
-    *inside = it->teller == this_thread() && DEPTH() < it->depth;
-    if (*inside) put_shared(&it->thread, LOGGER);
-    return !*inside;
-}
-
-/* The entry of a handle, which no other thread holds until it is let go; NULL if there is none, or
- * if this thread is in a call of it already, which `inside` tells. */
-static entry *hold(void *handle, thing_kind kind, int *inside) {
+/* The entry of a handle, which no other thread has locked; NULL, and what is wrong: there is none,
+ * or this thread is in a call of it already. */
+static entry *lock_entry(void *handle, thing_kind kind, string *wrong) {
     size_t place = (uintptr_t)handle & (MOST_ENTRIES - 1);
     entry *chunk = get_shared(&chunks[place >> CHUNK_BITS]);
     entry *it = chunk == NULL ? NULL : &chunk[place & (CHUNK_SIZE - 1)];
-    *inside = 0;
+    *wrong = kind == INSTANCE ? "not a live instance of this FMU" : "not a live state of this FMU";
     while (is_alive(it, handle)) {
-        if (swap_shared(&it->thread, NULL, this_thread()) || take_from_logger(it, inside)) {
+        if (swap_shared(&it->thread, NULL, this_thread())) {
             if (is_alive(it, handle) && it->kind == kind) return it;
-            put_shared(&it->thread, NULL);
+            unlock_entry(it);
             return NULL;
         }
-        *inside |= get_shared(&it->thread) == this_thread();
-        if (*inside) return NULL;
-        wait_a_moment();
+        if (get_shared(&it->thread) == this_thread()) {
+            if (kind == INSTANCE) *wrong = "called by the logger";
+            return NULL;
+        }
+        give_way();
     }
     return NULL;
 }
 
-/* Holds an entry again after the logger has come back; NULL: it is the handle's no more. */
-static entry *hold_after_logger(entry *it, void *handle) {
-    int inside;
-    if (!swap_shared(&it->thread, LOGGER, this_thread())) return hold(handle, INSTANCE, &inside);
-    if (is_alive(it, handle)) return it;
-    put_shared(&it->thread, LOGGER);
-    return NULL;
-}
-
-static void let_go(entry *it) { put_shared(&it->thread, NULL); }
-
-/* Gives a state another owner. */
-static void give(entry *it, entry *owner) {
+static void set_owner(entry *it, entry *owner) {
     lock_table();
     unlink_from_owner(it);
     link_to(it, owner);
     unlock_table();
 }
 
-/* Ends the life of a handle whose entry is held, and lets it go. */
-static void drop(entry *it) {
+/* Ends the life of a handle, and unlocks its entry. */
+static void free_entry(entry *it) {
     lock_table();
     put_shared(&it->handle, NULL);
     unlink_from_owner(it);
     it->next = free_entries;
     free_entries = it;
     unlock_table();
-    let_go(it);
+    unlock_entry(it);
 }
 
 /* The handle of some state of an instance; NULL: it has none. */

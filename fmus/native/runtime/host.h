@@ -1,9 +1,18 @@
-/* What a host passes in, and what it is told: the same for components in C and for the loader of
- * those in Python.
+/* What both runtimes share: that of components in C, and the loader of those in Python.
  *
- * utf8.c       which bytes are text
- * arguments.c  what can be wrong with arrays
- * listener.c   what the host wants to hear, and how it is told
+ * text.c      texts of messages, and which bytes are text
+ * host.c      the host's arguments and its logger
+ * handles.c   tells what is alive from what is not
+ * calls.c     what every call begins with, and the host's states
+ *
+ * Names use a few verbs in one sense, as fmus/python/callbacks.py does:
+ *
+ * check    whether something is good; writes or gives the reason if it is not
+ * refuse   answer a call with another status than OK, and log the reason
+ * fail     refuse with an error, after which the instance is in FMI's error state
+ * log      hand a message to the host's logger
+ *
+ * A function that can fail writes a reason into `why`, and gives 0.
  */
 #ifndef HOST_H
 #define HOST_H
@@ -22,6 +31,7 @@ typedef struct {
     void *environment;
 } logger;
 
+/* What an instance logs. */
 typedef struct {
     logger host;
     char *name;
@@ -30,23 +40,16 @@ typedef struct {
     char **categories; /* that are wanted; none: all */
 } listener;
 
-/* How far the stack reaches down where it is called. */
-#if defined(_MSC_VER)
-#define DEPTH() ((uintptr_t)_AddressOfReturnAddress())
-#define APART __declspec(noinline)
-#else
-#define DEPTH() ((uintptr_t)__builtin_frame_address(0))
-#define APART __attribute__((noinline))
-#endif
+typedef struct instance instance;
+typedef struct entry entry;
 
-/* More stack than lies between two calls of a host that goes on after its logger was left. */
-#define MARGIN(name)                                                                             \
-    volatile char name[1 << 14];                                                                 \
-    name[0] = 0;                                                                                 \
-    (void)name[0]
-
-/* Of the version: calls the logger, which is not NULL. */
-static void deliver(const logger *host, string instance_name, int status, string category,
-                    string text);
+/* A call between its beginning and its end. */
+typedef struct {
+    instance *instance; /* NULL: the handle belongs to no live instance */
+    entry *entry;       /* of the instance, which the call has locked */
+    string function;
+    int allowed; /* the modes that it may come in, of modes.h */
+    int status;  /* what the call is answered with */
+} call;
 
 #endif

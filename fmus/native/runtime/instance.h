@@ -1,15 +1,12 @@
 /* What the parts of the component know of each other.
  *
- * handles.c    tells what is alive from what is not
- * messages.c   what an instance says, and when the host is told
+ * messages.c   what an instance logs, and refusals
  * noise.c      Python's random numbers
  * store.c      values of ports, and what may be done with them
  * run.c        modes and steps
  * bytes.c      numbers and texts as bytes
  * state.c      the state as bytes, and what is checked before one is taken
- * guard.c      making and freeing instances, and what every call begins and ends with
- *
- * A function that can fail writes a reason into `why`, and gives 0.
+ * guard.c      making and freeing instances, and what every call ends with
  */
 #ifndef INSTANCE_H
 #define INSTANCE_H
@@ -114,18 +111,8 @@ typedef struct {
     int fault;
 } run;
 
-/* A message that the host has not been told yet. */
-typedef struct untold untold;
-struct untold {
-    untold *next;
-    int status;
-    char text[1];
-};
-
 struct instance {
     listener host;
-    untold *untold; /* in their order */
-    int no_memory;  /* which the end of the call tells */
     int in_error;
     run run;
     parameter_values meant; /* the parameters that steps are taken with */
@@ -133,8 +120,9 @@ struct instance {
     model_derived derived;
     int underived; /* whether it is to be derived again before it is used */
     int stale;     /* whether a value has changed that the state at the start time depends on */
-    size_t n_said;
-    uint64_t said[MOST_MESSAGES];
+    size_t n_logged;
+    uint64_t logged[MOST_MESSAGES];
+    state_values restarted; /* for the outputs of a state that is not credible */
     /* What a call sets, until all of it is found good. */
     parameter_values set_parameters;
     input_values set_inputs;

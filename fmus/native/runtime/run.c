@@ -29,7 +29,7 @@ static void renew(instance *it) {
     renew_run(&it->run);
     it->stale = 0;
     it->in_error = 0;
-    it->n_said = 0;
+    it->n_logged = 0;
 }
 
 static int adopt(instance *it, const parameter_values *values, message *why) {
@@ -42,32 +42,32 @@ static int adopt(instance *it, const parameter_values *values, message *why) {
     return 1;
 }
 
-static int bounded(const state_values *state) {
+static int is_bounded(const state_values *state) {
     double sum = 0.0;
     for (int i = 0; i < MODEL_STATE; i++) sum += state->values[i] * state->values[i];
     return sum <= LARGEST_STATE * LARGEST_STATE;
 }
 
 /* Whether a number of the state is one that its enumeration has, if it is of one. */
-static int is_member(const numbers *of, double number, message *why) {
+static int check_member(const numbers *of, double number, message *why) {
     return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
            compose(why, "%.0f is not of type %s", number, of->name);
 }
 
-static int has_members(const double values[], message *why) {
+static int check_members(const double values[], message *why) {
     for (size_t i = 0; i < N_STATE_NUMBERS; values += state_numbers[i++].n) {
         for (size_t k = 0; state_numbers[i].name != NULL && k < state_numbers[i].n; k++) {
-            if (!is_member(&state_numbers[i], values[k], why)) return 0;
+            if (!check_member(&state_numbers[i], values[k], why)) return 0;
         }
     }
     return 1;
 }
 
 /* Whether a state that was computed is one that a run can go on from. */
-static int is_sound(const state_values *state, const Error *error, message *why) {
+static int check_computed(const state_values *state, const Error *error, message *why) {
     if (error->raised) return compose(why, "%s", error->why.text);
-    return has_members(state->values, why) &&
-           (bounded(state) ||
+    return check_members(state->values, why) &&
+           (is_bounded(state) ||
             compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE));
 }
 
@@ -88,13 +88,12 @@ static int evaluate(instance *it, const moment *of, message *why) {
     const model_parameters *parameters = &it->meant.model;
     const model_inputs *inputs = &it->run.inputs.groups;
     const model_state *state = &of->state.groups;
-    state_values restarted;
     Error error;
     error.raised = 0;
     if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
-        restarted = of->state;
-        state = &restarted.groups;
-        model_restart(parameters, &restarted.groups, inputs, &error);
+        it->restarted = of->state;
+        state = &it->restarted.groups;
+        model_restart(parameters, &it->restarted.groups, inputs, &error);
     }
     if (MODEL_OUTPUTS_TAKE_DERIVED) derive(it, state, of->time, &error);
     model_evaluate(parameters, state, &it->derived, inputs, of->time, &outputs->groups, &error);
@@ -105,7 +104,7 @@ static int evaluate(instance *it, const moment *of, message *why) {
     }
     for (int i = 0; i < REAL_OUTPUTS; i++) {
         if (!isfinite(outputs->values[i])) {
-            return is_finite(port_at(output_references[i]), outputs->values[i], why);
+            return check_finite(port_at(output_references[i]), outputs->values[i], why);
         }
     }
     return 1;
@@ -125,7 +124,7 @@ static int start(instance *it, message *why) {
     }
     next->time = run->start_time;
     model_start(&it->meant.model, &run->inputs.groups, next->time, &next->state.groups, &error);
-    if (!is_sound(&next->state, &error, why) || !evaluate(it, next, why)) return 0;
+    if (!check_computed(&next->state, &error, why) || !evaluate(it, next, why)) return 0;
     next->outputs_are = FRESH;
     run->now = !run->now;
     run->shown = !run->shown;
@@ -153,6 +152,7 @@ static int refresh(instance *it, message *why) {
     return compose(why, "initialisation refused: %s", said.text);
 }
 
+/* A stop time that is not after the start stands for none. */
 static void set_experiment(call *this, double start, double stop) {
     run *run = &this->instance->run;
     message why;
@@ -237,7 +237,7 @@ static int advance(instance *it, double time, double step, message *why) {
         model_restart(parameters, state, inputs, &error);
         if (!error.raised) {
             compose(&said, MODEL_RESTARTED, time);
-            say(it, &said, FMI_WARNING, MODEL_RESTARTED);
+            log_once(it, &said, FMI_WARNING, MODEL_RESTARTED);
         }
     }
     double h = step / n;
@@ -247,7 +247,7 @@ static int advance(instance *it, double time, double step, message *why) {
         model_update(parameters, state, &it->derived, inputs, t, h, &error);
         if (MODEL_DERIVE_TAKES_STATE || MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
-    if (!is_sound(&next->state, &error, why)) return 0;
+    if (!check_computed(&next->state, &error, why)) return 0;
     next->time = time + step;
     if (MODEL_OUTPUTS_TAKE_TIME || MODEL_DERIVE_TAKES_TIME) {
         next->time = end_of_step(run->start_time, time, step);
@@ -270,6 +270,7 @@ static int advance(instance *it, double time, double step, message *why) {
     return 1;
 }
 
+/* Where the run is: at the end of the last step that was taken. */
 static double time_of(const call *this) {
     const run *run = &this->instance->run;
     return run->moments[run->now].time;
@@ -290,6 +291,6 @@ static void take_step(call *this, double time, double step) {
     } else if (!advance(it, time, step, &why)) {
         it->underived = 1;
         compose(&said, "step refused at t = %g s: %s", time, why.text);
-        discard(this, &said, why.text);
+        refuse(this, FMI_DISCARD, &said, why.text);
     }
 }

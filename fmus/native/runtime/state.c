@@ -19,9 +19,6 @@ static const char MAGIC[] = "FMU state 3";
 /* Tells states of one model and version from all others. */
 static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
 
-/* More bytes than any state has. */
-static const size_t MOST_BYTES = (size_t)1 << 30;
-
 /* No normal number that is drawn is larger: it is made of 53 bits. */
 static const double LARGEST_DRAW = 9.0;
 
@@ -90,17 +87,18 @@ static int has_its_checksum(const saved *state) {
 static int is_truth(double number) { return number == 0.0 || number == 1.0; }
 
 /* Whether a number can be a port's; an output is in no range, as no step looks at one. */
-static int good_value(const port *port, double number, message *why) {
+static int check_value(const port *port, double number, message *why) {
     if (port->type == BOOLEAN && !is_truth(number)) {
         return compose(why, "%s: must be a Boolean", port->name);
     }
-    return port->causality == OUTPUT ? is_finite(port, number, why) : in_range(port, number, why);
+    return port->causality == OUTPUT ? check_finite(port, number, why)
+                                     : check_range(port, number, why);
 }
 
-static int good_values(const double values[], size_t n, const uint32_t references[],
-                       message *why) {
+static int check_values(const double values[], size_t n, const uint32_t references[],
+                        message *why) {
     for (size_t i = 0; i < n; i++) {
-        if (!good_value(port_at(references[i]), values[i], why)) return 0;
+        if (!check_value(port_at(references[i]), values[i], why)) return 0;
     }
     return 1;
 }
@@ -108,25 +106,25 @@ static int good_values(const double values[], size_t n, const uint32_t reference
 static int take_parameter(reader *from, parameter_values *values, const port *port, message *why) {
     double number;
     take_numbers(from, port->type, &number, 1);
-    if (!good_value(port, number, why)) return 0;
+    if (!check_value(port, number, why)) return 0;
     put_parameter(values, port, number);
     return 1;
 }
 
 /* Whether a number can be one of the state. */
-static int good_number(const numbers *of, double number, message *why) {
+static int check_number(const numbers *of, double number, message *why) {
     if (of->type == REAL) return isfinite(number) || compose(why, "a value is not finite");
     if (of->type == BOOLEAN && !is_truth(number)) {
         return compose(why, "%.0f is not of type bool", number);
     }
-    return is_member(of, number, why);
+    return check_member(of, number, why);
 }
 
 static int take_state(reader *from, double values[], message *why) {
     for (size_t i = 0; i < N_STATE_NUMBERS; values += state_numbers[i++].n) {
         take_numbers(from, state_numbers[i].type, values, state_numbers[i].n);
         for (size_t k = 0; k < state_numbers[i].n; k++) {
-            if (!good_number(&state_numbers[i], values[k], why)) return 0;
+            if (!check_number(&state_numbers[i], values[k], why)) return 0;
         }
     }
     return 1;
@@ -155,7 +153,7 @@ static int take_sample(reader *from, run *it, message *why) {
     uint32_t number = take_word(from);
     if (number > FRESH) return compose(why, "its outputs are neither fresh nor not");
     it->moments[it->now].outputs_are = (freshness)number;
-    return good_values(values, MODEL_OUTPUTS, output_references, why);
+    return check_values(values, MODEL_OUTPUTS, output_references, why);
 }
 
 /* A saved run, checked part by part. */
@@ -183,7 +181,7 @@ static int take_run(reader *from, run *it, message *why) {
         }
     }
     take_values(from, it->inputs.values, REAL_INPUTS, MODEL_INPUTS);
-    if (!good_values(it->inputs.values, MODEL_INPUTS, input_references, why)) return 0;
+    if (!check_values(it->inputs.values, MODEL_INPUTS, input_references, why)) return 0;
     it->begun = take_truth(from);
     if (it->mode == INSTANTIATED && it->begun) {
         return compose(why, "it has a state before the initialisation");
@@ -204,12 +202,12 @@ static int take_run(reader *from, run *it, message *why) {
 }
 
 /* Whether a run can have led to a state, whose numbers are finite. */
-static int can_be_reached(const run *it, message *why) {
+static int check_reachable(const run *it, message *why) {
     const model_parameters *parameters = &it->parameters.model;
     const state_values *state = &it->moments[it->now].state;
     Error error = {0};
     model_check(parameters, &error);
-    if (!error.raised && !bounded(state)) return compose(why, "it exceeds %g", LARGEST_STATE);
+    if (!error.raised && !is_bounded(state)) return compose(why, "it exceeds %g", LARGEST_STATE);
     model_check_state(parameters, &state->groups, &error);
     return !error.raised || compose(why, "%s", error.why.text);
 }
@@ -224,7 +222,7 @@ static size_t largest_size(run *it) {
 }
 
 /* Makes a new run what was saved. */
-static int can_be_restored(const saved *state, run *it, message *why) {
+static int take_saved(const saved *state, run *it, message *why) {
     reader from = {.bytes = state->bytes, .left = content_size(state)};
     if (!take_this(&from, MAGIC)) return compose(why, "the bytes are not a state");
     if (state->size > largest_size(it)) return compose(why, "it has missing or unknown parts");
@@ -232,14 +230,14 @@ static int can_be_restored(const saved *state, run *it, message *why) {
         return compose(why, "the bytes were changed since they were written");
     }
     if (!take_this(&from, IDENTITY)) return compose(why, "not a state of %s", IDENTITY);
-    return take_run(&from, it, why) && (!it->begun || can_be_reached(it, why));
+    return take_run(&from, it, why) && (!it->begun || check_reachable(it, why));
 }
 
 static int restore(instance *it, const saved *state, message *why) {
     run *wanted = malloc(sizeof *wanted);
     if (wanted == NULL) return compose(why, "out of memory");
     renew_run(wanted);
-    int good = can_be_restored(state, wanted, why) &&
+    int good = take_saved(state, wanted, why) &&
                (!wanted->begun || adopt(it, &wanted->parameters, why));
     if (good) {
         it->run = *wanted;
@@ -253,41 +251,9 @@ static int restore(instance *it, const saved *state, message *why) {
 
 /* What the host does with states */
 
-/* The entry of a state, held; NULL: there is none, which is told. */
-static entry *held_state(call *this, void *state) {
-    int inside;
-    entry *it = hold(state, STATE, &inside);
-    if (it == NULL) sound(this, "not a live state of this FMU");
-    return it;
-}
-
-static void release_state(entry *it) {
-    if (it == NULL) return;
-    free(it->thing);
-    drop(it);
-}
-
-/* Whether there is a place for a state; `before` is the one that is there, held, or NULL. */
-static int has_place(call *this, void **state, entry **before) {
-    *before = NULL;
-    if (!sound(this, state == NULL ? "NULL" : NULL)) return 0;
-    return *state == NULL || (*before = held_state(this, *state)) != NULL;
-}
-
-/* Hands a state over to the host, replacing one that it already had. */
-static void hand_over(call *this, saved *made, void **state, entry *before) {
-    if (before != NULL && made != NULL) {
-        free(before->thing);
-        before->thing = made;
-        give(before, this->entry);
-    } else if (made != NULL) {
-        *state = new_handle(STATE, made, this->entry);
-    }
-    if (before != NULL) let_go(before);
-    if (made == NULL || *state == NULL) {
-        free(made);
-        this->instance->no_memory = 1;
-    }
+static void free_saved(instance *it, void *saved) {
+    (void)it;
+    free(saved);
 }
 
 /* A state with room for some bytes; NULL: no memory. */
@@ -302,7 +268,7 @@ static void get_state(call *this, void **state) {
     writer to = {NULL, 0};
     entry *before;
     if (this->instance->stale) refresh(this->instance, &unused);
-    if (!has_place(this, state, &before)) return;
+    if (!check_place(this, state, &before)) return;
     put_run(&to, &this->instance->run);
     saved *made = new_saved(to.size + CHECKSUM_SIZE);
     if (made != NULL) {
@@ -314,10 +280,10 @@ static void get_state(call *this, void **state) {
 
 static void set_state(call *this, void *state) {
     message why, said;
-    entry *held = held_state(this, state);
-    if (held == NULL) return;
-    int restored = restore(this->instance, held->thing, &why);
-    let_go(held);
+    entry *locked = lock_state(this, state);
+    if (locked == NULL) return;
+    int restored = restore(this->instance, locked->thing, &why);
+    unlock_entry(locked);
     if (restored) {
         this->instance->in_error = 0;
     } else {
@@ -326,41 +292,31 @@ static void set_state(call *this, void *state) {
     }
 }
 
-static void free_state(call *this, void **state) {
-    entry *before;
-    if (!has_place(this, state, &before)) return;
-    release_state(before);
-    *state = NULL;
-}
-
 static void size_of_state(call *this, void *state, size_t *size) {
-    if (!sound(this, size == NULL ? "NULL" : NULL)) return;
-    entry *held = held_state(this, state);
-    if (held == NULL) return;
-    *size = ((const saved *)held->thing)->size;
-    let_go(held);
+    if (!check(this, wrong_place(size))) return;
+    entry *locked = lock_state(this, state);
+    if (locked == NULL) return;
+    *size = ((const saved *)locked->thing)->size;
+    unlock_entry(locked);
 }
 
 static void serialise_state(call *this, void *state, unsigned char bytes[], size_t size) {
-    if (!sound(this, bytes == NULL ? "NULL" : NULL)) return;
-    entry *held = held_state(this, state);
-    if (held == NULL) return;
-    saved *it = held->thing;
+    if (!check(this, wrong_place(bytes))) return;
+    entry *locked = lock_state(this, state);
+    if (locked == NULL) return;
+    saved *it = locked->thing;
     int fits = size == it->size;
     if (fits) {
         if (!it->sealed) seal(it);
         memcpy(bytes, it->bytes, size);
     }
-    let_go(held);
-    sound(this, fits ? NULL : "the state has a different size");
+    unlock_entry(locked);
+    check(this, fits ? NULL : "the state has a different size");
 }
 
 static void deserialise_state(call *this, const unsigned char bytes[], size_t size, void **state) {
-    string wrong = bytes == NULL                     ? "NULL"
-                   : size == 0 || size > MOST_BYTES ? "no state has that size"
-                                                    : NULL;
     entry *before;
-    if (!sound(this, wrong) || !has_place(this, state, &before)) return;
+    if (!check(this, wrong_bytes(bytes, size)) || !check_place(this, state, &before)) return;
     saved *made = new_saved(size);
     if (made != NULL) {
         memcpy(made->bytes, bytes, size);

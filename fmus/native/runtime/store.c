@@ -38,13 +38,13 @@ static string text_among(const choice choices[], size_t n, double number) {
     return NULL;
 }
 
-static int is_finite(const port *port, double number, message *why) {
+static int check_finite(const port *port, double number, message *why) {
     return isfinite(number) || compose(why, "%s = %r: must be finite", port->name, number);
 }
 
 /* Whether a port can take a number. */
-static int in_range(const port *port, double number, message *why) {
-    if (!is_finite(port, number, why)) return 0;
+static int check_range(const port *port, double number, message *why) {
+    if (!check_finite(port, number, why)) return 0;
     if (port->n_choices > 0 && text_among(port->choices, port->n_choices, number) == NULL) {
         compose(why, "%s = %.0f: use one of ", port->name, number);
         for (size_t i = 0; i < port->n_choices; i++) {
@@ -88,11 +88,12 @@ static void put_parameter(parameter_values *values, const port *port, double num
 
 /* Getting */
 
+/* References for a type that no port has; `type` is the version's name of it. */
 static void get_unknown(call *this, string type, const uint32_t references[], size_t n) {
     message why;
     for (size_t i = 0; i < n; i++) {
         compose(&why, NO_PORT, type, references[i]);
-        refuse_to_get(this, &why);
+        refuse(this, FMI_ERROR, &why, NULL);
     }
 }
 
@@ -126,13 +127,15 @@ static int has_output(const uint32_t references[], size_t n) {
     return 0;
 }
 
+/* Before values are got: outputs are made what they are. */
 static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     instance *it = this->instance;
     message why;
     if (it->run.moments[it->run.now].outputs_are != OUTDATED) return;
-    if (has_output(references, n) && !refresh(it, &why)) refuse_to_get(this, &why);
+    if (has_output(references, n) && !refresh(it, &why)) refuse(this, FMI_ERROR, &why, NULL);
 }
 
+/* All values can be got as Reals. */
 static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
     instance *it = this->instance;
     prepare_to_get(this, references, n);
@@ -166,13 +169,14 @@ static void note_change(instance *it, int inputs, int parameters) {
     }
 }
 
-/* The values of a call, which the instance keeps until all of them are found good. */
-struct setting {
+/* The values of a call, which the instance keeps until all of them are found good: all are taken,
+ * or none. They are set one by one between the beginning and the end of a setting. */
+typedef struct {
     call *call;
     int good;
     int has_parameters;
     int changes_inputs, changes_parameters;
-};
+} setting;
 
 static void set_unknown(call *this, string type, const uint32_t references[], size_t n) {
     message why;
@@ -203,7 +207,7 @@ static int is_settled(const run *run, const port *port) {
 }
 
 /* Whether the standard lets a port be set to any value now; a host may tell a fixed one again. */
-static int can_be_set(const run *run, const port *port, double number, message *why) {
+static int check_settable(const run *run, const port *port, double number, message *why) {
     if (port->causality == OUTPUT) {
         return compose(why, "%s is an output and cannot be set", port->name);
     }
@@ -214,7 +218,7 @@ static int can_be_set(const run *run, const port *port, double number, message *
 static int take_value(setting *it, const port *port, double number, message *why) {
     instance *instance = it->call->instance;
     if (is_settled(&instance->run, port)) return 1;
-    if (!in_range(port, number, why)) return 0;
+    if (!check_range(port, number, why)) return 0;
     if (port->causality == INPUT) {
         instance->set_inputs.values[port->place] = number;
         it->changes_inputs = 1;
@@ -226,13 +230,13 @@ static int take_value(setting *it, const port *port, double number, message *why
 }
 
 /* A run with another parameter than the host asked for must not begin. */
-static void give_up(setting *it, message *why) {
+static void refuse_setting(setting *it, message *why) {
     it->good = 0;
     if (it->has_parameters && it->call->instance->run.mode != STEPPING) {
         it->call->instance->run.fault = 1;
         fail(it->call, why);
     } else {
-        discard(it->call, why, NULL);
+        refuse(it->call, FMI_DISCARD, why, NULL);
     }
 }
 
@@ -240,11 +244,11 @@ static void set_value(setting *it, uint32_t reference, double number) {
     message why;
     const port *port = port_at(reference);
     if (!it->good) return;
-    if (!can_be_set(&it->call->instance->run, port, number, &why)) {
+    if (!check_settable(&it->call->instance->run, port, number, &why)) {
         it->good = 0;
         fail(it->call, &why);
     } else if (!take_value(it, port, number, &why)) {
-        give_up(it, &why);
+        refuse_setting(it, &why);
     }
 }
 
@@ -255,7 +259,7 @@ static void end_setting(setting *it) {
     if (!it->good) return;
     if (it->changes_parameters && run->mode == STEPPING &&
         !adopt(instance, &instance->set_parameters, &why)) {
-        give_up(it, &why);
+        refuse_setting(it, &why);
         return;
     }
     if (it->changes_parameters) run->parameters = instance->set_parameters;

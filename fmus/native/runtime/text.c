@@ -1,4 +1,4 @@
-/* Texts of messages: of bounded length, with numbers as Python writes them in any locale. */
+/* Texts of messages: UTF-8, of bounded length, with numbers as Python writes them in any locale. */
 #ifndef TEXT_C
 #define TEXT_C
 
@@ -12,7 +12,37 @@
 
 #include "host.h"
 
-#include "utf8.c"
+/* UTF-8 */
+
+/* The number of bytes of the character that a text begins with; 0: it is none. */
+static int length_of_character(const char *text) {
+    static const uint32_t smallest[] = {0, 0, 0x80, 0x800, 0x10000};
+    const unsigned char *bytes = (const unsigned char *)text;
+    int length = bytes[0] < 0x80      ? 1
+                 : bytes[0] >> 5 == 6  ? 2
+                 : bytes[0] >> 4 == 14 ? 3
+                 : bytes[0] >> 3 == 30 ? 4
+                                       : 0;
+    if (length < 2) return length;
+    uint32_t character = bytes[0] & (0x7fu >> length);
+    for (int i = 1; i < length; i++) {
+        if (bytes[i] >> 6 != 2) return 0;
+        character = character << 6 | (bytes[i] & 0x3f);
+    }
+    int surrogate = character >= 0xd800 && character <= 0xdfff;
+    return character < smallest[length] || surrogate || character > 0x10ffff ? 0 : length;
+}
+
+static int is_utf8(const char *text) {
+    while (*text != '\0') {
+        int length = length_of_character(text);
+        if (length == 0) return 0;
+        text += length;
+    }
+    return 1;
+}
+
+/* Messages */
 
 /* Some hosts have a buffer of 1 or 2 kB for a message. No character has more than four bytes. */
 enum { MOST_CHARACTERS = 500, MOST_TEXT = 4 * MOST_CHARACTERS };

@@ -1,28 +1,18 @@
 /* The functions of FMI 2.0: valid calls are forwarded to PythonFMU. */
 #define _GNU_SOURCE
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "loader.h"
 
-#include "../../native/runtime/utf8.c"
-#include "../../native/runtime/arguments.c"
-#include "../../native/runtime/listener.c"
-#include "../../native/runtime/model_exchange.h"
+#include "../../native/runtime/host.c"
+#include "../../native/runtime/handles.c"
+#include "../../native/runtime/calls.c"
 
-#include "messages.c"
-#include "location.c"
 #include "python.c"
 #include "preflight.c"
-#include "handles.c"
+#include "location.c"
 #include "guard.c"
-
-/* A kind of fmi2GetRealStatus. */
-enum { LAST_SUCCESSFUL_TIME = 2 };
-
-/* More bytes than any state has. */
-static const size_t MOST_BYTES = (size_t)1 << 30;
 
 /* What PythonFMU answers to one of its functions. */
 #define TO_PYTHONFMU(call, name, parameters, arguments)                                          \
@@ -35,7 +25,7 @@ static const size_t MOST_BYTES = (size_t)1 << 30;
 /* A function that is forwarded as it is if nothing is wrong with its arguments. */
 #define FORWARD(name, allowed, wrong, parameters, arguments)                                     \
     EXPORT int name parameters {                                                                 \
-        call this = begin(c, #name, allowed);                                                    \
+        call this = enter(c, #name, allowed);                                                    \
         if (GOES_ON(this, wrong)) {                                                              \
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
@@ -54,14 +44,14 @@ static void free_slave(component slave) {
     ((void (*)(component))pythonfmu_function("fmi2FreeInstance"))(slave);
 }
 
-static component new_slave(instance *it, string guid, string path, int visible, char *why) {
+static component new_slave(instance *it, string guid, string path, int visible, message *why) {
     typedef component (*instantiate)(string, int, string, string, const callbacks *, int, int);
     instantiate forward = (instantiate)pythonfmu_function("fmi2Instantiate");
     component slave = forward(it->host.name, CO_SIMULATION, guid, path, &it->heard, visible, 1);
     /* PythonFMU's watch over an interpreter that it has not started: it would free it twice when
      * the process ends. */
     ((void (*)(void))pythonfmu_function("finalizePythonInterpreter"))();
-    if (exception(why) && slave != NULL) {
+    if (take_exception(why) && slave != NULL) {
         free_slave(slave);
         slave = NULL;
     }
@@ -69,9 +59,9 @@ static component new_slave(instance *it, string guid, string path, int visible, 
     return slave;
 }
 
-static component new_component(instance *it, string guid, string path, int visible, char *why) {
+static component new_component(instance *it, string guid, string path, int visible, message *why) {
     component handle = NULL;
-    if (!loaded(why)) return NULL;
+    if (!load(why)) return NULL;
     int lock = py.PyGILState_Ensure();
     begin_making();
     if (preflight(path, guid, why)) it->slave = new_slave(it, guid, path, visible, why);
@@ -86,67 +76,46 @@ static component new_component(instance *it, string guid, string path, int visib
 
 EXPORT component fmi2Instantiate(string name, int type, string guid, string location,
                                  const callbacks *functions, int visible, int logging) {
-    char why[WHY] = "the slave cannot be created", *path = NULL;
-    string wrong = is_blank(name)            ? "the instance has no name"
-                   : !is_utf8(name)          ? "the name of the instance is not UTF-8"
-                   : type != CO_SIMULATION   ? "this FMU is for co-simulation only"
-                   : location == NULL        ? "there is no resource location"
-                   : guid && !is_utf8(guid) ? "the GUID is not UTF-8"
-                                             : NULL;
-    instance *it = new_instance(name != NULL && is_utf8(name) ? name : "?", functions, logging);
+    string wrong = type != CO_SIMULATION ? "this FMU is for co-simulation only"
+                   : location == NULL    ? "there is no resource location"
+                                         : NULL;
+    char *path = NULL;
+    message why;
+    instance *it = new_instance(name, functions, logging);
     component handle = NULL;
     if (it == NULL) return NULL;
-    if (wrong != NULL) {
-        snprintf(why, sizeof why, "%s", wrong);
-    } else if (plain_path(location, &path, why)) {
-        handle = new_component(it, guid, path, visible, why);
+    compose(&why, "the slave cannot be created");
+    if (check_instance(wrong, name, "GUID", guid, &why) && plain_path(location, &path, &why)) {
+        handle = new_component(it, guid, path, visible, &why);
     }
     free(path);
-    if (handle == NULL) {
-        if (!it->told) complain(it, FMI_ERROR, "fmi2Instantiate: %s", why);
-        logger host = it->host.host;
-        untold *messages = it->untold;
-        it->untold = NULL;
-        release_instance(it);
-        tell_all(host, messages);
-    } else if (it->untold != NULL) {
-        call this = {.instance = it, .handle = handle, .lock = py.PyGILState_Ensure()};
-        give_back_and_tell(&this);
-    }
+    if (handle == NULL && !it->has_logged_error) log_error(it, "fmi2Instantiate", why.text);
+    log_queue(it);
+    if (handle == NULL) release_instance(it);
     return handle;
 }
 
-static int free_state(instance *it, void *state) {
-    call this = {.instance = it};
-    TO_PYTHONFMU(this, fmi2FreeFMUstate, (component, void **), (it->slave, &state));
-    return this.status;
+static void free_saved(instance *it, void *saved) {
+    typedef int (*free_state)(component, void **);
+    if (!it->is_lost) ((free_state)pythonfmu_function("fmi2FreeFMUstate"))(it->slave, &saved);
 }
 
 EXPORT void fmi2FreeInstance(component c) {
     if (c == NULL) return;
-    call this = begin(c, "fmi2FreeInstance", MASK_FreeInstance);
-    void *state;
+    call this = enter(c, "fmi2FreeInstance", MASK_FreeInstance);
     if (this.instance == NULL) return;
-    /* PythonFMU may have freed parts of a lost instance: it is not touched. */
-    int sound = this.instance->condition != LOST;
-    while ((state = state_of(c)) != NULL) {
-        void *object = thing_of(state, STATE);
-        drop(state);
-        if (sound) free_state(this.instance, object);
-    }
-    if (sound) free_slave(this.instance->slave);
-    drop(c);
-    instance *it = this.instance;
-    end(&this);
-    release_instance(it);
+    free_handles(&this);
+    if (!this.instance->is_lost) free_slave(this.instance->slave);
+    leave(&this);
+    release_instance(this.instance);
 }
 
 EXPORT int fmi2Reset(component c) {
-    call this = begin(c, "fmi2Reset", MASK_Reset);
+    call this = enter(c, "fmi2Reset", MASK_Reset);
     if (GOES_ON(this, NULL)) {
         TO_PYTHONFMU(this, fmi2Reset, (component), (this.instance->slave));
         if (this.status == FMI_OK) {
-            this.instance->condition = SOUND;
+            this.instance->in_error = 0;
             this.instance->last_successful_time = 0.0;
         }
     }
@@ -155,9 +124,10 @@ EXPORT int fmi2Reset(component c) {
 
 /* Messages are chosen here: PythonFMU would keep errors back, too. */
 EXPORT int fmi2SetDebugLogging(component c, int on, size_t n, const string names[]) {
-    call this = begin(c, "fmi2SetDebugLogging", MASK_SetDebugLogging);
-    if (GOES_ON(this, wrong_texts(n, names)) && !choose(&this.instance->host, on, n, names)) {
-        refuse(&this, "out of memory");
+    call this = enter(c, "fmi2SetDebugLogging", MASK_SetDebugLogging);
+    if (GOES_ON(this, wrong_texts(n, names)) &&
+        !choose_categories(&this.instance->host, on, n, names)) {
+        check(&this, "out of memory");
     }
     return end(&this);
 }
@@ -171,7 +141,7 @@ static void come_to(instance *it, double time) {
 /* A function that is forwarded, and after which steps have come to a time. */
 #define FORWARD_TO(time_after, name, allowed, parameters, arguments)                             \
     EXPORT int name parameters {                                                                 \
-        call this = begin(c, #name, allowed);                                                    \
+        call this = enter(c, #name, allowed);                                                    \
         if (GOES_ON(this, NULL)) {                                                               \
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
@@ -212,46 +182,27 @@ SET(fmi2SetString, const string, wrong_strings(n, r, v))
 
 /* States */
 
-static string wrong_state(void *state) {
-    return thing_of(state, STATE) == NULL ? "not a live state of this FMU" : NULL;
-}
-
-/* Where there is a state or NULL. */
-static string wrong_place(void **state) {
-    return state == NULL ? "NULL" : *state == NULL ? NULL : wrong_state(*state);
-}
-
-/* Hands a state that PythonFMU has made over to the host, replacing one that it already had. */
-static void hand_over(call *this, component owner, void *made, void **state) {
-    void *before = thing_of(*state, STATE);
-    if (this->status != FMI_OK) return;
-    if (before != NULL) {
-        replace(*state, made, owner);
-        free_state(this->instance, before);
-    } else if ((*state = new_handle(STATE, made, owner)) == NULL) {
-        free_state(this->instance, made);
-        refuse(this, "out of memory");
-    }
-}
-
 EXPORT int fmi2GetFMUstate(component c, void **state) {
-    call this = begin(c, "fmi2GetFMUstate", MASK_FMUstate);
-    if (GOES_ON(this, wrong_place(state))) {
+    call this = enter(c, "fmi2GetFMUstate", MASK_FMUstate);
+    entry *before;
+    if (GOES_ON(this, NULL) && check_place(&this, state, &before)) {
         void *made = NULL;
         TO_PYTHONFMU(this, fmi2GetFMUstate, (component, void **), (this.instance->slave, &made));
-        hand_over(&this, c, made, state);
+        hand_over(&this, made, state, before);
     }
     return end(&this);
 }
 
 EXPORT int fmi2SetFMUstate(component c, void *state) {
-    call this = begin(c, "fmi2SetFMUstate", MASK_FMUstate);
-    if (GOES_ON(this, wrong_state(state))) {
+    call this = enter(c, "fmi2SetFMUstate", MASK_FMUstate);
+    entry *saved;
+    if (GOES_ON(this, NULL) && (saved = lock_state(&this, state)) != NULL) {
         TO_PYTHONFMU(this, fmi2SetFMUstate, (component, void *),
-                     (this.instance->slave, thing_of(state, STATE)));
+                     (this.instance->slave, saved->thing));
+        unlock_entry(saved);
         take_answer(&this, 1);
         if (this.status == FMI_OK) {
-            this.instance->condition = SOUND;
+            this.instance->in_error = 0;
             come_to(this.instance, this.instance->last_successful_time);
         }
     }
@@ -259,56 +210,51 @@ EXPORT int fmi2SetFMUstate(component c, void *state) {
 }
 
 EXPORT int fmi2FreeFMUstate(component c, void **state) {
-    call this = begin(c, "fmi2FreeFMUstate", MASK_FMUstate);
-    if (GOES_ON(this, wrong_place(state)) && *state != NULL) {
-        void *object = thing_of(*state, STATE);
-        drop(*state);
-        *state = NULL;
-        this.status = free_state(this.instance, object);
-    }
+    call this = enter(c, "fmi2FreeFMUstate", MASK_FMUstate);
+    if (GOES_ON(this, NULL)) free_state(&this, state);
     return end(&this);
 }
 
-/* Both functions below ask for the size; the state must not go away between two questions. */
-static size_t size_of_state(call *this, void *object) {
+static size_t size_of_state(call *this, void *saved) {
     size_t size = 0;
     TO_PYTHONFMU(*this, fmi2SerializedFMUstateSize, (component, void *, size_t *),
-                 (this->instance->slave, object, &size));
+                 (this->instance->slave, saved, &size));
     return size;
 }
 
 EXPORT int fmi2SerializedFMUstateSize(component c, void *state, size_t *size) {
-    call this = begin(c, "fmi2SerializedFMUstateSize", MASK_FMUstate);
-    if (GOES_ON(this, size == NULL ? "NULL" : wrong_state(state))) {
-        *size = size_of_state(&this, thing_of(state, STATE));
+    call this = enter(c, "fmi2SerializedFMUstateSize", MASK_FMUstate);
+    entry *saved;
+    if (GOES_ON(this, wrong_place(size)) && (saved = lock_state(&this, state)) != NULL) {
+        *size = size_of_state(&this, saved->thing);
+        unlock_entry(saved);
     }
     return end(&this);
 }
 
 /* PythonFMU copies as many bytes as it is told, however many there are. */
 EXPORT int fmi2SerializeFMUstate(component c, void *state, char bytes[], size_t size) {
-    call this = begin(c, "fmi2SerializeFMUstate", MASK_FMUstate);
-    if (GOES_ON(this, bytes == NULL ? "NULL" : wrong_state(state))) {
-        void *object = thing_of(state, STATE);
-        py.Py_IncRef(object);
-        size_t needed = size_of_state(&this, object);
+    call this = enter(c, "fmi2SerializeFMUstate", MASK_FMUstate);
+    entry *saved;
+    if (GOES_ON(this, wrong_place(bytes)) && (saved = lock_state(&this, state)) != NULL) {
+        size_t needed = size_of_state(&this, saved->thing);
         if (GOES_ON(this, size != needed ? "the state has a different size" : NULL)) {
             TO_PYTHONFMU(this, fmi2SerializeFMUstate, (component, void *, char *, size_t),
-                         (this.instance->slave, object, bytes, size));
+                         (this.instance->slave, saved->thing, bytes, size));
         }
-        py.Py_DecRef(object);
+        unlock_entry(saved);
     }
     return end(&this);
 }
 
 EXPORT int fmi2DeSerializeFMUstate(component c, const char bytes[], size_t size, void **state) {
-    call this = begin(c, "fmi2DeSerializeFMUstate", MASK_FMUstate);
-    if (GOES_ON(this, bytes == NULL ? "NULL" : wrong_place(state)) &&
-        GOES_ON(this, size == 0 || size > MOST_BYTES ? "no state has that size" : NULL)) {
+    call this = enter(c, "fmi2DeSerializeFMUstate", MASK_FMUstate);
+    entry *before;
+    if (GOES_ON(this, wrong_bytes(bytes, size)) && check_place(&this, state, &before)) {
         void *made = NULL;
         TO_PYTHONFMU(this, fmi2DeSerializeFMUstate, (component, const char *, size_t, void **),
                      (this.instance->slave, bytes, size, &made));
-        hand_over(&this, c, made, state);
+        hand_over(&this, made, state, before);
     }
     return end(&this);
 }
@@ -327,7 +273,7 @@ FORWARD(fmi2GetRealOutputDerivatives, MASK_NotSupported, NULL,
         (c, r, n, order, v))
 
 #define STATUS(name, type)                                                                       \
-    FORWARD(name, MASK_Get, v == NULL ? "NULL" : NULL, (component c, int kind, type *v),         \
+    FORWARD(name, MASK_Get, wrong_place(v), (component c, int kind, type *v),         \
             (c, kind, v))
 
 STATUS(fmi2GetStatus, int)
@@ -336,8 +282,8 @@ STATUS(fmi2GetStringStatus, string)
 
 /* PythonFMU's time is also that of a step that was refused, and of the run before a reset. */
 EXPORT int fmi2GetRealStatus(component c, int kind, double *v) {
-    call this = begin(c, "fmi2GetRealStatus", MASK_Get);
-    if (GOES_ON(this, v == NULL ? "NULL" : NULL)) {
+    call this = enter(c, "fmi2GetRealStatus", MASK_Get);
+    if (GOES_ON(this, wrong_place(v))) {
         if (kind == LAST_SUCCESSFUL_TIME) {
             *v = this.instance->last_successful_time;
         } else {
@@ -351,9 +297,9 @@ EXPORT int fmi2GetRealStatus(component c, int kind, double *v) {
 /* No answer: PythonFMU's own is "true" after each refused step, and hosts would end the run as a
  * success; with "false" FMPy would repeat the step without end. */
 EXPORT int fmi2GetBooleanStatus(component c, int kind, int *v) {
-    call this = begin(c, "fmi2GetBooleanStatus", MASK_Get);
+    call this = enter(c, "fmi2GetBooleanStatus", MASK_Get);
     (void)kind;
-    if (GOES_ON(this, v == NULL ? "NULL" : NULL)) {
+    if (GOES_ON(this, wrong_place(v))) {
         *v = 0;
         this.status = FMI_DISCARD;
     }
@@ -361,11 +307,8 @@ EXPORT int fmi2GetBooleanStatus(component c, int kind, int *v) {
 }
 
 static int not_supported(component c, string function) {
-    call this = begin(c, function, MASK_NotSupported);
-    if (GOES_ON(this, NULL)) {
-        complain(this.instance, FMI_ERROR, "FMI function not supported: %s", function);
-        this.status = FMI_ERROR;
-    }
+    call this = enter(c, function, MASK_NotSupported);
+    if (GOES_ON(this, NULL)) refuse_unsupported(&this, FMI_ERROR);
     return end(&this);
 }
 

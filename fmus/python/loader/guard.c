@@ -1,168 +1,156 @@
-/* The instance that the host holds, and what every call begins and ends with.
+/* The instance that the host holds, its messages, and the ends of every call.
  *
- * A call holds the global interpreter lock from its beginning to its end, and its instance is
- * marked: a call of the same instance from another thread waits, one from the host's logger, which
- * is told what there is to tell after that, is refused.
+ * A call holds the global interpreter lock and its instance. It gives the interpreter lock back
+ * first, then logs, then lets the next call of the instance begin.
  */
 #include <math.h>
-#include <stdarg.h>
-#include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+/* Messages */
+
+/* Notes a message for the end of the call. In a format a percent sign is doubled, if it is not a
+ * slave of somebody else that takes it for a text. Bytes that are no UTF-8 are question marks. */
+static void queue_message(instance *it, int status, string category, string text, int is_format) {
+    int valid = is_utf8(text);
+    queued **place = &it->queue, *made;
+    if (status >= FMI_ERROR) it->has_logged_error = 1;
+    if (!is_wanted(&it->host, status, category)) return;
+    made = malloc(sizeof *made + strlen(category) + 1 + strlen(text));
+    if (made == NULL) return;
+    made->next = NULL;
+    made->status = status;
+    made->text = strcpy(made->category, category) + strlen(category) + 1;
+    char *end = made->text;
+    for (; *text != '\0'; text++) {
+        *end++ = valid || (unsigned char)*text < 0x80 ? *text : '?';
+        if (is_format && text[0] == '%' && text[1] == '%') text++;
+    }
+    *end = '\0';
+    while (*place != NULL) place = &(*place)->next;
+    *place = made;
+}
+
+static void log_message(instance *it, int status, string text) {
+    queue_message(it, status, CATEGORIES[status], text, 0);
+}
+
+static void log_queue(instance *it) {
+    while (it->queue != NULL) {
+        queued *first = it->queue;
+        it->queue = first->next;
+        log_to_host(&it->host, first->status, first->category, first->text);
+        free(first);
+    }
+}
+
+/* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
+static void call_logger(const logger *host, string name, int status, string category, string text) {
+    char *format = malloc(2 * strlen(text) + 1);
+    if (format == NULL) return;
+    copy_doubled(format, text, '%');
+    ((fmi2_logger)host->function)(host->environment, name, status, category, format);
+    free(format);
+}
+
 /* The logger that PythonFMU gets. An entry of the category "answer" is no message: with it the
  * slave says what PythonFMU cannot, the status of the call, and as the digits of a double's bits
  * the time that it has come to, if that does not follow from the arguments. */
-static void hear(void *environment, string name, int status, string category, string text, ...) {
+static void log_of_slave(void *environment, string name, int status, string category, string text,
+                         ...) {
     instance *it = environment;
+    int known = status >= FMI_OK && status <= FMI_FATAL;
     (void)name;
-    if (category == NULL || strcmp(category, "answer") != 0) {
-        tell(it, status, category, text);
-    } else {
+    if (category != NULL && strcmp(category, "answer") == 0) {
         if (status > it->answer) it->answer = status;
         if (text != NULL && *text != '\0') {
             uint64_t bits = strtoull(text, NULL, 16);
             memcpy(&it->time_told, &bits, sizeof bits);
         }
+    } else if (text != NULL) {
+        if (category == NULL || category[0] == '\0') category = CATEGORIES[known ? status : FMI_OK];
+        queue_message(it, status, category, text, 1);
     }
 }
 
-instance *new_instance(string name, const callbacks *functions, int logging) {
+/* Instances */
+
+static instance *new_instance(string name, const callbacks *functions, int logging) {
     instance *it = calloc(1, sizeof *it);
-    logger host = {NULL, NULL};
     if (it == NULL) return NULL;
-    it->heard = (callbacks){.logger = hear, .environment = it};
-    if (functions != NULL) {
-        host = (logger){(void (*)(void))functions->logger, functions->environment};
-    }
-    if (!listen(&it->host, name, host, logging)) {
-        free(it);
-        return NULL;
-    }
-    return it;
+    it->heard = (callbacks){.logger = log_of_slave, .environment = it};
+    if (listen(&it->host, name, logger_of(functions), logging)) return it;
+    free(it);
+    return NULL;
 }
 
-void release_instance(instance *it) {
-    for (untold *next; it->untold != NULL; it->untold = next) {
-        next = it->untold->next;
-        free(it->untold);
-    }
+static void release_instance(instance *it) {
     release_listener(&it->host);
     free(it);
 }
 
-/* The instance of a handle, once no other thread is in a call of it. */
-static instance *awaited(component handle) {
-    instance *it;
-    while ((it = thing_of(handle, INSTANCE)) != NULL && it->busy &&
-           !pthread_equal(it->thread, pthread_self())) {
-        wait_without_lock();
-    }
-    return it;
-}
+/* Calls */
 
-/* Where the logger is called from. */
-static APART void mark_teller(instance *it) {
-    it->telling = 1;
-    it->teller = pthread_self();
-    it->depth = DEPTH();
-}
-
-static int is_teller(const instance *it) {
-    return it->telling && pthread_equal(it->teller, pthread_self());
-}
-
-/* Whether the logger calls, which this thread tells something. One that has been left does not: the
- * stack does not reach down to it any more. */
-static int is_in_logger(instance *it) {
-    if (!is_teller(it)) return 0;
-    it->telling = DEPTH() < it->depth;
-    return it->telling;
-}
+/* Whether a call may be forwarded: only then are its arguments checked. */
+#define GOES_ON(call, wrong)                                                                     \
+    ((call).instance != NULL && (call).status == FMI_OK && check(&(call), wrong))
 
 /* A host that ends Python first lets its instances go after that: there is nothing left to end. */
-static int lets_go(string function) {
+static int is_an_end(string function) {
     return strcmp(function, "fmi2Terminate") == 0 || strcmp(function, "fmi2FreeInstance") == 0;
 }
 
-call begin(component handle, string function, int allowed) {
-    call this = {.function = function, .status = FMI_ERROR, .handle = handle};
-    string wrong = "not a live instance of this FMU";
-    instance *it = NULL;
-    if (python_runs()) {
-        this.lock = py.PyGILState_Ensure();
-        it = awaited(handle);
-        if (it != NULL) wrong = it->busy || is_in_logger(it) ? "called by the logger" : NULL;
-        if (wrong != NULL) py.PyGILState_Release(this.lock);
-    } else if (has_loaded()) {
-        if (lets_go(function)) this.status = FMI_OK;
-        wrong = "the host has ended Python";
-    }
-    if (wrong != NULL) {
-        /* There is no one else to tell: a logger that calls would do so again. */
-        if (this.status != FMI_OK) fprintf(stderr, "%s: %s\n", function, wrong);
+/* Begins a call with the interpreter lock, if Python runs: before that there is no instance. */
+static call enter(component handle, string function, int allowed) {
+    call this = {.function = function, .status = is_an_end(function) ? FMI_OK : FMI_ERROR};
+    int lock = 0, has_lock = pythonfmu != NULL;
+    if (has_lock && !py.Py_IsInitialized()) {
+        if (this.status != FMI_OK) fprintf(stderr, "%s: %s\n", function, ENDED);
         return this;
     }
-    this.instance = it;
-    it->answer = FMI_OK;
-    it->time_told = NAN;
-    it->busy = 1;
-    it->thread = pthread_self();
-    if (it->condition == LOST) {
-        this.status = FMI_FATAL;
-    } else if (it->condition == SOUND || allowed & WHEN(AFTER_ERROR)) {
-        this.status = FMI_OK;
+    if (has_lock) lock = py.PyGILState_Ensure();
+    this = begin(handle, function, allowed);
+    if (this.instance != NULL) {
+        this.instance->lock = lock;
+        this.instance->answer = FMI_OK;
+        this.instance->time_told = NAN;
+        if (this.instance->is_lost) this.status = FMI_FATAL;
+    } else if (has_lock) {
+        py.PyGILState_Release(lock);
     }
     return this;
 }
 
-/* The arguments are wrong: the instance is in FMI's error state from now on. */
-int refuse(call *this, string wrong) {
-    this->status = FMI_ERROR;
-    this->instance->condition = IN_ERROR;
-    complain(this->instance, FMI_ERROR, "%s: %s", this->function, wrong);
-    return 0;
-}
-
-int sound(call *this, string wrong) { return wrong == NULL || refuse(this, wrong); }
-
 /* Takes on the status that the slave has for a call, where PythonFMU has answered fmi2OK. */
-void take_answer(call *this, int ends_in_error) {
+static void take_answer(call *this, int ends_in_error) {
     if (this->instance->answer > this->status) this->status = this->instance->answer;
-    if (this->instance->answer >= FMI_ERROR && ends_in_error) this->instance->condition = IN_ERROR;
+    if (this->instance->answer >= FMI_ERROR && ends_in_error) this->instance->in_error = 1;
 }
 
-/* Gives the lock back, and tells the host what there is to tell. */
-void give_back_and_tell(call *this) {
+/* Gives the interpreter lock back, and logs what there is to log. */
+static void leave(call *this) {
     instance *it = this->instance;
-    untold *messages = it->untold;
-    logger host = it->host.host;
-    MARGIN(margin);
-    it->untold = NULL;
-    if (messages != NULL) mark_teller(it);
-    py.PyGILState_Release(this->lock);
-    if (messages == NULL) return;
-    tell_all(host, messages);
-    if (!python_runs()) return;
-    this->lock = py.PyGILState_Ensure();
-    /* It may have been freed meanwhile. */
-    if (thing_of(this->handle, INSTANCE) == it && is_teller(it)) it->telling = 0;
-    py.PyGILState_Release(this->lock);
-}
-
-int end(call *this) {
-    instance *it = this->instance;
-    char why[WHY];
-    if (it == NULL) return this->status;
+    message why;
     /* PythonFMU leaves an exception where it does not look for one; a Python host would stumble
      * over it later. */
-    if (exception(why) && this->status < FMI_ERROR) refuse(this, why);
-    if (this->status == FMI_FATAL && it->condition != LOST) {
-        it->condition = LOST;
-        if (!it->told) complain(it, FMI_FATAL, "%s: failed permanently", this->function);
+    if (take_exception(&why) && this->status < FMI_ERROR) check(this, why.text);
+    if (this->status == FMI_FATAL && !it->is_lost) {
+        it->is_lost = 1;
+        if (!it->has_logged_error) {
+            compose(&why, "%s: failed permanently", this->function);
+            log_message(it, FMI_FATAL, why.text);
+        }
     }
-    it->busy = 0;
-    give_back_and_tell(this);
+    py.PyGILState_Release(it->lock);
+    log_queue(it);
+}
+
+/* Lets the next call of the instance begin; the status of this one. */
+static int end(call *this) {
+    if (this->instance != NULL) {
+        leave(this);
+        unlock_entry(this->entry);
+    }
     return this->status;
 }

@@ -1,5 +1,4 @@
 /* The resource location. */
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -10,17 +9,14 @@ static int hex(char digit) {
 }
 
 /* PythonFMU takes the path once more for a URI: it would read another folder. */
-static int read_otherwise(string path) {
+static int is_read_otherwise(string path) {
     return strstr(path, "%20") != NULL || strstr(path, "file://") != NULL;
 }
 
 /* file:///a%20b or file:/a%20b as the plain path /a b, which PythonFMU takes as it is. */
-int plain_path(string uri, char **path, char *why) {
+static int plain_path(string uri, char **path, message *why) {
     char *end = *path = malloc(strlen(uri) + 1);
-    if (end == NULL) {
-        snprintf(why, WHY, "out of memory");
-        return 0;
-    }
+    if (end == NULL) return compose(why, "out of memory");
     if (strncmp(uri, "file://", 7) == 0) {
         uri = strchr(uri + 7, '/') != NULL ? strchr(uri + 7, '/') : uri + 7;
     } else if (strncmp(uri, "file:", 5) == 0) {
@@ -33,18 +29,10 @@ int plain_path(string uri, char **path, char *why) {
         } else {
             *end = *uri++;
         }
-        if (*end++ == '\0') {
-            snprintf(why, WHY, "the resource location has a zero byte in it");
-            return 0;
-        }
+        if (*end++ == '\0') return compose(why, "the resource location has a zero byte in it");
     }
     *end = '\0';
-    if (!is_utf8(*path)) {
-        snprintf(why, WHY, "the resource location is not UTF-8");
-    } else if (read_otherwise(*path)) {
-        snprintf(why, WHY, "the resources folder has %%20 or file:// in its name: rename it");
-    } else {
-        return 1;
-    }
-    return 0;
+    if (!is_utf8(*path)) return compose(why, "the resource location is not UTF-8");
+    return !is_read_otherwise(*path) ||
+           compose(why, "the resources folder has %%20 or file:// in its name: rename it");
 }

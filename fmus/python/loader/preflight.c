@@ -1,6 +1,4 @@
 /* Has preflight.py find out whether PythonFMU can make an instance: it would end the process. */
-#include <stdio.h>
-
 enum { FILE_INPUT = 257 };
 
 extern const char source[] __attribute__((visibility("hidden")));
@@ -26,7 +24,7 @@ static void *function(string name) {
     return py.PyDict_GetItemString(namespace, name);
 }
 
-int preflight(string resources, string guid, char *why) {
+static int preflight(string resources, string guid, message *why) {
     void *refusal = function("refusal");
     void *words = refusal == NULL
                       ? NULL
@@ -34,18 +32,18 @@ int preflight(string resources, string guid, char *why) {
     string text = words == NULL ? NULL : py.PyUnicode_AsUTF8(words);
     int good = text != NULL && text[0] == '\0';
     if (text != NULL && !good) {
-        snprintf(why, WHY, "%s", text);
-    } else if (text == NULL && !exception(why)) {
-        snprintf(why, WHY, "the loader is broken");
+        compose(why, "%s", text);
+    } else if (text == NULL && !take_exception(why)) {
+        compose(why, "the loader is broken");
     }
     py.Py_DecRef(words);
     return good;
 }
 
 /* Takes a resources folder off sys.path, where PythonFMU leaves it. */
-void forget(string resources) {
-    char why[WHY];
+static void forget(string resources) {
+    message unused;
     void *forget = function("forget");
     if (forget != NULL) py.Py_DecRef(py.PyObject_CallFunction(forget, "s", resources));
-    exception(why);
+    take_exception(&unused);
 }

@@ -18,36 +18,32 @@
 
 enum { NEWEST = 13, OLDEST = 9 };
 
-/* Between two looks whether another thread is done [us]. */
-enum { WAIT = 100 };
-
 typedef struct {
     pthread_mutex_t lock; /* for starting; the interpreter lock is never waited for under it */
     enum { UNTRIED, RUNS, FAILED } python;
     /* Under the interpreter lock: */
-    uint64_t serial; /* of the last handle */
-    int making;      /* how many instances a thread makes, one within the other */
+    int making; /* how many instances a thread makes, one within the other */
     pthread_t maker;
     pid_t family; /* the process that it is in: a child that is forked lacks the thread */
-    char why[WHY];
+    message why;
 } process_state;
 
 /* The name carries a number, which another layout raises. Defined without C, because clang gives
  * what C defines another binding. Zeros are a lock that is free, and UNTRIED. */
 enum { ROOM = 4096 };
 _Static_assert(sizeof(process_state) <= ROOM, "the state is larger than its room");
-extern __attribute__((visibility("default"))) process_state auv_fmu_process_2;
+extern __attribute__((visibility("default"))) process_state auv_fmu_process_3;
 __asm__(".pushsection .bss\n"
         ".balign 64\n"
-        ".type auv_fmu_process_2, %gnu_unique_object\n"
-        ".size auv_fmu_process_2, 4096\n"
-        "auv_fmu_process_2: .zero 4096\n"
+        ".type auv_fmu_process_3, %gnu_unique_object\n"
+        ".size auv_fmu_process_3, 4096\n"
+        "auv_fmu_process_3: .zero 4096\n"
         ".popsection");
-#define process auv_fmu_process_2
-
-python_functions py;
+#define process auv_fmu_process_3
 
 static _Atomic(void *) pythonfmu;
+
+static const char ENDED[] = "the host has ended Python";
 
 /* PythonFMU's own library, found while the current folder is that in which this one was. */
 static char companion[PATH_MAX];
@@ -75,7 +71,7 @@ static int note_libpython(struct dl_phdr_info *info, size_t size, void *path) {
     return 1;
 }
 
-static int find_python(char *why) {
+static int find_python(message *why) {
     char path[PATH_MAX] = "";
     /* A libpython that the host has loaded only for itself is made visible: a second one of
      * another version in the same process would not do. */
@@ -87,18 +83,16 @@ static int find_python(char *why) {
         dlopen(path, RTLD_LAZY | RTLD_GLOBAL);
     }
     if (!has_python()) {
-        snprintf(why, WHY,
-                 "no Python in this process: install a libpython3.%d to libpython3.%d where the "
-                 "dynamic linker finds it (Debian: apt install libpython3-dev)",
-                 OLDEST, NEWEST);
-        return 0;
+        return compose(why,
+                       "no Python in this process: install a libpython3.%d to libpython3.%d where "
+                       "the dynamic linker finds it (Debian: apt install libpython3-dev)",
+                       OLDEST, NEWEST);
     }
 #define FIND(type, name, parameters)                                                             \
     py.name = (type(*) parameters)dlsym(RTLD_DEFAULT, #name);                                    \
     if (py.name == NULL) {                                                                       \
-        snprintf(why, WHY, "the Python of this process has no %s: it must be 3.%d to 3.%d",      \
-                 #name, OLDEST, NEWEST);                                                         \
-        return 0;                                                                                \
+        return compose(why, "the Python of this process has no %s: it must be 3.%d to 3.%d",     \
+                       #name, OLDEST, NEWEST);                                                   \
     }
     PYTHON_FUNCTIONS(FIND)
 #undef FIND
@@ -113,10 +107,9 @@ typedef struct {
 } preconfiguration;
 
 static int succeeded(python_status status) {
-    if (status.type == 0) return 1;
-    snprintf(process.why, WHY, "Python does not start: %s",
-             status.message != NULL ? status.message : "no reason given");
-    return 0;
+    return status.type == 0 ||
+           compose(&process.why, "Python does not start: %s",
+                   status.message != NULL ? status.message : "no reason given");
 }
 
 static int start(void) {
@@ -140,54 +133,52 @@ static int start(void) {
     return 1;
 }
 
-static int start_python(char *why) {
+static int start_python(message *why) {
     if (process.python == UNTRIED) {
         process.python = py.Py_IsInitialized() || start() ? RUNS : FAILED;
     }
-    if (process.python == FAILED) snprintf(why, WHY, "%s", process.why);
-    return process.python == RUNS;
+    return process.python == RUNS || compose(why, "%s", process.why.text);
 }
 
-static int load_pythonfmu(char *why) {
+static int load_pythonfmu(message *why) {
     void *library = companion[0] == '\0' ? NULL : dlopen(companion, RTLD_NOW | RTLD_LOCAL);
     if (library == NULL) {
-        snprintf(why, WHY, "cannot load PythonFMU's library: %s",
-                 companion[0] == '\0' ? "its path is too long" : dlerror());
-    } else if (dlsym(library, "finalizePythonInterpreter") == NULL) {
-        snprintf(why, WHY, "the library next to the loader is not PythonFMU's");
-    } else {
-        pythonfmu = library;
+        return compose(why, "cannot load PythonFMU's library: %s",
+                       companion[0] == '\0' ? "its path is too long" : dlerror());
     }
-    return pythonfmu != NULL;
+    if (dlsym(library, "finalizePythonInterpreter") == NULL) {
+        return compose(why, "the library next to the loader is not PythonFMU's");
+    }
+    pythonfmu = library;
+    return 1;
 }
 
 /* Brings Python and PythonFMU into the process, if they are not. */
-int loaded(char *why) {
+static int load(message *why) {
     if (pythonfmu == NULL) {
         pthread_mutex_lock(&process.lock);
         (void)(pythonfmu != NULL ||
                (find_python(why) && start_python(why) && load_pythonfmu(why)));
         pthread_mutex_unlock(&process.lock);
     }
-    if (pythonfmu != NULL && !py.Py_IsInitialized()) {
-        snprintf(why, WHY, "the host has ended Python");
-        return 0;
-    }
-    return pythonfmu != NULL;
+    if (pythonfmu == NULL) return 0;
+    return py.Py_IsInitialized() || compose(why, "%s", ENDED);
 }
 
-int has_loaded(void) { return pythonfmu != NULL; }
+static void *pythonfmu_function(string name) { return dlsym(pythonfmu, name); }
 
-int python_runs(void) { return has_loaded() && py.Py_IsInitialized(); }
+/* Lets other threads have the interpreter lock for a while. */
+static void give_way(void) {
+    void *thread = py.PyEval_SaveThread();
+    wait_a_moment();
+    py.PyEval_RestoreThread(thread);
+}
 
-void *pythonfmu_function(string name) { return dlsym(pythonfmu, name); }
-
-/* Waits until no other thread makes an instance, of any FMU, which changes sys.path. The interpreter
- * lock is given away meanwhile: a thread that makes one needs it. */
-void begin_making(void) {
+/* Waits until no other thread makes an instance, of any FMU, which changes sys.path. */
+static void begin_making(void) {
     while (process.making > 0 && process.family == getpid() &&
            !pthread_equal(process.maker, pthread_self())) {
-        wait_without_lock();
+        give_way();
     }
     if (process.family != getpid()) process.making = 0;
     process.family = getpid();
@@ -195,25 +186,16 @@ void begin_making(void) {
     process.making++;
 }
 
-void end_making(void) { process.making--; }
-
-/* Lets other threads have the interpreter lock for a while. */
-void wait_without_lock(void) {
-    void *thread = py.PyEval_SaveThread();
-    usleep(WAIT);
-    py.PyEval_RestoreThread(thread);
-}
-
-uint64_t next_serial(void) { return ++process.serial; }
+static void end_making(void) { process.making--; }
 
 /* Whether a Python exception is set, in words; it is set no longer. */
-int exception(char *why) {
+static int take_exception(message *why) {
     void *type = NULL, *value = NULL, *trace = NULL;
     if (py.PyErr_Occurred() == NULL) return 0;
     py.PyErr_Fetch(&type, &value, &trace);
     void *words = py.PyObject_Repr(value != NULL ? value : type);
     string text = words != NULL ? py.PyUnicode_AsUTF8(words) : NULL;
-    snprintf(why, WHY, "%s", text != NULL ? text : "an exception without a message");
+    compose(why, "%s", text != NULL ? text : "an exception without a message");
     py.PyErr_Clear();
     py.Py_DecRef(words);
     py.Py_DecRef(trace);

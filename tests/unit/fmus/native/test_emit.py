@@ -570,6 +570,11 @@ CONSTRUCTS = {
         "def f(k: int, x: float) -> float:\n    match k:\n        case 1 | _ if x > 1.0:\n"
         "            x = 2.0\n        case 1 | _:\n            x = 1.0 / x\n    return x\n"
     ),
+    "zip that ends with a range": (
+        "def f(v: Annotated[Vector, 3], x: float) -> tuple[float, Annotated[Vector, 3]]:\n"
+        "    for a, k, i in zip(v, range(3), range(3)):\n        x += a * k + i\n"
+        "    return x, Vector(a * k + x for a, k in zip(v, range(4)))\n"
+    ),
     "sums and tests in loops": (
         "def f(x: float, v: Annotated[Vector, 4], k: int) -> tuple[int, bool, bool, float, int]:\n"
         "    def near(a: float) -> bool:\n        return abs(a - x) < 1.0\n"

@@ -25,10 +25,11 @@ from auv_fmu.water.sea import Sea
 from auv_fmu.water.waves import MOST as MOST_WAVES
 from auv_fmu.water.waves import Spectrum, Waves
 from fmus.discovery import source_of
+from fmus.language.build import program_of
 from fmus.language.types import type_of
 from fmus.native.emit import Emitter, strip_sphinx_marks
 from fmus.native.tables import tables
-from fmus.native.translator import _drawn, translated
+from fmus.native.translator import _drawn, deepest, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.callbacks import LONGEST_MESSAGE, Callbacks
@@ -44,6 +45,7 @@ from support.equations import (
     is_series,
     structure,
 )
+from support.language import HEAD, module_of
 from support.settings import NAMES, behaviour_of, parameters_of, ports_of
 
 #: Where equations live, and where they overflow.
@@ -470,3 +472,30 @@ def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
     parameters.noise.seed = seed
     both.library.seed.restype = c_ulong
     assert both.library.seed(byref(parameters), byref(Error())) == seed % 2**32
+
+
+#: Functions within each other.
+DEEP = """
+M = Matrix((0.0 for _ in range(100)) for _ in range(10))
+
+
+def own_sum(a: Annotated[Vector, 100], b: Annotated[Vector, 100]) -> Annotated[Vector, 100]:
+    c, d = a, b
+    return c
+
+
+def start(x: Annotated[Vector, 100]) -> Annotated[Vector, 10]:
+    y = own_sum(own_sum(x, x), x)
+    return M @ y
+"""
+
+
+def test_depth_is_that_of_the_calls_within_each_other(tmp_path):
+    """What start holds: x, y, its result, two sums and a product; own_sum: two arguments, c and d.
+
+    The matrix is not copied.
+    """
+    module = module_of(HEAD + DEEP, tmp_path, "deep")
+    size, function = deepest(program_of(module.start).functions.values())
+    assert function is not None and function.name == "start"
+    assert size == 8 * (100 + 100 + 10 + 2 * 100 + 10 + 2 * 100 + 2 * 100)

@@ -208,7 +208,7 @@ def test_without_a_loader_a_step_tells_the_first_refusal(slave):
     slave.set_real([0], [nan])
     slave.get_string([0])
     assert not slave.do_step(0.0, 0.1)
-    assert slave._untold == "fmi2SetupExperiment is not allowed when stepping"
+    assert slave._failure == "fmi2SetupExperiment is not allowed when stepping"
 
 
 def test_values_that_give_no_start_are_refused_by_what_needs_one(slave):

@@ -1,3 +1,30 @@
+/* What FMI 2.0 is made of, for both runtimes. */
+#ifndef FMI2_H
+#define FMI2_H
+
+#include "host.h"
+
+enum { CO_SIMULATION = 1 };
+
+/* A kind of fmi2GetRealStatus. */
+enum { LAST_SUCCESSFUL_TIME = 2 };
+
+typedef void (*fmi2_logger)(void *, string, int, string, string, ...);
+
+/* fmi2CallbackFunctions, of which only the logger is used. */
+typedef struct {
+    fmi2_logger logger;
+    void *(*allocate)(size_t, size_t);
+    void (*release)(void *);
+    void (*step_finished)(void *, int);
+    void *environment;
+} callbacks;
+
+static logger logger_of(const callbacks *functions) {
+    if (functions == NULL) return (logger){NULL, NULL};
+    return (logger){(void (*)(void))functions->logger, functions->environment};
+}
+
 /* The functions of FMI 2.0 that only model exchange has: some hosts look for them in every FMU.
  *
  * F(name, parameters): `c` is the instance, and nothing else is looked at. */
@@ -12,3 +39,5 @@
     F(fmi2GetEventIndicators, (void *c, double indicators[], size_t ni))                         \
     F(fmi2GetContinuousStates, (void *c, double x[], size_t nx))                                 \
     F(fmi2GetNominalsOfContinuousStates, (void *c, double x_nominal[], size_t nx))
+
+#endif
