@@ -94,7 +94,7 @@ ABOUT = ("", "Plain", 'ü \\" \\\\ <&> 100 % {t:g} ??/ */', "'")
 MESSAGES = ("again at {t:g} s", "100 % at {t}", "{{t}} is {t:.3f} %d", "ü without a time")
 
 #: Names of fields that C or the runtime has, too.
-NAMES = ("double", "error", "state", "llabs", "math_errhandling", "x_u0302", "self", "made", "n")
+NAMES = ("double", "error", "state", "llabs", "math_errhandling", "x_u0302", "self", "made")
 
 #: Modules of ours and functions in them that are outside the language: the user's own are not.
 HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop", "blocks_of"))
