@@ -32,7 +32,7 @@ static void call_logger(const logger *host, string name, int status, string cate
 }
 
 /* A function that does something unless anything is wrong with its arguments. */
-#define FUNCTION(name, allowed, wrong, parameters, action)                                         \
+#define FUNCTION(name, allowed, wrong, parameters, action)                                       \
     EXPORT int FMI2(name) parameters {                                                           \
         call this = begin(c, #name, allowed);                                                    \
         if (GOES_ON(this, wrong)) {                                                              \
@@ -80,7 +80,7 @@ FUNCTION(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int 
     for (size_t i = 0; i < n; i++) action
 
 #define GET(name, type, action)                                                                  \
-    FUNCTION(name, MASK_Get, wrong_values(n, r, v),                                                \
+    FUNCTION(name, MASK_Get, wrong_values(n, r, v),                                              \
            (void *c, const uint32_t r[], size_t n, type v[]), action)
 #define GET_EACH(name, type, get)                                                                \
     GET(name, type, {                                                                            \
@@ -88,7 +88,7 @@ FUNCTION(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int 
         FOR_EACH(v[i] = get(&this, r[i]));                                                       \
     })
 #define SET(name, type, wrong, action)                                                           \
-    FUNCTION(name, MASK_Set, wrong,                                                                \
+    FUNCTION(name, MASK_Set, wrong,                                                              \
            (void *c, const uint32_t r[], size_t n, const type v[]), action)
 #define SET_EACH(name, c_type, type, number)                                                     \
     SET(name, c_type, wrong_values(n, r, v), {                                                   \

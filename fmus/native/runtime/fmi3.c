@@ -40,7 +40,7 @@ static void call_logger(const logger *host, string name, int status, string cate
     ((fmi3_logger)host->function)(host->environment, status, category, doubled);
 }
 
-/* Turns the named categories on or off, and leaves the others as they are; no names: all of them. */
+/* Turns the named categories on or off, and leaves the others as they are; no names: all. */
 static void switch_categories(call *this, int on, size_t n, const string names[]) {
     enum { ALL = sizeof CATEGORIES / sizeof *CATEGORIES };
     string chosen[ALL];

@@ -53,13 +53,13 @@ typedef struct {
     char text[MOST_TEXT + 1];
 } message;
 
-/* Adds some bytes, which are UTF-8, as far as it has room. */
+/* Adds some bytes as far as it has room: whole characters, if they are UTF-8. */
 static void append_bytes(message *it, string bytes, size_t n) {
     string end = bytes + n;
-    while (bytes < end && it->characters < MOST_CHARACTERS) {
+    while (bytes < end && it->characters < MOST_CHARACTERS && it->length < MOST_TEXT) {
         do {
             it->text[it->length++] = *bytes++;
-        } while (bytes < end && ((unsigned char)*bytes & 0xc0) == 0x80);
+        } while (bytes < end && ((unsigned char)*bytes & 0xc0) == 0x80 && it->length < MOST_TEXT);
         it->characters++;
     }
     it->text[it->length] = '\0';

@@ -19,7 +19,7 @@
     do {                                                                                         \
         static int(*forward) parameters;                                                         \
         if (forward == NULL) forward = (int(*) parameters)pythonfmu_function(#name);             \
-        (call).status = forward == NULL ? FMI_FATAL : forward arguments;                        \
+        (call).status = forward == NULL ? FMI_FATAL : forward arguments;                         \
     } while (0)
 
 /* A function that is forwarded as it is if nothing is wrong with its arguments. */
@@ -29,7 +29,7 @@
         if (GOES_ON(this, wrong)) {                                                              \
             c = this.instance->slave;                                                            \
             TO_PYTHONFMU(this, name, parameters, arguments);                                     \
-            take_answer(&this, !((allowed) & WHEN(AFTER_ERROR)));                                  \
+            take_answer(&this, !((allowed) & WHEN(AFTER_ERROR)));                                \
         }                                                                                        \
         return end(&this);                                                                       \
     }
@@ -273,7 +273,7 @@ FORWARD(fmi2GetRealOutputDerivatives, MASK_NotSupported, NULL,
         (c, r, n, order, v))
 
 #define STATUS(name, type)                                                                       \
-    FORWARD(name, MASK_Get, wrong_place(v), (component c, int kind, type *v),         \
+    FORWARD(name, MASK_Get, wrong_place(v), (component c, int kind, type *v),                    \
             (c, kind, v))
 
 STATUS(fmi2GetStatus, int)

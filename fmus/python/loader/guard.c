@@ -10,8 +10,8 @@
 
 /* Messages */
 
-/* Notes a message for the end of the call. In a format a percent sign is doubled, if it is not a
- * slave of somebody else that takes it for a text. Bytes that are no UTF-8 are question marks. */
+/* Notes a message for the end of the call. Percent signs of a format are doubled; those of slaves
+ * that log plain texts are not. What is not UTF-8 gets question marks. */
 static void queue_message(instance *it, int status, string category, string text, int is_format) {
     int valid = is_utf8(text);
     queued **place = &it->queue, *made;

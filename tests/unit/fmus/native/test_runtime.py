@@ -77,10 +77,10 @@ class Runtime:
         self._library.show_in(c_char_p(directives), c_double(number), text)
         return text.value.decode()
 
-    def text(self, said: str) -> str:
+    def text(self, said: bytes) -> bytes:
         text = create_string_buffer(ROOM)
-        self._library.show_text(c_char_p(said.encode()), text)
-        return text.value.decode()
+        self._library.show_text(c_char_p(said), text)
+        return text.value
 
     def is_utf8(self, content: bytes) -> bool:
         return bool(self._library.utf8(c_char_p(content)))
@@ -237,7 +237,11 @@ def test_refusals_say_the_same_in_both_languages(tmp_path: Path):
 
 
 def test_long_text_is_cut_between_characters(runtime: Runtime):
-    assert runtime.text("𝜃" * 100_000) == "𝜃" * MOST_CHARACTERS
+    assert runtime.text("𝜃".encode() * 100_000) == "𝜃".encode() * MOST_CHARACTERS
+
+
+def test_bytes_that_are_no_text_are_cut_where_the_room_ends(runtime: Runtime):
+    assert runtime.text(b"\x80" * 100_000) == b"\x80" * (ROOM - 1)
 
 
 def can_be_decoded(content: bytes) -> bool:
