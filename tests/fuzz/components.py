@@ -70,10 +70,16 @@ RULES: Mapping[str, Sequence[str]] = {
     MODE: ("(Mode.HIGH if {b} else {m})", "Mode.LOW"),
 }
 LETTERS = {"f": FLOAT, "i": INT, "b": BOOL, "m": MODE}
-#: Types of what `measured` draws.
-DRAWS = (FLOAT, FF, V3, "tuple[tuple[float, float], float]", "Draws")
-
 CONSTANTS = {FLOAT: ("-0.0", "1.25"), INT: ("0", "-3"), BOOL: ("True",), MODE: ("Mode.OFF",)}
+
+#: Types of what `measured` draws, and how their numbers are read.
+DRAWS = {
+    FLOAT: ("n",),
+    FF: ("n[0]", "n[1]"),
+    V3: ("n[0]", "n[1]", "n[2]"),
+    "tuple[tuple[float, float], float]": ("n[0][0]", "n[0][1]", "n[1]"),
+    "Draws": ("n.a", "n.b[0]", "n.b[1]"),
+}
 
 #: A type in the annotation of an argument, a result or a field.
 _TYPE = re.compile(
@@ -81,11 +87,8 @@ _TYPE = re.compile(
     r"(?=[,\]):]| =)"
 )
 
-#: What a mistake begins with.
+#: Where a mistake is, or where something was raised.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
-
-#: Where Python says that something was raised.
-_RAISED = re.compile(r"\S+\.py:\d+: ")
 
 #: What stands in descriptions.
 ABOUT = ("", "Plain", 'ü \\" \\\\ <&> 100 % {t:g} ??/ */', "'")
@@ -280,8 +283,8 @@ class Component:
 
     def _noise(self, fields: Names, parameters: Names) -> Iterator[str]:
         group, hint = self._random.choice([*fields.items()])
-        drawn = self._random.choice(DRAWS)
-        names = _names("", {"n": drawn, group: hint}) | parameters
+        drawn = self._random.choice([*DRAWS])
+        names = _names("", {group: hint}) | dict.fromkeys(DRAWS[drawn], FLOAT) | parameters
         yield _function("seed() -> int:", [f"return {self._random.randint(-5, 5)}"])
         head = f"measured(parameters: Parameters, n: {drawn}, {group}: {hint}) -> {hint}:"
         yield _function(head, [f"return {self._value(hint, names)}"])
@@ -421,7 +424,7 @@ def _trace(library: Library, plan: Sequence[int]) -> list[Any]:
                 straight
             ):
                 found.append(("not restored", library.description.kind))
-        found += [(m.status, m.category, _RAISED.sub("", m.text)) for m in host.messages]
+        found += [(m.status, m.category, _PLACE.sub("", m.text)) for m in host.messages]
     return found
 
 
