@@ -3,9 +3,9 @@
     PYTHONPATH=tests python -m fuzz.components --runs 100
 
 Each is a script made from a seed, with ports, state and noise of any types and any of the hooks.
-Every other one has one type exchanged for another. What is wrong is told with its line. What passes
-has valid descriptions, and both kinds take the same steps: parameters change during the run, and
-from a state that is restored they go on as they did before.
+Every other one has a type exchanged, or another mistake. What is wrong is told with its line. What
+passes has valid descriptions, and both kinds take the same steps: parameters change during the run,
+and from a state that is restored they go on as they did before.
 """
 
 from __future__ import annotations
