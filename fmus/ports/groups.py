@@ -291,7 +291,7 @@ def ports_in(field: Field) -> Sequence[Port]:
 class ParameterSet(Generic[T]):
     """Ports of the parameters that make one parameter set of the equations, field by field."""
 
-    def __init__(self, made: Callable[..., T], **fields: Field) -> None:
+    def __init__(self, made: Callable[..., T], /, **fields: Field) -> None:
         """Declare the set.
 
         Args:

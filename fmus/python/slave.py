@@ -130,26 +130,29 @@ def _plain(said: Behaviour, hook: str) -> Iterator[str]:
 
 
 def _known(said: Behaviour, hook: str) -> Iterator[str]:
-    """How what a hook needs is found out, once; with a guard that is of which state it is.
-
-    The name `known` is then for what is derived.
-    """
+    """How what a hook needs is found out, once."""
     derive = _call(said, "derive") if "derived" in said.arguments(hook) else "None"
     if said.hooks["credible"]:
-        yield "if derived is None:"
-        yield f"    good = {_call(said, 'credible')}"
-        yield f"    if not good: state = {_call(said, 'restarted')}"
-        yield f"    derived = good, state, {derive}"
-        yield "good, state, known = derived"
+        yield from _guarded(said, derive)
     elif derive != "None":
         yield f"if derived is None: derived = {derive}"
+
+
+def _guarded(said: Behaviour, derive: str) -> Iterator[str]:
+    """How a guard finds out, once, of which state something is derived; that is `known` then."""
+    yield "if derived is None:"
+    yield f"    good = {_call(said, 'credible')}"
+    yield f"    if not good: state = {_call(said, 'restarted')}"
+    yield f"    derived = good, state, {derive}"
+    yield "good, state, known = derived"
 
 
 def _advance(said: Behaviour) -> Iterator[str]:
     """How a run goes on."""
     derived = "derived"
     if said.hooks["credible"]:
-        yield from _known(said, "update")
+        # It is told before `derive`, which may refuse the step.
+        yield from _guarded(said, "None")
         yield "if not good: self.log_once(RESTARTED.format(t=t), warning, RESTARTED)"
         derived = "known"
     t, indent = "t", ""

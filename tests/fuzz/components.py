@@ -3,9 +3,9 @@
     PYTHONPATH=tests python -m fuzz.components --runs 100
 
 Each is a script made from a seed, with ports, state and noise of any types and any of the hooks.
-Every other one has one type exchanged for another. What is wrong is told with its line. What passes
-has valid descriptions, and both kinds take the same steps: parameters change during the run, and
-from a state that is restored they go on as they did before.
+Every other one has a type exchanged, or another mistake. What is wrong is told with its line. What
+passes has valid descriptions, and both kinds take the same steps: parameters change during the run,
+and from a state that is restored they go on as they did before.
 """
 
 from __future__ import annotations
@@ -51,13 +51,35 @@ TYPES = (FLOAT, INT, BOOL, MODE, *PARTS)
 
 #: What a number is made of others by.
 RULES: Mapping[str, Sequence[str]] = {
-    FLOAT: ("0.5 * {f} - 0.25 * {f}", "({f} if {b} else 0.5 * {f})", "{f} / (2.0 + abs({f}))"),
-    INT: ("({i} % 1000 + 3 * ({i} % 1000)) % 997", "int({f} % 50.0)", "max({i} % 7, -2)"),
+    FLOAT: (
+        "0.5 * {f} - 0.25 * {f}",
+        "({f} if {b} else 0.5 * {f})",
+        "{f} / (2.0 + abs({f}))",
+        "1e305 * {f} * {f}",
+        "white_noise({f})",
+        "TABLE[{i} % 3]",
+    ),
+    INT: (
+        "({i} % 1000 + 3 * ({i} % 1000)) % 997",
+        "int({f} % 50.0)",
+        "max({i} % 7, -2)",
+        "min({i} % 5, int({b}))",
+        "({m} + {i} % 9) % 100",
+    ),
     BOOL: ("{f} < {f}", "not {b}", "{i} % 3 == {i} % 2", "{m} == Mode.LOW"),
     MODE: ("(Mode.HIGH if {b} else {m})", "Mode.LOW"),
 }
 LETTERS = {"f": FLOAT, "i": INT, "b": BOOL, "m": MODE}
 CONSTANTS = {FLOAT: ("-0.0", "1.25"), INT: ("0", "-3"), BOOL: ("True",), MODE: ("Mode.OFF",)}
+
+#: Types of what `measured` draws, and how their numbers are read.
+DRAWS = {
+    FLOAT: ("n",),
+    FF: ("n[0]", "n[1]"),
+    V3: ("n[0]", "n[1]", "n[2]"),
+    "tuple[tuple[float, float], float]": ("n[0][0]", "n[0][1]", "n[1]"),
+    "Draws": ("n.a", "n.b[0]", "n.b[1]"),
+}
 
 #: A type in the annotation of an argument, a result or a field.
 _TYPE = re.compile(
@@ -65,11 +87,41 @@ _TYPE = re.compile(
     r"(?=[,\]):]| =)"
 )
 
-#: What a mistake begins with.
+#: Where a mistake is, or where something was raised.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
 
 #: What stands in descriptions.
 ABOUT = ("", "Plain", 'ü \\" \\\\ <&> 100 % {t:g} ??/ */', "'")
+
+#: What may be logged at a restart.
+MESSAGES = ("again at {t:g} s", "100 % at {t}", "{{t}} is {t:.3f} %d", "ü without a time")
+
+#: Names of fields that C or the runtime has, too.
+NAMES = ("double", "error", "state", "llabs", "math_errhandling", "x_u0302", "self", "made")
+
+#: Modules of ours and functions in them that are outside the language: the user's own are not.
+HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop", "blocks_of"))
+
+#: What is refused, or means the same in both kinds.
+MISTAKES = (
+    ("HIGH = 7", "HIGH = 2147483648"),
+    ("HIGH = 7", "HIGH = 4294967303"),
+    ("HIGH = 7", "HIGH = -5000000000"),
+    ("] = 4\n", "] = True\n"),
+    ("] = 4\n", "] = Mode.HIGH\n"),
+    ("] = 0.25\n", "] = 1\n"),
+    ('"double")', '"x")'),
+    ('"double")', "'a\"b')"),
+    ('"double")', '"back\\\\slash")'),
+    ('"double")', '"two\\nlines")'),
+    ('description="', 'description="\\x0b'),
+    ('description="', 'description="two\\nlines'),
+    ("Mode.LOW", "(Mode.LOW + 1) % 3"),
+    ("Mode.OFF", "0"),
+    ("] = 0\n", "] = False\n"),
+    ("SAMPLED = True", "SAMPLED = 1"),
+    ("{t:g}", "{t!r}"),
+)
 
 HEAD = '''\
 """A random component."""
@@ -77,9 +129,14 @@ HEAD = '''\
 from __future__ import annotations
 
 from enum import IntEnum
+from pathlib import Path
 from typing import Annotated, NamedTuple
 
+from HELPER import white_noise
+
 from auv_fmu import Matrix, Refusal, Variable, Vector
+
+TABLE = tuple(map(float, Path(__file__).with_name("table.txt").read_text().split()))
 
 
 class Mode(IntEnum):
@@ -96,7 +153,34 @@ class Pair(NamedTuple):
     a: Annotated[float, Variable("m")] = 0.25
     n: Annotated[int, Variable()] = 4
     on: Annotated[bool, Variable()] = True
+
+
+class Draws(NamedTuple):
+    """Numbers for noise."""
+
+    a: float
+    b: Annotated[Vector, 2]
+
+
+def _shown() -> str:
+    """What no hook calls may be any Python."""
+    with open(__file__) as file:
+        return {"text": file.read()}["text"]
+
+
+if __name__ == "__main__":
+    print(*(line for line in _shown()))
 '''
+
+#: What lies beside it.
+HELPER = """\
+def white_noise(x: float, limit: float = 2.0) -> float:
+    assert x < 59.0, f"{x:g} is too large"
+    while True:
+        if x <= limit:
+            return x
+        x = x * 0.5
+"""
 
 #: What a hook returns, and the types of what it may take.
 RETURNS = {"start": "State", "update": "State", "derive": "Derived", "outputs": "Outputs"}
@@ -118,8 +202,14 @@ class Component:
     def text(self) -> str:
         """The script."""
         draw = self._random
+        odd = draw.sample(NAMES, len(NAMES))
         groups = {
-            name: {f"{name[0].lower()}{i}": draw.choice(TYPES) for i in range(draw.randint(1, 4))}
+            name: {
+                odd.pop() if odd and draw.random() < 0.2 else f"{name[0].lower()}{i}": draw.choice(
+                    TYPES
+                )
+                for i in range(draw.randint(1, 4))
+            }
             for name in ("Parameters", "Inputs", "State", "Outputs", "Derived")
         }
         groups["Parameters"] = {"gain": FLOAT, **groups["Parameters"]}
@@ -146,7 +236,12 @@ class Component:
             names = {name: hint for one in sorted(taken) for name, hint in known[one].items()}
             said = ", ".join(f"{one}: {TAKEN.get(one, FLOAT)}" for one in sorted(taken))
             result = self._made(made, groups[made], names)
-            parts += [_function(f"{hook}({said}) -> {made}:", [f"return {result}"])]
+            lines = [f"return {result}"]
+            if draw.random() < 0.3:
+                test, value = self._number(BOOL, names, 2), self._number(FLOAT, names)
+                text = f"{{{value}:g}} is refused: {{{self._number(INT, names)}}} %"
+                lines.insert(0, f"if {test} and {value} > 3.0:\n        raise Refusal(f'{text}')")
+            parts += [_function(f"{hook}({said}) -> {made}:", lines)]
         if restarts:
             parts += self._restart(groups["State"], known["state"], known["inputs"])
         if draw.random() < 0.7:
@@ -180,7 +275,7 @@ class Component:
 
     def _restart(self, fields: Names, state: Names, inputs: Names) -> Iterator[str]:
         test = self._number(BOOL, state)
-        yield 'RESTARTED = "again at {t:g} s"\n'
+        yield f'RESTARTED = "{self._random.choice(MESSAGES)}"\n'
         yield _function("credible(state: State) -> bool:", [f"return {test}"])
         made = self._made("State", fields, state | inputs)
         head = "restarted(state: State, inputs: Inputs) -> State:"
@@ -188,8 +283,8 @@ class Component:
 
     def _noise(self, fields: Names, parameters: Names) -> Iterator[str]:
         group, hint = self._random.choice([*fields.items()])
-        drawn = self._random.choice((FLOAT, FF, V3))
-        names = _names("", {"n": drawn, group: hint}) | parameters
+        drawn = self._random.choice([*DRAWS])
+        names = _names("", {group: hint}) | dict.fromkeys(DRAWS[drawn], FLOAT) | parameters
         yield _function("seed() -> int:", [f"return {self._random.randint(-5, 5)}"])
         head = f"measured(parameters: Parameters, n: {drawn}, {group}: {hint}) -> {hint}:"
         yield _function(head, [f"return {self._value(hint, names)}"])
@@ -232,13 +327,30 @@ def _function(head: str, lines: Sequence[str]) -> str:
 
 
 def text_of(seed: int) -> str:
-    """The component of a seed; of an odd one with one type exchanged."""
-    text, draw = Component(seed).text(), Random(seed)
+    """The component of a seed; of an odd one with a type exchanged, or another mistake."""
+    draw = Random(seed)
+    module, function = draw.choice(HELPERS)
+    text = Component(seed).text().replace("HELPER", module).replace("white_noise", function)
     if seed % 2:
-        place = draw.choice([found for found in _TYPE.finditer(text) if found.start() > len(HEAD)])
+        places = [(found.span(), "") for found in _TYPE.finditer(text, text.index("class Draws"))]
+        if seed % 4 == 3:
+            places = [
+                (m.span(), new) for old, new in MISTAKES for m in re.finditer(re.escape(old), text)
+            ]
         other = draw.choice((*TYPES, "State", "Inputs", "Outputs", "Parameters", "None", "str"))
-        text = text[: place.start()] + other + text[place.end() :]
+        (start, end), new = draw.choice(places)
+        text = text[:start] + (new or other) + text[end:]
     return text
+
+
+def files_of(seed: int) -> Mapping[str, str]:
+    """The texts of all files of the component of a seed."""
+    module, function = Random(seed).choice(HELPERS)
+    return {
+        f"random_{seed}.py": text_of(seed),
+        f"{module}.py": HELPER.replace("white_noise", function),
+        "table.txt": "0.25 -0.0 1e9\n",
+    }
 
 
 # Trials
@@ -246,17 +358,18 @@ def text_of(seed: int) -> str:
 
 def finding(seed: int) -> str:
     """What is wrong with the component of a seed; empty: nothing."""
-    name = f"random_{seed}"
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
-        script = folder / f"{name}.py"
-        script.write_text(text_of(seed), encoding="utf-8")
+        files = files_of(seed)
+        for name, text in files.items():
+            (folder / name).write_text(text, encoding="utf-8")
         (folder / "checked").mkdir()
         try:
-            return _finding(script, folder, seed)
+            return _finding(folder / f"random_{seed}.py", folder, seed)
         finally:
             sys.path.remove(str(folder.resolve()))
-            sys.modules.pop(name, None)
+            for name in files:
+                sys.modules.pop(name.removesuffix(".py"), None)
 
 
 def _finding(script: Path, folder: Path, seed: int) -> str:
@@ -311,6 +424,7 @@ def _trace(library: Library, plan: Sequence[int]) -> list[Any]:
                 straight
             ):
                 found.append(("not restored", library.description.kind))
+        found += [(m.status, m.category, _PLACE.sub("", m.text)) for m in host.messages]
     return found
 
 

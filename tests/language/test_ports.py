@@ -22,6 +22,7 @@ from fmus.script import source_of_script
 from fmus.trial import run
 from fuzz.components import difference
 from support.language import module_of
+from support.tiers import slow
 
 PORTS = Path(__file__).parent / "ports"
 
@@ -86,6 +87,9 @@ CHANGES: Mapping[str, tuple[Change, ...]] = {
 
 each = pytest.mark.parametrize("name", CHANGES)
 
+#: Together they have most of what the language has.
+QUICK = ("battery_modes", "mpc")
+
 
 def natural(name: str) -> str:
     return (PORTS / f"{name}.py").read_text(encoding="utf-8")
@@ -142,7 +146,7 @@ def test_numbers_are_those_of_the_textbook(script: Path, tmp_path: Path, name: s
 
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
-@each
+@pytest.mark.parametrize("name", [*QUICK, *slow(*sorted(CHANGES.keys() - {*QUICK}))])
 def test_both_kinds_agree_bit_for_bit(script: Path, tmp_path: Path, name: str):
     (tmp_path / "checked").mkdir()
     assert check.mistakes(script, tmp_path / "checked") == []

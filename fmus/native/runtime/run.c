@@ -234,9 +234,11 @@ static int advance(instance *it, double time, double step, message *why) {
     }
     error.raised = 0;
     if (MODEL_HAS_GUARD && !model_credible(parameters, state, inputs, &error) && !error.raised) {
-        compose(&said, MODEL_RESTARTED, time);
-        log_once(it, &said, FMI_WARNING, MODEL_RESTARTED);
         model_restart(parameters, state, inputs, &error);
+        if (!error.raised) {
+            compose(&said, MODEL_RESTARTED, time);
+            log_once(it, &said, FMI_WARNING, MODEL_RESTARTED);
+        }
     }
     double h = step / n;
     for (int i = 0; i < n && !error.raised; i++) {
