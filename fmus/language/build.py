@@ -1079,7 +1079,7 @@ class _Builder:
         if value.type in (TEXT, BOOL) and not how:
             return value, ""
         if is_whole(value.type) and how in ("", "d"):
-            return value, "d"
+            return _as_int(value), "d"
         if is_number(value.type) and NUMBER_FORMAT.fullmatch(how):
             return self._float(value), how
         name = ast.unparse(part.value)

@@ -794,7 +794,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("_ = y\n    y = _", "a value of _ is not in the language"),
         ("y = 1.0 * len(y)", "len of a number"),
         ("y = 1.0 if y > 0.0 and len(A[int(y)]) > 2 else 2.0", "this is computed only in some cas"),
-        ("y = 1.0 * _nothing(y)", "nothing where a number is wanted"),
+        ("y = 1.0 * _nothing(y)", "what returns nothing is used as a value"),
         ("k = _nothing(y)", "what returns nothing is used as a value"),
         ("y = _none(y)", "_none returns a value, and its type is None"),
         ("y = _any(v, 5.0)", "arguments other than v"),
