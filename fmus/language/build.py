@@ -1230,6 +1230,8 @@ class _Builder:
             raise _Outside(node, said) from None
         finally:
             self._depth -= 1
+        # Found now, of parts that know it, it takes no deep recursion later.
+        found.fails  # noqa: B018
         if found.type == UNKNOWN:
             raise _Follows
         if found.type == NOTHING != wanted:
