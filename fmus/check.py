@@ -9,7 +9,6 @@ imports the component.
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import redirect_stdout
@@ -21,14 +20,12 @@ from types import FunctionType
 from fmus.compilers import Compiler, check_sources
 from fmus.discovery import Source, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
-from fmus.language.build import Program, Untranslatable
+from fmus.language.build import Program, Untranslatable, position
+from fmus.language.types import PLACED
 from fmus.native.packaging import MAIN, fmu_entries
 from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
 from fmus.script import is_component, no_component, script_in, source_of_script, told
-
-#: Where a line says that it is about.
-_PLACE = re.compile(r"^(.+?:\d+): ")
 
 
 def mistakes(path: Path, folder: Path) -> list[str]:
@@ -52,18 +49,11 @@ def mistakes(path: Path, folder: Path) -> list[str]:
     try:
         for text in _mistakes(script, folder):
             # One line of the script has one mistake: others follow from it.
-            place = _PLACE.match(text)
-            found.setdefault(place[1] if place else text, text)
+            place = PLACED.match(text)
+            found.setdefault(place[0] if place else text, text)
     except RecursionError as error:
         found[""] = told(error, script)
-    return sorted(found.values(), key=_order)
-
-
-def _order(text: str) -> tuple[str, int]:
-    """Line by line of each file; what has no place comes first."""
-    place = _PLACE.match(text)
-    file, _, line = place[1].rpartition(":") if place else ("", "", "0")
-    return file, int(line)
+    return sorted(found.values(), key=position)
 
 
 def _mistakes(script: Path, folder: Path) -> Iterator[str]:

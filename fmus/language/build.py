@@ -164,7 +164,7 @@ class Program:
     @property
     def mistakes(self) -> list[str]:
         """All that is wrong with it: a line each, in the order of files and lines."""
-        return sorted((f"{place}{what}" for place, what in self._mistakes.items()), key=_place)
+        return sorted((f"{place}{what}" for place, what in self._mistakes.items()), key=position)
 
     def check(self) -> None:
         """Refuse a program with mistakes.
@@ -225,9 +225,9 @@ class Program:
         return made
 
 
-def _place(line: str) -> tuple[str, int]:
-    """The file and the line that a mistake is in."""
-    found = PLACED.match(line)
+def position(mistake: str) -> tuple[str, int]:
+    """The file and the line that a mistake is in; one without comes first."""
+    found = PLACED.match(mistake)
     file, _, number = found[0][:-2].rpartition(":") if found else ("", "", "0")
     return file, int(number)
 
@@ -1230,8 +1230,6 @@ class _Builder:
             raise _Outside(node, said) from None
         finally:
             self._depth -= 1
-        # Found now, of parts that know it, it takes no deep recursion later.
-        found.fails  # noqa: B018
         if found.type == UNKNOWN:
             raise _Follows
         if found.type == NOTHING != wanted:

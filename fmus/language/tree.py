@@ -80,16 +80,16 @@ class Expression:
     """A value: its type, and the expressions that it consists of."""
 
     type: Type
+    fails: bool
 
     @cached_property
     def parts(self) -> Sequence[Expression]:
         """In the order in which they are computed."""
         return [*_expressions_in(vars(self).values())]
 
-    @cached_property
-    def fails(self) -> bool:
-        """Whether it can, itself or one of its parts."""
-        return any(part.fails for part in self.parts)
+    def __post_init__(self) -> None:
+        """Find whether it can fail, of parts that know it."""
+        self.fails = any(part.fails for part in self.parts)
 
 
 @dataclass(eq=False)
@@ -151,6 +151,7 @@ class Item(Expression):
         """Find its type."""
         assert isinstance(self.owner.type, Array)
         self.type = self.owner.type.item
+        super().__post_init__()
 
 
 @dataclass(eq=False)
@@ -169,10 +170,10 @@ class Operation(Expression):
     operands: Sequence[Expression]
     type: Type
 
-    @cached_property
-    def fails(self) -> bool:
-        """Whether the operator or an operand can."""
-        return self.operator.fails or super().fails
+    def __post_init__(self) -> None:
+        """Fail as the operator or an operand does."""
+        super().__post_init__()
+        self.fails |= self.operator.fails
 
 
 @dataclass(eq=False)
@@ -186,6 +187,7 @@ class Choice(Expression):
     def __post_init__(self) -> None:
         """Find its type."""
         self.type = self.one.type
+        super().__post_init__()
 
 
 @dataclass(eq=False)
@@ -196,13 +198,10 @@ class Call(Expression):
     arguments: Sequence[Expression]
 
     def __post_init__(self) -> None:
-        """Find its type."""
+        """Find its type; fail as the function or an argument does."""
         self.type = self.function.returns
-
-    @cached_property
-    def fails(self) -> bool:
-        """Whether the function or an argument can."""
-        return self.function.fails or super().fails
+        super().__post_init__()
+        self.fails |= self.function.fails
 
 
 @dataclass
@@ -382,6 +381,17 @@ def stored_in(statement: Statement) -> list[str]:
     if isinstance(statement, Store):
         return [name for name, _ in statement.values]
     return [statement.name] if isinstance(statement, (Reserve, StoreItem)) else []
+
+
+def variables_in(body: Sequence[Statement]) -> dict[str, Type]:
+    """The variables that a block gives a value, with their types."""
+    found: dict[str, Type] = {}
+    for one in statements_in(body):
+        if isinstance(one, Store):
+            found |= {name: value.type for name, value in one.values}
+        elif isinstance(one, Reserve):
+            found[one.name] = one.type
+    return found
 
 
 def may_fail(statement: Statement) -> bool:

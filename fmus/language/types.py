@@ -14,7 +14,7 @@ from auv_fmu.language.arrays import Matrix, Vector
 from fmus.ports.groups import hints_of, is_class, is_record
 
 #: How a text begins that says where it is about.
-PLACED = re.compile(r".+:\d+: ")
+PLACED = re.compile(r".+?:\d+: ")
 
 #: A vector or matrix may be copied to the stack, which has 1 MB in Windows.
 _MOST_NUMBERS = 65_536

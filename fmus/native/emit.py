@@ -440,7 +440,7 @@ class _Body:
 
     def _zero(self, name: str, statements: Sequence[Statement]) -> str:
         """The declaration of a variable that gets its value in a block below."""
-        type_ = _types(statements)[name]
+        type_ = tree.variables_in(statements)[name]
         value = "0" if isinstance(type_, Scalar) else "{0}"
         return f"{self._emitter.declared(type_)}{in_c(name)} = {value};"
 
@@ -583,15 +583,6 @@ def _stores(statements: Sequence[Statement]) -> Iterator[str]:
     """The variables that are given a value, each time; those of an element twice."""
     for one in tree.statements_in(statements):
         yield from tree.stored_in(one) * (1 + isinstance(one, (tree.StoreItem, tree.Reserve)))
-
-
-def _types(statements: Sequence[Statement]) -> dict[str, Type]:
-    """The types of all variables that are given a value."""
-    found: dict[str, Type] = {}
-    for one in tree.statements_in(statements):
-        if isinstance(one, tree.Store):
-            found |= {name: value.type for name, value in one.values}
-    return found
 
 
 def _variables(function: Function) -> Iterator[str]:

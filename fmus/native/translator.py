@@ -341,17 +341,12 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     depths: dict[Function, int] = {}
     for function in functions:
         own, deeper = 0, 0
-        variables: dict[str, Type] = {}
         for one in tree.statements_in(function.body):
-            if isinstance(one, tree.Reserve):
-                variables[one.name] = one.type
-            elif isinstance(one, tree.Store):
-                variables |= {name: value.type for name, value in one.values}
             for each in tree.expressions_of(one):
                 own += _held(each)
                 calls = (part for part in tree.expressions_in(each) if isinstance(part, Call))
                 deeper = max([deeper, *(depths[call.function] for call in calls)])
-        own += sum(map(_result, variables.values()))
+        own += sum(map(_result, tree.variables_in(function.body).values()))
         depths[function] = _passed(function) + own + deeper
     found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
     return max(found, key=itemgetter(0), default=(0, None))
