@@ -348,18 +348,19 @@ def _is_text(node: ast.stmt) -> bool:
     return isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
-def _is_of_loops(name: str, *nodes: ast.AST) -> bool:
-    """Whether a name occurs only in loops that give it a value."""
+def _beyond_loops(*nodes: ast.AST) -> set[str]:
+    """Names that occur elsewhere than in loops which give them their only value."""
+    found: set[str] = set()
     for node in nodes:
-        if isinstance(node, ast.For) and name in _names(node.target):
-            occurs = name in _free(node.iter)
+        if isinstance(node, ast.For):
+            names, again = _names(node.target), {*_stored(*node.body)}
+            found |= {*_free(node.iter)} | names & again
+            found |= _beyond_loops(*node.body) - (names - again)
         elif isinstance(node, (ast.FunctionDef, ast.expr)):
-            occurs = name in (*_free(node), *_stored(node))
+            found |= {*_free(node), *_stored(node)}
         else:
-            occurs = not _is_of_loops(name, *ast.iter_child_nodes(node))
-        if occurs:
-            return False
-    return True
+            found |= _beyond_loops(*ast.iter_child_nodes(node))
+    return found
 
 
 def _constant(node: ast.expr) -> Any:
@@ -388,26 +389,15 @@ class _Loop(NamedTuple):
     bound: Sequence[tuple[str, Expression]]
     is_wide: bool = False
 
-    def made(self, counter: Local, body: Sequence[Statement] = ()) -> tree.For:
+    def made(self, counter: Local, body: Sequence[Statement]) -> tree.For:
         """It as a statement."""
         return tree.For(
             counter.name, self.start, self.stop, self.step, self.turns, body, self.is_wide
         )
 
 
-class _Turns:
-    """A loop on its way: its counter, and whether the value of its name is used after it."""
-
-    def __init__(self, loop: tree.For, counter: Local) -> None:
-        self.loop, self.counter = loop, counter
-        self.escapes = False
-
-
-#: Names that have a value here, with its type, and the loops whose name it is.
-_Known = dict[str, "tuple[Type, frozenset[_Turns]]"]
-
-#: Of a value that is no loop's.
-_PLAIN: frozenset[_Turns] = frozenset()
+#: Names that have a value here, with its type.
+_Known = dict[str, Type]
 
 
 class _Callable(NamedTuple):
@@ -467,11 +457,10 @@ class _Builder:
         #: Variables in the tree, by their names and types.
         self._variables: dict[tuple[str, Type], str] = {}
         self._taken: set[str] = set()
-        #: Loops around the statement, and those whose counter could be their variable.
-        self._loops: list[_Turns] = []
-        #: What is known where each of them is left by `break`.
+        #: Names that are used beyond the loops that give them a value.
+        self._beyond_loops: Set[str] = frozenset()
+        #: What is known where the loops around the statement are left by `break`.
         self._ends: list[_Known | None] = []
-        self._counted: list[_Turns] = []
         #: Variables of the function around this one that only functions called here need.
         self._closure: dict[str, Expression] = {}
         #: Statements before the one on its way; None: part of it may not be computed.
@@ -499,6 +488,7 @@ class _Builder:
         self.names = {*(argument.arg for argument in arguments), *_stored(*node.body)}
         self._taken |= {*self.names, *_names(node)}
         self._counts = Counter(_stored(*node.body))
+        self._beyond_loops = _beyond_loops(*node.body) | {one.arg for one in arguments}
         with self._noting():
             self._check_head(node)
         for argument in arguments:
@@ -521,25 +511,13 @@ class _Builder:
             with self._noting():
                 raise _Outside(node, f"{node.name} may end without a return")
         self.made.returns = self._returns or UNKNOWN
-        self._end(body)
+        self.made.end(body)
 
     def _start(self, arguments: Mapping[str, Type]) -> None:
         """Know the arguments, and the local functions of the function around this one."""
-        self.known = {name: (type_, _PLAIN) for name, type_ in arguments.items()}
-        self.known |= dict.fromkeys(self.functions, (NOTHING, _PLAIN))
+        self.known = {**arguments, **dict.fromkeys(self.functions, NOTHING)}
         self._variables |= {(name, type_): name for name, type_ in arguments.items()}
         self._taken |= arguments.keys()
-
-    def _end(self, body: Sequence[Statement]) -> None:
-        """Give the function its body; the name of a loop that is not needed after it counts."""
-        for turns in self._counted:
-            loop, counter = turns.loop, turns.counter
-            for one in loop.body if not turns.escapes else ():
-                if isinstance(one, tree.Store) and one.values[0][1] is counter:
-                    loop.counter = counter.name = one.values[0][0]
-                    loop.body = [other for other in loop.body if other is not one]
-                    break
-        self.made.end(body)
 
     def _check_head(self, node: ast.FunctionDef) -> None:
         given = node.args
@@ -720,7 +698,7 @@ class _Builder:
         elif not _names(node.test) & {*_stored(*node.body)}:
             raise self._cannot(node, "a while that changes nothing in its condition")
         self._before = None
-        before = self._before_loop(node.body)
+        before = self.known
         test: Expression = Number(True, BOOL)
         with self._noting():
             test = self.condition(node.test)
@@ -752,46 +730,30 @@ class _Builder:
             self._block(node.body)
             self.known = before
             raise
-        before = self._before_loop(node.body, _names(node.target))
-        made = loop.made(counter)
-        turns = _Turns(made, counter)
-        used = {*_free(*node.body), *_stored(*node.body), *(before or {})}
-        names = {name: value for name, value in loop.bound if name in used or loop.turns}
-        stores = [self._store(node, [each]) for each in names.items()]
-        if before is not None:
-            mine = frozenset((turns,))
-            of_loop: _Known = {
-                name: (value.type, _PLAIN if name in before and not before[name][1] else mine)
-                for name, value in names.items()
-            }
-            self.known = {**before, **of_loop}
-        counts = [name for name, value in names.items() if value is counter]
-        if counts and not loop.is_wide and not {*counts} & {*(before or {}), *_stored(*node.body)}:
-            self._counted.append(turns)
-        self._loops.append(turns)
+        before = self.known
+        used = {*_free(*node.body), *_stored(*node.body), *self._beyond_loops}
+        stores = self._turn(node, loop, counter, used)
         self._ends.append(None)
         body = self._block(node.body)
         self._ends.pop()
-        self._loops.pop()
-        made.body = [*stores, *body]
-        self.known = before
         if before is not None:
-            after = {**before, **of_loop}
-            self.known = after if loop.turns else _both(before, after)
-        found.append(made)
+            after = {n: v.type for n, v in loop.bound if n in self._beyond_loops}
+            self.known = {**before, **after}
+            self.known = self.known if loop.turns else _both(before, self.known)
+        found.append(loop.made(counter, [*stores, *body]))
 
-    def _before_loop(self, body: Sequence[ast.stmt], own: Set[str] = frozenset()) -> _Known | None:
-        """What is known before a loop, whose body may give names of earlier loops other values."""
-        again = {*_stored(*body)} - own
-        for name, (type_, loops) in [*(self.known or {}).items()]:
-            if name in again and loops and loops.isdisjoint(self._loops):
-                assert self.known is not None
-                if self.node is not None and _is_of_loops(name, *self.node.body):
-                    self.known = {n: value for n, value in self.known.items() if n != name}
-                else:
-                    self._local(body[0], name)
-                    self._know(name, type_)
-        return self.known
+    def _turn(
+        self, node: ast.AST, loop: _Loop, counter: Local, used: Set[str]
+    ) -> Sequence[Statement]:
+        """The first statements in each turn of a loop: values of names that are used."""
+        bound = dict(loop.bound)
+        for name, value in loop.bound:
+            if value is counter and name not in self._beyond_loops:
+                counter.name = self._variable(name, INT)
+                self._know(name, INT)
+                del bound[name]
+                break
+        return [self._store(node, [each]) for each in bound.items() if each[0] in used]
 
     # Functions within this one
 
@@ -910,8 +872,7 @@ class _Builder:
         if isinstance(target, ast.Name) and target.id == "_":
             found.append(tree.Do(self.expression(value)))
         elif isinstance(target, ast.Name):
-            known = (self.known or {}).get(target.id)
-            wanted = known[0] if known else None
+            wanted = (self.known or {}).get(target.id)
             found.append(self._store(target, [(target.id, self.expression(value, wanted))]))
         elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
             has_star = any(isinstance(one, ast.Starred) for one in value.elts)
@@ -976,11 +937,10 @@ class _Builder:
         stores = []
         for name, value in values:
             known = (self.known or {}).get(name)
-            if known and known[0] == INT and getattr(value.type, "made", None):
+            if known == INT and getattr(value.type, "made", None):
                 value = _as_int(value)
-            is_over = known and known[1] and known[1].isdisjoint(self._loops)
-            if known and known[0] != value.type and not is_over:
-                raise _Outside(node, self._other(name, known[0], value))
+            if known and known != value.type:
+                raise _Outside(node, self._other(name, known, value))
             stores.append((self._variable(name, value.type), value))
             self._know(name, value.type)
         return tree.Store(stores)
@@ -998,7 +958,7 @@ class _Builder:
     def _know(self, name: str, type_: Type) -> None:
         """A name has a value from here on."""
         if self.known is not None:
-            self.known = {**self.known, name: (type_, _PLAIN)}
+            self.known = {**self.known, name: type_}
 
     def _forget(self, node: ast.AST) -> None:
         """Names have a value from here on that has been refused."""
@@ -1354,9 +1314,7 @@ class _Builder:
     def _local(self, node: ast.AST, name: str) -> Expression:
         if self.known is None or name not in self.known:
             raise _Outside(node, f"{name} may have no value here")
-        type_, loops = self.known[name]
-        for turns in loops - {*self._loops}:
-            turns.escapes = True
+        type_ = self.known[name]
         if type_ == UNKNOWN:
             raise _Follows
         if name in self.functions:
@@ -1979,14 +1937,12 @@ class _Builder:
             return Local(name, value.type)
 
         loop = self._loop(generator.target, generator.iter, counter, hold)
-        stores = [inner._store(node, [each]) for each in loop.bound]
+        stores = inner._turn(node, loop, counter, own)
         filled = fill(inner, loop, counter)
         made = loop.made(counter, [*stores, *filled.body])
-        if any(value is counter for _, value in loop.bound) and not loop.is_wide:
-            inner._counted.append(_Turns(made, counter))
         inner.made.returns = filled.type
         inner.made.arguments = {name: value.type for name, value in given.items()}
-        inner._end([*filled.before, made, filled.after])
+        inner.made.end([*filled.before, made, filled.after])
         self.program.functions["inner", inner.made] = inner.made
         return Call(inner.made, [*given.values()])
 
@@ -2200,11 +2156,7 @@ def _both(one: _Known | None, other: _Known | None) -> _Known | None:
     """What has a value of one type on both ways; None: no step comes there."""
     if one is None or other is None:
         return one if other is None else other
-    return {
-        name: (type_, loops | other[name][1])
-        for name, (type_, loops) in one.items()
-        if name in other and other[name][0] == type_
-    }
+    return {name: type_ for name, type_ in one.items() if other.get(name) == type_}
 
 
 def _first_name(target: ast.expr) -> str:

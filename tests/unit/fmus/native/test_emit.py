@@ -543,10 +543,10 @@ CONSTRUCTS = {
     "loops that have ended": (
         "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, int, float]:\n"
         "    for k, a in enumerate(v, 1):\n        if a > x:\n            break\n"
-        "    y = a * k\n    for a in range(N):\n        y += a\n"
+        "    y = a * k\n    for c in range(N):\n        y += c\n"
         "    for k in reversed(range(2, 9, 3)):\n"
         "        y = y * 0.5 + k\n    for b in reversed(v):\n        y = y * x + b\n"
-        "    return y, k + a, b\n"
+        "    return y, k + c, b\n"
     ),
     "names of loops that are over": (
         "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, int, int]:\n"
