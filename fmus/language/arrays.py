@@ -140,10 +140,26 @@ def _product(functions: Functions, left: Expression, right: Expression) -> Expre
 
 
 def _is_stored(expression: Expression) -> bool:
-    """Whether a value has an address: that of a variable or a constant, or a field of one."""
-    if isinstance(expression, tree.Field):
+    """Whether a value has an address: a variable, a constant, one that is made, or a part."""
+    if isinstance(expression, (tree.Field, Item)):
         return _is_stored(expression.owner)
-    return isinstance(expression, (Local, tree.Constant))
+    return isinstance(expression, (Local, tree.Constant, tree.Make))
+
+
+def element(functions: Functions, owner: Expression, place: Expression) -> Expression:
+    """The element at a computed place; what has no address is passed to a function."""
+    type_ = owner.type
+    assert isinstance(type_, Array)
+    at = tree.Operation(tree.PLACE, (place, int_of(type_.n)), INT)
+    if _is_stored(owner):
+        return Item(owner, at)
+    given: dict[str, Type] = {"a": type_, "place": INT}
+
+    def body() -> Sequence[Statement]:
+        at = tree.Operation(tree.PLACE, (Local("place", INT), int_of(type_.n)), INT)
+        return [tree.Return(Item(Local("a", type_), at))]
+
+    return Call(functions.helper("element", (type_,), given, type_.item, body), (owner, place))
 
 
 def transpose(functions: Functions, operand: Expression) -> Expression:

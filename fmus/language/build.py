@@ -18,6 +18,7 @@ from contextlib import suppress
 from enum import IntEnum
 from functools import cache, partial
 from importlib.util import resolve_name
+from inspect import Parameter
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any, NamedTuple
@@ -50,8 +51,10 @@ from fmus.language.types import (
     UNKNOWN,
     Array,
     Record,
+    Scalar,
     Type,
     check_int,
+    check_size,
     check_value,
     enumeration,
     has_no_size,
@@ -73,6 +76,9 @@ from fmus.ports.groups import hints_of, is_class, is_record
 
 #: Compilers take brackets within brackets, but not any number of them.
 _DEEPEST = 200
+
+#: Blocks within each other, of which each `elif` is one, and cases of a `match`.
+_MOST_BLOCKS = 100
 
 #: Packages whose functions all equations share.
 _SHARED = frozenset(("auv_fmu", "fmus"))
@@ -158,6 +164,8 @@ class Program:
     def __init__(self) -> None:
         """Begin with nothing."""
         self.functions = tree.Functions()
+        #: Of modules, by their module, name and value.
+        self.constants: dict[Hashable, tree.Constant] = {}
         self._begun: set[Hashable] = set()
         self._mistakes: dict[str, str] = {}
 
@@ -225,6 +233,11 @@ class Program:
         return made
 
 
+def _told(error: Exception) -> str:
+    """What an error says, and of what class it is if it is none of ours."""
+    return str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
+
+
 def position(mistake: str) -> tuple[str, int]:
     """The file and the line that a mistake is in; one without comes first."""
     found = PLACED.match(mistake)
@@ -288,7 +301,8 @@ def _is_at_hand(function: FunctionType, path: str, module: str) -> bool:
     """Whether a function stands in this product, or beside the module that uses it."""
     if function.__module__.partition(".")[0] in _SHARED:
         return True
-    root = Path(path).resolve().parents[module.count(".")]
+    depth = module.count(".") + (Path(path).stem == "__init__")
+    root = Path(path).resolve().parents[depth]
     file = Path(str(inspect.getsourcefile(function))).resolve()
     return root in file.parents and "site-packages" not in file.relative_to(root).parts
 
@@ -342,10 +356,9 @@ def _arguments(node: ast.FunctionDef) -> list[ast.arg]:
     return [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
 
 
-def _is_text(node: ast.stmt) -> bool:
-    """Whether a statement is a text, as docstrings are."""
-    value = node.value if isinstance(node, ast.Expr) else None
-    return isinstance(value, ast.Constant) and isinstance(value.value, str)
+def _is_none(node: ast.expr | None) -> bool:
+    """Whether there is no expression, or `None`."""
+    return node is None or (isinstance(node, ast.Constant) and node.value is None)
 
 
 def _beyond_loops(*nodes: ast.AST) -> set[str]:
@@ -361,14 +374,6 @@ def _beyond_loops(*nodes: ast.AST) -> set[str]:
         else:
             found |= _beyond_loops(*ast.iter_child_nodes(node))
     return found
-
-
-def _constant(node: ast.expr) -> Any:
-    """A number or a text that is written out; None: it is computed."""
-    try:
-        return ast.literal_eval(node)
-    except ValueError:
-        return None
 
 
 class _Loop(NamedTuple):
@@ -400,24 +405,60 @@ class _Loop(NamedTuple):
 _Known = dict[str, Type]
 
 
-class _Callable(NamedTuple):
-    """A function, and how it is called.
+class _Signature(NamedTuple):
+    """How something is called.
 
     Attributes:
-        function: as a tree; it gets what it captures after its arguments.
-        names: of its arguments.
+        module, name: where it stands, and its own.
+        types: of its arguments, by their names; None: any vector or matrix.
         unnamed, positional: how many of them must, and may, be given by their place.
-        defaults: values of some of them.
-        captured: names in the function around it.
+        defaults: values of some of them, of Python or as trees.
 
     """
 
-    function: Function
-    names: Sequence[str]
+    module: str
+    name: str
+    types: Mapping[str, Type | None]
     unnamed: int
     positional: int
-    defaults: Mapping[str, Expression]
-    captured: Sequence[str] = ()
+    defaults: Mapping[str, Any]
+
+
+class _Callable(NamedTuple):
+    """A local function: as a tree, which gets what it captures after its arguments."""
+
+    function: Function
+    signature: _Signature
+    captured: Sequence[str]
+
+
+class _Each(NamedTuple):
+    """A function with a loop, on its way, that stands for an expression with a `for`.
+
+    Attributes:
+        builder: of the function.
+        given: its arguments, by their names in it.
+        loop, counter: that it has.
+        turn: statements of each turn.
+        block: those that use the element: the same, or what stands under an `if` there.
+
+    """
+
+    builder: _Builder
+    given: dict[str, Expression]
+    loop: _Loop
+    counter: Local
+    turn: list[Statement]
+    block: list[Statement]
+
+    def call(self, before: Sequence[Statement], after: Expression) -> Expression:
+        """Call the function, of which some steps before the loop and the result are given."""
+        function = self.builder.made
+        function.returns = after.type
+        function.arguments = {name: value.type for name, value in self.given.items()}
+        function.end([*before, self.loop.made(self.counter, self.turn), tree.Return(after)])
+        self.builder.program.functions["inner", function] = function
+        return Call(function, [*self.given.values()])
 
 
 class _Builder:
@@ -465,7 +506,7 @@ class _Builder:
         self._closure: dict[str, Expression] = {}
         #: Statements before the one on its way; None: part of it may not be computed.
         self._before: list[Statement] | None = None
-        self._depth = self._parts = 0
+        self._depth = self._blocks = self._parts = 0
         self.has_mistakes = False
         self._counts: Counter[str] = Counter()
 
@@ -489,26 +530,26 @@ class _Builder:
         self._taken |= {*self.names, *_names(node)}
         self._counts = Counter(_stored(*node.body))
         self._beyond_loops = _beyond_loops(*node.body) | {one.arg for one in arguments}
-        with self._noting():
+        with _Noting(self):
             self._check_head(node)
         for argument in arguments:
             self.made.arguments[argument.arg] = UNKNOWN
-            with self._noting():
+            with _Noting(self):
                 what = f"the argument {argument.arg} of {node.name}"
                 type_ = self._hinted(argument, argument.annotation, what)
                 self.made.arguments[argument.arg] = type_ or unsized(argument.arg)
         self.made.arguments |= captured or {}
         self.names |= self.made.arguments.keys()
         self._start(self.made.arguments)
-        self._gives = not (isinstance(node.returns, ast.Constant) and node.returns.value is None)
+        self._gives = node.returns is None or not _is_none(node.returns)
         self._returns: Type | None = NOTHING
         if self._gives:
             self._returns = UNKNOWN
-            with self._noting():
+            with _Noting(self):
                 self._returns = self._hinted(node, node.returns, f"the result of {node.name}")
         body = self._block(node.body)
         if self.known is not None and self._gives and not self.has_mistakes:
-            with self._noting():
+            with _Noting(self):
                 raise _Outside(node, f"{node.name} may end without a return")
         self.made.returns = self._returns or UNKNOWN
         self.made.end(body)
@@ -545,15 +586,9 @@ class _Builder:
         except Exception as error:
             if PLACED.match(str(error)):
                 raise
-            said = (
-                str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
-            )
-            raise _Outside(node, f"{what}: {said}") from None
+            raise _Outside(node, f"{what}: {_told(error)}") from None
 
     # Mistakes
-
-    def _noting(self) -> _Noting:
-        return _Noting(self)
 
     def _foreign(self, what: str) -> str:
         return f"{what} is not in the language of equations{advice(what)}"
@@ -565,6 +600,7 @@ class _Builder:
 
     def _block(self, nodes: Sequence[ast.stmt]) -> list[Statement]:
         found: list[Statement] = []
+        self._blocks += 1
         for node in nodes:
             if self.known is None:
                 break  # no step of the program comes here
@@ -579,12 +615,14 @@ class _Builder:
             )
             if about and is_simple and len(found) > before:
                 found[-1].comment = about
+        self._blocks -= 1
         return found
 
     def _statement(self, node: ast.stmt, found: list[Statement]) -> None:
         name = f"_{type(node).__name__.lower()}_statement"
-        if _is_text(node):
-            return
+        if max(self._blocks, len(getattr(node, "cases", ()))) > _MOST_BLOCKS:
+            what = f"more than {_MOST_BLOCKS} branches: use a tuple of values, or functions"
+            raise _Outside(node, what)
         if not hasattr(self, name):
             raise self._cannot(node, word_of(node))
         getattr(self, name)(node, found)
@@ -593,17 +631,20 @@ class _Builder:
         """Nothing to do."""
 
     def _expr_statement(self, node: ast.Expr, found: list[Statement]) -> None:
+        if isinstance(getattr(node.value, "value", None), str):
+            return  # as docstrings are
         if not isinstance(node.value, ast.Call):
-            raise self._cannot(node, word_of(node))
+            is_word = isinstance(node.value, (ast.Await, ast.Yield, ast.YieldFrom))
+            raise self._cannot(node, word_of(node.value if is_word else node))
         found.append(tree.Do(self.expression(node.value, NOTHING)))
 
     def _return_statement(self, node: ast.Return, found: list[Statement]) -> None:
         assert self.node is not None
         name, value = self.node.name, None
         try:
-            if node.value is None and self._gives:
+            if _is_none(node.value) and self._gives:
                 raise _Outside(node, f"{name} has a result: return a value")
-            if node.value is not None:
+            if node.value is not None and not _is_none(node.value):
                 if not self._gives:
                     raise _Outside(node, f"{name} returns a value, and its type is None")
                 value = self.fitting(node.value, self._returns)
@@ -623,7 +664,7 @@ class _Builder:
 
     def _if_statement(self, node: ast.If, found: list[Statement]) -> None:
         test: Expression = Number(True, BOOL)
-        with self._noting():
+        with _Noting(self):
             test = self.condition(node.test)
         before = self.known
         body = self._block(node.body)
@@ -652,7 +693,7 @@ class _Builder:
         for case in node.cases:
             self.known = before
             test: Expression | None = None
-            with self._noting():
+            with _Noting(self):
                 values = self._cases(case.pattern)
                 if rest - {None} and case.guard is None:
                     rest -= {getattr(value, "value", None) for value in values}
@@ -700,7 +741,7 @@ class _Builder:
         self._before = None
         before = self.known
         test: Expression = Number(True, BOOL)
-        with self._noting():
+        with _Noting(self):
             test = self.condition(node.test)
         self._ends.append(None)
         body = self._block(node.body)
@@ -761,7 +802,10 @@ class _Builder:
         if self._counts[node.name] > 1:
             raise _Outside(node, f"{node.name} is given a value twice: use two names")
         own = {*(argument.arg for argument in _arguments(node)), *_stored(*node.body)}
-        captured = self._captured(_free(node))
+        free = _free(node)
+        if node.name in free:
+            raise _Outside(node, f"{node.name} calls itself")
+        captured = self._captured(free)
         for name in captured:
             if name in own:
                 raise _Outside(node, f"{name} has two meanings in {node.name}: rename one")
@@ -769,20 +813,19 @@ class _Builder:
                 raise _Outside(node, f"{name}, which {node.name} uses, is changed")
         inner = self._inner(node.name, own, node)
         inner.build(inner.sizeless, {name: self._local(node, name).type for name in captured})
-        arguments = _arguments(node)
-        n = len(arguments) - len(node.args.kwonlyargs)
-        defaults = [*zip(arguments[n - len(node.args.defaults) : n], node.args.defaults)]
-        defaults += [(a, d) for a, d in zip(node.args.kwonlyargs, node.args.kw_defaults) if d]
-        given = {}
-        for argument, default in defaults:
-            wanted = inner.made.arguments[argument.arg]
-            value = self._sometimes(partial(self.fitting, wanted=wanted), default)
+        names, given = [argument.arg for argument in _arguments(node)], node.args
+        types = {name: inner.made.arguments[name] for name in names}
+        n = len(names) - len(given.kwonlyargs)
+        defaults = [*zip(names[n - len(given.defaults) : n], given.defaults)]
+        defaults += [(name, one) for name, one in zip(names[n:], given.kw_defaults) if one]
+        values = {}
+        for name, default in defaults:
+            value = self._sometimes(partial(self.fitting, wanted=types[name]), default)
             if value.fails or _names(default) & {*self.names, *self.functions}:
-                raise _Outside(default, f"the default value of {argument.arg} is no constant")
-            given[argument.arg] = value
-        names = [argument.arg for argument in arguments]
-        unnamed = len(node.args.posonlyargs)
-        called = _Callable(inner.made, names, unnamed, n, given, captured)
+                raise _Outside(default, f"the default value of {name} is no constant")
+            values[name] = value
+        takes = _Signature("", node.name, types, len(given.posonlyargs), n, values)
+        called = _Callable(inner.made, takes, captured)
         self.functions = {**self.functions, node.name: called}
         self.program.functions["inner", inner.made] = inner.made
         self._know(node.name, NOTHING)
@@ -994,9 +1037,15 @@ class _Builder:
     # Refusals of the component's own
 
     def _raise_statement(self, node: ast.Raise, found: list[Statement]) -> None:
-        call = node.exc
-        if not isinstance(call, ast.Call) or len(call.args) != 1 or call.keywords or node.cause:
+        try:
+            found.append(self._raised(node, node.exc))
+        finally:
             self.known = None
+
+    def _raised(self, node: ast.Raise, call: ast.expr | None) -> tree.Raise:
+        if not _is_none(node.cause):
+            raise self._cannot(node, "a raise with from")
+        if not isinstance(call, ast.Call) or len(call.args) != 1 or call.keywords:
             raise self._cannot(node, "a raise without a text")
         kind = self._meant(call.func)
         is_known = is_class(kind, BaseException) and issubclass(kind, _EXCEPTIONS)
@@ -1005,27 +1054,25 @@ class _Builder:
             for value in vars(one).values() if isinstance(value, FunctionType)
         ]  # fmt: skip
         if not is_known or changed or kind.__str__ is not BaseException.__str__:
-            self.known = None
             what = ast.unparse(call.func)
             raise _Outside(node, f"{what} is not an exception: write raise Refusal(...)")
         head = "" if issubclass(kind, Refusal) else f"{kind.__name__}: "
-        try:
-            found.append(tree.Raise([head, *self._message(call.args[0])]))
-        finally:
-            self.known = None
+        return tree.Raise([head, *self._message(call.args[0])])
 
     def _message(self, text: ast.expr) -> list[str | tuple[Expression, str]]:
         """The texts and values of a text."""
         if not isinstance(text, ast.JoinedStr):
-            if isinstance(text, ast.Constant) and isinstance(text.value, str):
-                return [text.value]
-            raise self._cannot(text, "a raise without a text")
-        found: list[str | tuple[Expression, str]] = []
+            if not (isinstance(text, ast.Constant) and isinstance(text.value, str)):
+                raise self._cannot(text, "a raise without a text")
+            text = ast.copy_location(ast.JoinedStr([text]), text)
+        found: list[Any] = []
         for part in text.values:
             if isinstance(part, ast.FormattedValue):
                 found.append(self._formatted(part))
             else:
                 found.append(str(ast.literal_eval(part)))
+                if "\0" in found[-1]:
+                    raise _Outside(text, "a text with a NUL, which ends a text in C")
         return found
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
@@ -1184,10 +1231,7 @@ class _Builder:
                 error.node = node
             raise
         except Exception as error:
-            said = (
-                str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
-            )
-            raise _Outside(node, said) from None
+            raise _Outside(node, _told(error)) from None
         finally:
             self._depth -= 1
         if found.type == UNKNOWN:
@@ -1348,9 +1392,12 @@ class _Builder:
     def _constant_of(
         self, module: str, name: str, value: Any, wanted: Type | None = None
     ) -> Expression:
-        type_ = wanted or type_of_value(value, name)
-        check_value(value, type_, name)
-        return tree.Constant(module, name, value, type_)
+        constants, key = self.program.constants, (module, name, id(value))
+        if key not in constants:
+            type_ = wanted or type_of_value(value, name)
+            check_value(value, type_, name)
+            constants[key] = tree.Constant(module, name, value, type_)
+        return constants[key]
 
     def _attribute(self, node: ast.Attribute, wanted: Type | None) -> Expression:
         owner = self._meant(node.value)
@@ -1386,20 +1433,14 @@ class _Builder:
     def _element(self, node: ast.Subscript, place: ast.expr, value: Expression) -> Expression:
         type_ = value.type
         n = type_.n if isinstance(type_, Array) else len(parts_of(type_))
-        key = _constant(place)
-        if key is None:
-            key = self._size(place)
-            if isinstance(type_, Array) and key not in range(-n, n):
-                key = None
-        if isinstance(key, int) and not isinstance(key, bool):
-            key += n if key < 0 else 0
-        if key is not None:
-            if type(key) is not int or not 0 <= key < n:
-                raise _Outside(node, f"there is no element {ast.unparse(place)} here")
+        key = self._size(place)
+        if key is not None and key in range(-n, n):
             if isinstance(type_, Array):
-                return Item(value, int_of(key))
+                return Item(value, int_of(key % n))
             assert isinstance(type_, Record)
             return Field(value, *type_.fields[key])
+        if key is not None and (isinstance(type_, Record) or not _names(place)):
+            raise _Outside(node, f"there is no element {ast.unparse(place)} here")
         if not isinstance(type_, Array):
             kinds = {*parts_of(type_)}
             what = "something other than a tuple of parts of one type"
@@ -1407,7 +1448,7 @@ class _Builder:
                 what = "a tuple of ints and floats: write all of them as floats"
             raise _Outside(node, f"a computed subscript of {what}")
         where = self._integer(place, "a subscript")
-        return Item(value, Operation(tree.PLACE, (where, int_of(n)), INT))
+        return arrays.element(self.program.functions, value, where)
 
     def _slice(self, node: ast.Subscript, places: ast.Slice, value: Expression) -> Expression:
         if getattr(value.type, "made", None) is Matrix:
@@ -1445,9 +1486,13 @@ class _Builder:
         return Make(made, values)
 
     def _elements(
-        self, nodes: Sequence[ast.expr], types: Sequence[Type | None]
+        self,
+        nodes: Sequence[ast.expr],
+        types: Sequence[Type | None],
+        make: Callable[[ast.expr, Type | None], Expression] | None = None,
     ) -> list[Expression]:
         """Expressions, of which those with a star stand for their elements."""
+        make = make or self.fitting
         values: list[Expression] = []
         for node in nodes:
             if isinstance(node, ast.Starred):
@@ -1456,7 +1501,7 @@ class _Builder:
                 values += [self._fit(node, *one) for one in zip(parts, wanted)]
             else:
                 wanted = [*types[len(values) :], None]
-                values.append(self.fitting(node, wanted[0]))
+                values.append(make(node, wanted[0]))
         return values
 
     def _unpacked(self, node: ast.expr) -> list[Expression]:
@@ -1467,8 +1512,10 @@ class _Builder:
     # Operators
 
     def _binop(self, node: ast.BinOp, wanted: Type | None) -> Expression:
-        if isinstance(node.op, ast.Mult) and isinstance(node.left, (ast.Tuple, ast.List)):
-            return self._repeated(node, node.left, node.right)
+        if isinstance(node.left, ast.Tuple):
+            parts = self._listed(node, self.fitting)
+            if parts is not None:
+                return self._collected(node, tuple, parts)
         left = self.expression(node.left)
         if isinstance(node.op, ast.Pow):
             return self._power(node, left)
@@ -1488,15 +1535,6 @@ class _Builder:
         if of_floats is tree.DIVIDE and isinstance(operands[1], Number) and operands[1].value:
             of_floats = tree.OVER
         return Operation(of_floats, operands, FLOAT)
-
-    def _repeated(self, node: ast.AST, items: ast.Tuple | ast.List, times: ast.expr) -> Expression:
-        """A tuple some times over."""
-        if isinstance(items, ast.List):
-            raise self._cannot(items, word_of(items))
-        n, values = self._size(times), self._elements(items.elts, ())
-        if n is None or n < 1:
-            raise _Outside(node, "a tuple a number of times that is not a constant above 0")
-        return Make(tuple_of([value.type for value in values] * n), values * n)
 
     def _power(self, node: ast.BinOp, base: Expression) -> Expression:
         exponent = self._folded(node.right)
@@ -1639,51 +1677,31 @@ class _Builder:
         about = FUNCTIONS[name]
         self._check_plain(node, name, about.arguments)
         if about.result == INT:
-            return self._to_int(node.args[0], name)
+            return self._of_number(node, name)
         values = [self._number(argument) for argument in node.args]
         if about.factor:
             return Operation(tree.MULTIPLY, (values[0], Number(about.factor, FLOAT)), FLOAT)
         return Operation(tree.MATHEMATICS[name], values, about.result)
 
-    def _to_int(self, node: ast.expr, name: str) -> Expression:
-        value = self.expression(node)
-        if not is_number(value.type):
-            raise _Outside(node, f"{name} of {value.type.word}")
-        if value.type != FLOAT:
-            return _as_int(value)
-        if name == "round":
-            whole: Expression = Operation(tree.NEAREST, (value,), FLOAT)
-        else:
-            word = "trunc" if name == "int" else name
-            whole = Operation(tree.MATHEMATICS[word], (value,), FLOAT)
-        return Operation(tree.TO_INT, (whole,), INT)
-
     def _of_number(self, node: ast.Call, name: str) -> Expression:
+        """A call of a function that takes any number."""
         self._check_plain(node, name, 1)
         value = self.expression(node.args[0])
         if not is_number(value.type):
             raise _Outside(node, f"{name} of {value.type.word}")
-        return value
-
-    def _abs(self, node: ast.Call) -> Expression:
-        value = self._of_number(node, "abs")
-        if value.type == FLOAT:
-            return Operation(tree.ABS, (value,), FLOAT)
-        return Operation(tree.INT_ABS, (value,), INT)
-
-    def _bool(self, node: ast.Call) -> Expression:
-        return Operation(tree.TO_BOOL, (self._of_number(node, "bool"),), BOOL)
-
-    def _float_of(self, node: ast.Call) -> Expression:
-        return self._float(self._of_number(node, "float"))
-
-    def _int(self, node: ast.Call) -> Expression:
-        self._check_plain(node, "int", 1)
-        return self._to_int(node.args[0], "int")
-
-    def _round(self, node: ast.Call) -> Expression:
-        self._check_plain(node, "round", 1)
-        return self._to_int(node.args[0], "round")
+        is_float = value.type == FLOAT
+        if name == "float":
+            return self._float(value)
+        if name == "bool":
+            return Operation(tree.TO_BOOL, (value,), BOOL)
+        if name == "abs":
+            return Operation(tree.ABS if is_float else tree.INT_ABS, (value,),
+                             FLOAT if is_float else INT)  # fmt: skip
+        if not is_float:
+            return _as_int(value)
+        word = "trunc" if name == "int" else name
+        how = tree.NEAREST if name == "round" else tree.MATHEMATICS[word]
+        return Operation(tree.TO_INT, (Operation(how, (value,), FLOAT),), INT)
 
     def _len(self, node: ast.Call) -> Expression:
         self._check_plain(node, "len", 1)
@@ -1693,12 +1711,6 @@ class _Builder:
         if value.fails:
             self._held(value, "all")
         return int_of(len(parts_of(value.type)))
-
-    def _min(self, node: ast.Call) -> Expression:
-        return self._extreme(node, "min")
-
-    def _max(self, node: ast.Call) -> Expression:
-        return self._extreme(node, "max")
 
     def _extreme(self, node: ast.Call, word: str) -> Expression:
         self._check_plain(node, word)
@@ -1726,15 +1738,6 @@ class _Builder:
             found = arrays.extreme_of_two(word, found, value)
         return found
 
-    def _sum(self, node: ast.Call) -> Expression:
-        return self._of_generator(node, "sum")
-
-    def _any(self, node: ast.Call) -> Expression:
-        return self._of_generator(node, "any")
-
-    def _all(self, node: ast.Call) -> Expression:
-        return self._of_generator(node, "all")
-
     def _of_generator(self, node: ast.Call, word: str) -> Expression:
         self._check_plain(node, word, 1)
         [given] = node.args
@@ -1750,50 +1753,54 @@ class _Builder:
         self._check_plain(node, made.__name__)
         if len(node.args) != 1:
             raise _Outside(node, f"{made.__name__} of other than one argument")
-        given = self._unrolled(node.args[0])
+        [given] = node.args
         if isinstance(given, ast.GeneratorExp):
             return self._comprehension(given, made)
-        if isinstance(given, (ast.List, ast.Tuple)) and made is Matrix:
-            rows = [self._row(self._unrolled(row)) for row in given.elts]
-        elif isinstance(given, (ast.List, ast.Tuple)):
-            values = self._elements(given.elts, ())
-            return self._collected(node, made, values)
-        else:
+        parts = self._listed(given, self._row if made is Matrix else self.fitting)
+        if parts is None:
             value = self.expression(given)
             if getattr(value.type, "made", None) is made and made is not tuple:
                 return value
             parts = self._parts_of(given, self._held(value, "all"))
-            if made is not Matrix:
-                return self._collected(node, made, parts)
-            rows = [self._as_row(given, part) for part in parts]
+        if made is not Matrix:
+            return self._collected(node, made, parts)
+        rows = [self._as_row(given, part) for part in parts]
         if not rows or any(row.type != rows[0].type for row in rows):
             raise _Outside(node, "a Matrix of rows of different lengths")
         return Make(matrix(len(rows), *sizes(rows[0].type)), rows)
 
-    def _unrolled(self, node: ast.expr) -> ast.expr:
-        """A list or a tuple that is written some times over, written out."""
-        if not (isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult)):
-            return node
-        items, times = node.left, self._size(node.right)
-        if not isinstance(items, (ast.List, ast.Tuple)) or times is None:
-            return node
-        return ast.copy_location(ast.Tuple(items.elts * times, ast.Load()), node)
+    def _listed(
+        self, node: ast.expr, make: Callable[[ast.expr, Type | None], Expression]
+    ) -> list[Expression] | None:
+        """The elements of a list or a tuple, maybe some times over; None: it is neither."""
+        times: int | None = 1
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
+            times, node = self._size(node.right), node.left
+        if not isinstance(node, (ast.Tuple, ast.List)):
+            return None
+        if times is None or times < 1:
+            raise _Outside(node, "a tuple a number of times that is not a constant above 0")
+        check_size(f"a tuple of {len(node.elts)} times {times}", times * len(node.elts))
+        return self._elements(node.elts, (), make) * times
 
     def _collected(self, node: ast.AST, made: Any, values: Sequence[Expression]) -> Expression:
         """A vector or a tuple of some values."""
         if made is tuple:
             return Make(tuple_of([value.type for value in values]), values)
-        for value in values:
-            if not is_number(value.type):
-                raise _Outside(node, f"{value.type.word} in a Vector")
-        return Make(vector(len(values)), [*map(self._float, values)])
+        return Make(vector(len(values)), [self._in_vector(node, value) for value in values])
 
-    def _row(self, node: ast.expr) -> Expression:
-        if isinstance(node, (ast.List, ast.Tuple)):
-            return self._collected(node, Vector, self._elements(node.elts, ()))
+    def _in_vector(self, node: ast.AST, value: Expression) -> Expression:
+        if not is_number(value.type):
+            raise _Outside(node, f"{value.type.word} in a Vector")
+        return self._float(value)
+
+    def _row(self, node: ast.expr, wanted: Type | None = None) -> Expression:
         if isinstance(node, ast.GeneratorExp):
             return self._comprehension(node, Vector)
-        return self._as_row(node, self.expression(node))
+        parts = self._listed(node, self.fitting)
+        if parts is None:
+            return self._as_row(node, self.expression(node))
+        return self._collected(node, Vector, parts)
 
     def _as_row(self, node: ast.expr, value: Expression) -> Expression:
         if getattr(value.type, "made", None) is Vector:
@@ -1807,102 +1814,69 @@ class _Builder:
         if node.generators[0].ifs:
             raise _Outside(node, "an if in an expression of a fixed size")
 
-        def fill(inner: _Builder, loop: _Loop, counter: Local) -> _Filled:
-            if not loop.turns:
-                raise _Outside(node, "a number of elements that is not a constant above 0")
-            before: list[Statement] = []
-            inner._before = before
-            element = inner._row(node.elt) if made is Matrix else inner.expression(node.elt)
-            inner._before = None
-            if made is Matrix:
-                type_: Array = matrix(loop.turns, *sizes(element.type))
-            elif made is tuple:
-                found = tuple_of([element.type] * loop.turns)
-                assert isinstance(found, Array)
-                type_ = found
-            else:
-                if not is_number(element.type):
-                    raise _Outside(node, f"{element.type.word} in a Vector")
-                element, type_ = inner._float(element), vector(loop.turns)
-            elements, place = inner._unused("elements"), Local(inner._unused("place"), INT)
-            where: Expression = counter
-            moves = not (
-                isinstance(loop.start, Number) and loop.start.value == 0 and loop.step == 1
-            )
-            if moves:
-                where = place
-                following = Operation(tree.COUNT_ADD, (place, int_of(1)), INT)
-                before.append(tree.StoreItem(elements, [where], element))
-                before.append(tree.Store([(place.name, following)]))
-            else:
-                before.append(tree.StoreItem(elements, [where], element))
-            first = [tree.Store([(place.name, int_of(0))])] if moves else []
-            return _Filled(
-                [tree.Reserve(elements, type_), *first], before,
-                tree.Return(Local(elements, type_)), type_,
-            )  # fmt: skip
-
-        return self._in_a_loop(node, fill)
+        each = self._in_a_loop(node)
+        inner, turns = each.builder, each.loop.turns
+        if not turns:
+            raise _Outside(node, "a number of elements that is not a constant above 0")
+        type_: Array
+        if made is Matrix:
+            element = inner._row(node.elt)
+            type_ = matrix(turns, *sizes(element.type))
+        elif made is Vector:
+            element = inner._in_vector(node, inner.expression(node.elt))
+            type_ = vector(turns)
+        else:
+            element = inner.expression(node.elt)
+            check_size(f"a tuple of {turns}", turns)
+            type_ = Array(element.type, turns)
+        elements = Local(inner._unused("elements"), type_)
+        before: list[Statement] = [tree.Reserve(elements.name, type_)]
+        place = each.counter
+        if _value(each.loop.start) == 0 and each.loop.step == 1:
+            each.block.append(tree.StoreItem(elements.name, [place], element))
+        else:
+            place = Local(inner._unused("place"), INT)
+            before.append(tree.Store([(place.name, int_of(0))]))
+            following = Operation(tree.COUNT_ADD, (place, int_of(1)), INT)
+            each.block.append(tree.StoreItem(elements.name, [place], element))
+            each.block.append(tree.Store([(place.name, following)]))
+        return each.call(before, elements)
 
     def _generatorexp(self, node: ast.GeneratorExp, wanted: Type | None) -> Expression:
         raise self._cannot(node, word_of(node))
 
     def _reduced(self, node: ast.GeneratorExp, word: str) -> Expression:
         """What `sum`, `min`, `max`, `any` or `all` makes of an expression in a loop."""
-        tests = node.generators[0].ifs
-
-        def fill(inner: _Builder, loop: _Loop, counter: Local) -> _Filled:
-            block: list[Statement] = []
-            inner._before = block
-            test = None
-            if tests:
-                conditions = [
-                    inner.condition(tests[0]),
-                    *(inner._sometimes(inner.condition, one) for one in tests[1:]),
-                ]
-                test = conditions[0]
-                if len(tests) > 1:
-                    test = Operation(tree.AND, conditions, BOOL)
-                inner._before = None
-            if word in ("any", "all"):
-                value = inner.condition(node.elt)
-                is_any = word == "any"
-                left = value if is_any else Operation(tree.NOT, (value,), BOOL)
-                block.append(
-                    tree.If(left if test is None else Operation(tree.AND, (test, left), BOOL),
-                            [tree.Return(Number(is_any, BOOL))])
-                )  # fmt: skip
-                return _Filled((), block, tree.Return(Number(not is_any, BOOL)), BOOL)
-            value = inner.expression(node.elt)
-            if not is_number(value.type):
-                raise _Outside(node, f"{word} of {value.type.word}")
-            found = inner._unused("found")
-            if word == "sum":
-                if value.type == FLOAT:
-                    raise self._cannot(node, "sum of floats")
-                total = Operation(tree.INT_ADD, (Local(found, INT), value), INT)
-                add: Statement = tree.Store([(found, total)])
-                block.append(add if test is None else tree.If(test, [add]))
-                start: list[Statement] = [tree.Store([(found, int_of(0))])]
-                return _Filled(start, block, tree.Return(Local(found, INT)), INT)
-            if test is not None or not loop.turns:
+        each = self._in_a_loop(node)
+        inner, loop = each.builder, each.loop
+        if word in ("any", "all"):
+            is_any = word == "any"
+            test = inner.condition(node.elt)
+            test = test if is_any else Operation(tree.NOT, (test,), BOOL)
+            each.block.append(tree.If(test, [tree.Return(Number(is_any, BOOL))]))
+            return each.call((), Number(not is_any, BOOL))
+        value = inner.expression(node.elt)
+        if not is_number(value.type):
+            raise _Outside(node, f"{word} of {value.type.word}")
+        if word == "sum":
+            if value.type == FLOAT:
+                raise self._cannot(node, "sum of floats")
+            found = Local(inner._unused("found"), INT)
+            next_: Expression = Operation(tree.INT_ADD, (found, value), INT)
+        else:
+            if each.block is not each.turn or not loop.turns:
                 raise _Outside(node, f"{word} of a number of values that is not a constant above 0")
-            each = Local(inner._unused("each"), value.type)
-            block.append(tree.Store([(each.name, value)]))
-            is_first = Operation(tree.EQUAL, (counter, loop.start), BOOL)
-            kept = Local(found, value.type)
-            next_ = Choice(is_first, each, arrays.extreme_of_two(word, kept, each))
-            block.append(tree.Store([(found, next_)]))
-            zero: Expression = Number(0.0, FLOAT) if value.type == FLOAT else int_of(0)
-            start = [tree.Store([(found, zero)])]
-            return _Filled(start, block, tree.Return(kept), value.type)
+            found = Local(inner._unused("found"), value.type)
+            one = Local(inner._unused("each"), value.type)
+            each.block.append(tree.Store([(one.name, value)]))
+            is_first = Operation(tree.EQUAL, (each.counter, loop.start), BOOL)
+            next_ = Choice(is_first, one, arrays.extreme_of_two(word, found, one))
+        each.block.append(tree.Store([(found.name, next_)]))
+        zero = Number(0.0, FLOAT) if found.type == FLOAT else int_of(0)
+        return each.call([tree.Store([(found.name, zero)])], found)
 
-        return self._in_a_loop(node, fill)
-
-    def _in_a_loop(
-        self, node: ast.GeneratorExp, fill: Callable[[_Builder, _Loop, Local], _Filled]
-    ) -> Expression:
-        """A function of its own with a loop, called with what it needs."""
+    def _in_a_loop(self, node: ast.GeneratorExp) -> _Each:
+        """The function of an expression with a `for`, up to the element."""
         if len(node.generators) > 1 or node.generators[0].is_async:
             raise _Outside(node, "an expression with more than one for")
         [generator] = node.generators
@@ -1937,18 +1911,20 @@ class _Builder:
             return Local(name, value.type)
 
         loop = self._loop(generator.target, generator.iter, counter, hold)
-        stores = inner._turn(node, loop, counter, own)
-        filled = fill(inner, loop, counter)
-        made = loop.made(counter, [*stores, *filled.body])
-        inner.made.returns = filled.type
-        inner.made.arguments = {name: value.type for name, value in given.items()}
-        inner.made.end([*filled.before, made, filled.after])
-        self.program.functions["inner", inner.made] = inner.made
-        return Call(inner.made, [*given.values()])
+        turn = [*inner._turn(node, loop, counter, own)]
+        block = turn
+        for condition in generator.ifs:
+            inner._before, outer = block, block
+            test, block = inner.condition(condition), []
+            outer.append(tree.If(test, block))
+        inner._before = block
+        return _Each(inner, given, loop, counter, turn, block)
 
     # Methods, records and functions
 
     def _method(self, node: ast.Call, method: ast.Attribute) -> Expression:
+        if isinstance(self._meant(method.value), ModuleType):
+            return self._of_module(method)
         owner = self.expression(method.value)
         type_, name = owner.type, method.attr
         if name == "_replace" and isinstance(type_, Record) and type_.made:
@@ -1970,41 +1946,18 @@ class _Builder:
 
     def _changed(self, node: ast.Call, owner: Expression) -> Expression:
         """A record with other values of some fields."""
-        if node.args:
-            raise _Outside(node, "_replace without names of fields")
-        owner = self._held(owner, "all")
-        assert isinstance(owner.type, Record)
-        given = {str(keyword.arg): keyword.value for keyword in node.keywords}
-        values = []
-        for name, part in owner.type.fields:
-            value = given.pop(name, None)
-            values.append(Field(owner, name, part) if value is None else self.fitting(value, part))
-        for name in given:
-            raise _Outside(node, f"{name} is not a field of {owner.type.word}")
-        return Make(owner.type, values)
+        type_, owner = owner.type, self._held(owner, "all")
+        assert isinstance(type_, Record)
+        fields = {name: Field(owner, name, part) for name, part in type_.fields}
+        takes = _Signature("", "_replace", dict(type_.fields), 0, 0, fields)
+        return Make(type_, [*self._given(node, takes).values()])
 
     def _record(self, node: ast.Call, made: Any) -> Expression:
         type_ = type_of(made)
         assert isinstance(type_, Record)
-        wanted = dict(type_.fields)
-        given = self._elements(node.args, [*wanted.values()])
-        if len(given) > len(wanted):
-            raise _Outside(node, f"{len(given)} values for {len(wanted)} fields")
-        values: dict[str, Expression] = dict(zip(wanted, given))
-        for keyword in node.keywords:
-            name = str(keyword.arg)
-            if keyword.arg is None:
-                raise self._cannot(node, "a call with **")
-            if name not in wanted or name in values:
-                raise _Outside(node, f"{name} is not a further field of {type_.word}")
-            values[name] = self.fitting(keyword.value, wanted[name])
-        for name, value in made._field_defaults.items():
-            if name not in values:
-                values[name] = self._default(made.__module__, f"{made.__name__}_{name}", name,
-                                             value, wanted[name])  # fmt: skip
-        if len(values) != len(wanted):
-            raise _Outside(node, f"{len(values)} values for {len(wanted)} fields")
-        return Make(type_, [values[name] for name in wanted])
+        types, defaults = dict(type_.fields), made._field_defaults
+        takes = _Signature(made.__module__, made.__name__, types, 0, len(types), defaults)
+        return Make(type_, [*self._given(node, takes).values()])
 
     def _member(self, node: ast.Call, made: Any) -> Expression:
         """The member of an enumeration that an int stands for."""
@@ -2032,98 +1985,73 @@ class _Builder:
         of = self.program.functions.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
         return Call(of, (given,))
 
-    def _default(self, module: str, name: str, field: str, value: Any, wanted: Type) -> Expression:
-        if isinstance(wanted, (Array, Record)):
-            found = type_of_value(value, f"the default value of {field}")
-            if found != wanted:
-                raise TypeError(f"the default value of {field} is {found.word}")
-            return self._constant_of(module, name, value)
-        check_value(value, wanted, f"the default value of {field}")
-        return Number(value, wanted)
-
     def _function(self, node: ast.Call, called: FunctionType) -> Expression:
-        hints = hints_of(called)
-        code = called.__code__
-        names = code.co_varnames[: code.co_argcount + code.co_kwonlyargcount]
-        function = None
-        if any(has_no_size(hints.get(name)) for name in names):
-            sized = (name for name in names if name in hints and not has_no_size(hints[name]))
-            types: Mapping[str, Type] = {name: type_of(hints[name]) for name in sized}
+        hints, parameters = hints_of(called), inspect.signature(called).parameters.values()
+        unsized = [one.name for one in parameters if has_no_size(hints.get(one.name))]
+        if unsized:
+            function = None
+            types = {
+                one.name: None if one.name in unsized else type_of(hints[one.name])
+                for one in parameters
+                if one.name in hints
+            }
         else:
             function = self.program.function(called)
-            types = function.arguments
-        defaults = [*(called.__defaults__ or ())]
-        values: dict[str, Any] = dict(
-            zip(names[code.co_argcount - len(defaults) : code.co_argcount], defaults)
-        )
-        values |= called.__kwdefaults__ or {}
-        by_place = (code.co_posonlyargcount, code.co_argcount)
-        given = self._given(node, names, by_place, types, {*values})
-        for name, value in values.items():
-            if name not in given:
-                wanted = types[name] if name in types else type_of_value(value, name)
-                given[name] = self._default(
-                    called.__module__, f"{called.__name__}_{name}", name, value, wanted
-                )
+            types = {**function.arguments}
+        kinds = [one.kind for one in parameters]
+        takes = _Signature(
+            called.__module__, called.__name__, types, kinds.count(Parameter.POSITIONAL_ONLY),
+            len(kinds) - kinds.count(Parameter.KEYWORD_ONLY),
+            {one.name: one.default for one in parameters if one.default is not one.empty},
+        )  # fmt: skip
+        given = self._given(node, takes)
+        for name in unsized:
+            if not has_only_floats(given[name].type):
+                what = f"{given[name].type.word} with other than floats: write them as 1.0"
+                raise _Outside(node, what)
         if function is None:
-            for name in names:
-                type_ = given[name].type
-                if has_no_size(hints.get(name)) and not has_only_floats(type_):
-                    what = f"{type_.word} with other than floats: write them as 1.0"
-                    raise _Outside(node, what)
-            function = self.program.function(called, [given[name].type for name in names])
-        return Call(function, [given[name] for name in names])
+            function = self.program.function(called, [value.type for value in given.values()])
+        return Call(function, [*given.values()])
 
     def _call_of(self, node: ast.Call, called: _Callable) -> Expression:
         """A call of a local function."""
-        by_place = (called.unnamed, called.positional)
-        given = self._given(
-            node, called.names, by_place, called.function.arguments, {*called.defaults}
-        )
-        given = {**called.defaults, **given}
-        values = [given[name] for name in called.names]
-        values += [self._closed(node, name) for name in called.captured]
-        return Call(called.function, values)
+        captured = [self._closed(node, name) for name in called.captured]
+        given = self._given(node, called.signature)
+        return Call(called.function, [*given.values(), *captured])
 
-    def _given(
-        self,
-        node: ast.Call,
-        names: Sequence[str],
-        by_place: tuple[int, int],
-        types: Mapping[str, Type],
-        optional: set[str],
-    ) -> dict[str, Expression]:
-        """The arguments of a call, by their names."""
-        values = self._elements(node.args, [types.get(name) for name in names])
+    def _given(self, node: ast.Call, takes: _Signature) -> dict[str, Expression]:
+        """The arguments of a call, by their names, in the order of what is called."""
+        types = takes.types
+        values = self._elements(node.args, [*types.values()])
         words = {str(keyword.arg): keyword.value for keyword in node.keywords}
+        names = [*types]
         places = names[: len(values)]
-        missing = {*names} - {*places} - {*words} - optional
+        missing = {*names} - {*places} - {*words} - {*takes.defaults}
         if (
-            len(values) > by_place[1] or missing or {*words} & {*places}
-            or {*words} - {*names[by_place[0] :]} or len(words) < len(node.keywords)
+            len(values) > takes.positional or missing or {*words} & {*places}
+            or {*words} - {*names[takes.unnamed :]} or len(words) < len(node.keywords)
         ):  # fmt: skip
-            raise _Outside(node, f"arguments other than {', '.join(names)}")
+            raise _Outside(node, f"{takes.name} takes {', '.join(names) or 'no arguments'}")
         found = dict(zip(places, values))
         for name, value in words.items():
-            found[name] = self.fitting(value, types.get(name))
-        return found
+            found[name] = self.fitting(value, types[name])
+        for name in takes.defaults if len(found) < len(names) else ():
+            if name not in found:
+                found[name] = self._default(takes, name)
+        return {name: found[name] for name in names}
 
-
-class _Filled(NamedTuple):
-    """What a loop that stands for an expression consists of.
-
-    Attributes:
-        before: it.
-        body: in it.
-        after: it.
-        type: of the result.
-
-    """
-
-    before: Sequence[Statement]
-    body: Sequence[Statement]
-    after: Statement
-    type: Type
+    def _default(self, takes: _Signature, name: str) -> Expression:
+        """The default value of an argument."""
+        value, what = takes.defaults[name], f"the default value of {name}"
+        if isinstance(value, Expression):
+            return value
+        wanted = takes.types[name] or type_of_value(value, what)
+        if wanted == TEXT and isinstance(value, str):
+            return tree.Text(value)
+        check_value(value, wanted, what)
+        if isinstance(wanted, Scalar):
+            return Number(value, wanted)
+        return self._constant_of(takes.module, f"{takes.name}_{name}", value, wanted)
 
 
 class _Noting:
@@ -2140,6 +2068,8 @@ class _Noting:
         if error is None:
             return False
         builder = self._builder
+        if isinstance(error, RecursionError):
+            error = _Outside(ast.Pass(), "too many calls within each other: join some functions")
         if isinstance(error, (_Outside, TypeError)):
             node = error.node if isinstance(error, _Outside) else self._node
             line = getattr(node, "lineno", getattr(self._node, "lineno", 0))
@@ -2202,7 +2132,9 @@ def _as_int(value: Expression) -> Expression:
 
 #: What the functions of Python that need no import make of a call.
 _BUILT_IN: Mapping[Any, Callable[[_Builder, ast.Call], Expression]] = {
-    abs: _Builder._abs, all: _Builder._all, any: _Builder._any, bool: _Builder._bool,
-    float: _Builder._float_of, int: _Builder._int, len: _Builder._len, max: _Builder._max,
-    min: _Builder._min, round: _Builder._round, sum: _Builder._sum,
+    len: _Builder._len,
+    **{one: partial(_Builder._of_number, name=one.__name__)
+       for one in (abs, bool, float, int, round)},
+    **{one: partial(_Builder._extreme, word=one.__name__) for one in (max, min)},
+    **{one: partial(_Builder._of_generator, word=one.__name__) for one in (all, any, sum)},
 }  # fmt: skip

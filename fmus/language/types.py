@@ -140,17 +140,23 @@ def has_only_floats(type_: Type) -> bool:
 
 def vector(n: int) -> Array:
     """The type of a vector."""
-    _check_size(f"a Vector of {n}", n)
+    check_size(f"a Vector of {n}", n)
     return Array(FLOAT, n, Vector)
 
 
 def matrix(rows: int, columns: int) -> Array:
     """The type of a matrix."""
-    _check_size(f"a Matrix of {rows} rows of {columns}", rows * columns)
+    check_size(f"a Matrix of {rows} rows of {columns}", rows * columns)
     return Array(vector(columns), rows, Matrix)
 
 
-def _check_size(what: str, n: int) -> None:
+def check_size(what: str, n: int) -> None:
+    """Refuse what is empty, or larger than C takes.
+
+    Raises:
+        TypeError: it is.
+
+    """
     if n < 1:
         raise TypeError(f"{what} is empty")
     if n > _MOST_NUMBERS:

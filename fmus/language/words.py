@@ -68,6 +68,7 @@ INSTEAD: Mapping[str, str] = {
     "a list with a for": "write Vector(... for ...)",
     "a list": "write a tuple, or Vector((...))",
     "a name twice in one assignment": "use _ for what is not needed",
+    "a raise with from": "leave from out",
     "a raise without a text": 'write raise Refusal("...")',
     "a set with a for": "write Vector(... for ...)",
     "a set": "write a tuple",

@@ -115,7 +115,7 @@ def test_each_function_has_its_docstring_above_it(name):
     [
         ("def begin(parameters: A) -> A:\n    return begin(parameters)\n", "begin calls itself"),
         ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is not a field"),
-        ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: 2 values for 1 fields"),
+        ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: A takes x"),
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
         (
             "def begin(parameters: A, t: int) -> A:\n    return A(parameters[t])\n",
