@@ -502,8 +502,6 @@ class _Builder:
         self._beyond_loops: Set[str] = frozenset()
         #: What is known where the loops around the statement are left by `break`.
         self._ends: list[_Known | None] = []
-        #: Variables of the function around this one that only functions called here need.
-        self._closure: dict[str, Expression] = {}
         #: Statements before the one on its way; None: part of it may not be computed.
         self._before: list[Statement] | None = None
         self._depth = self._blocks = self._parts = 0
@@ -620,7 +618,8 @@ class _Builder:
 
     def _statement(self, node: ast.stmt, found: list[Statement]) -> None:
         name = f"_{type(node).__name__.lower()}_statement"
-        if max(self._blocks, len(getattr(node, "cases", ()))) > _MOST_BLOCKS:
+        is_branched = isinstance(node, (ast.If, ast.Match))
+        if is_branched and max(self._blocks, len(getattr(node, "cases", ()))) > _MOST_BLOCKS:
             what = f"more than {_MOST_BLOCKS} branches: use a tuple of values, or functions"
             raise _Outside(node, what)
         if not hasattr(self, name):
@@ -805,10 +804,8 @@ class _Builder:
         free = _free(node)
         if node.name in free:
             raise _Outside(node, f"{node.name} calls itself")
-        captured = self._captured(free)
+        captured = self._captured(node, free, own)
         for name in captured:
-            if name in own:
-                raise _Outside(node, f"{name} has two meanings in {node.name}: rename one")
             if self._counts[name] > (name not in self.made.arguments):
                 raise _Outside(node, f"{name}, which {node.name} uses, is changed")
         inner = self._inner(node.name, own, node)
@@ -836,11 +833,15 @@ class _Builder:
         what = "a Vector or Matrix has no size here: write Annotated[Vector, 3]"
         raise _Outside(self.node, f"the argument {name} of {self.node.name}: {what}")
 
-    def _captured(self, names: Sequence[str]) -> list[str]:
-        """The variables among some names, and those that local functions among them capture."""
+    def _captured(self, node: ast.AST, names: Sequence[str], own: Set[str]) -> list[str]:
+        """The variables that a function within this one uses, also in others that it calls."""
         self._check_functions(names)
-        found = [n for name in names for n in (name, *self._captured_by(name))]
-        return [n for n in dict.fromkeys(found) if n in self.names and n not in self.functions]
+        used = [n for name in names for n in (name, *self._captured_by(name))]
+        found = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
+        for name in found:
+            if name in own:
+                raise _Outside(node, f"{name} has two meanings here: rename one")
+        return found
 
     def _check_functions(self, names: Sequence[str]) -> None:
         """Refuse local functions that may not have been defined."""
@@ -863,10 +864,6 @@ class _Builder:
         }
         inner._taken = {*self._taken, *own}
         return inner
-
-    def _closed(self, node: ast.AST, name: str) -> Expression:
-        """The value of a variable that a function called here has captured."""
-        return self._closure.get(name) or self._local(node, name)
 
     # Assignments
 
@@ -1055,7 +1052,7 @@ class _Builder:
         ]  # fmt: skip
         if not is_known or changed or kind.__str__ is not BaseException.__str__:
             what = ast.unparse(call.func)
-            raise _Outside(node, f"{what} is not an exception: write raise Refusal(...)")
+            raise _Outside(node, f"{what} may not be raised: write raise Refusal(...)")
         head = "" if issubclass(kind, Refusal) else f"{kind.__name__}: "
         return tree.Raise([head, *self._message(call.args[0])])
 
@@ -1643,11 +1640,8 @@ class _Builder:
     def _call(  # noqa: PLR0911, for each kind of function
         self, node: ast.Call, wanted: Type | None
     ) -> Expression:
-        local = node.func.id if isinstance(node.func, ast.Name) else ""
-        if local in self.functions:
-            if self.known is not None and local not in self.known:
-                raise _Outside(node, f"{local} may have no value here")
-            return self._call_of(node, self.functions[local])
+        if isinstance(node.func, ast.Name) and node.func.id in self.names | self.functions.keys():
+            return self._call_of(node, node.func.id)
         if not isinstance(node.func, (ast.Name, ast.Attribute)):
             raise self._cannot(node, word_of(node.func))
         called = self._meant(node.func)
@@ -1675,9 +1669,9 @@ class _Builder:
 
     def _mathematics(self, node: ast.Call, name: str) -> Expression:
         about = FUNCTIONS[name]
-        self._check_plain(node, name, about.arguments)
         if about.result == INT:
             return self._of_number(node, name)
+        self._check_plain(node, name, about.arguments)
         values = [self._number(argument) for argument in node.args]
         if about.factor:
             return Operation(tree.MULTIPLY, (values[0], Number(about.factor, FLOAT)), FLOAT)
@@ -1884,20 +1878,11 @@ class _Builder:
         own, first = _names(generator.target), _first_name(generator.target)
         self._parts += 1
         inner = self._inner(f"each{self._parts}", own)
-        given: dict[str, Expression] = {}
         inside = [name for name in _free(node.elt, *generator.ifs) if name not in own]
-        self._check_functions(inside)
-        for name in dict.fromkeys(inside):
-            if name in self.names and name not in self.functions:
-                given[name] = self._local(node, name)
+        captured = self._captured(node, inside, own)
+        given: dict[str, Expression] = {name: self._local(node, name) for name in captured}
         inner.names = {*given, *own}
         inner._start({name: value.type for name, value in given.items()})
-        for name in dict.fromkeys(n for one in inside for n in self._captured_by(one)):
-            if name in given and name not in self._closure:
-                continue
-            argument = inner._unused(name) if name in {*own, *given} else name
-            given[argument] = self._closed(node, name)
-            inner._closure[name] = Local(argument, given[argument].type)
         counter = Local(inner._unused(f"{first}_at"), INT)
 
         def hold(value: Expression, source: ast.expr, word: str) -> Expression:
@@ -2013,9 +1998,13 @@ class _Builder:
             function = self.program.function(called, [value.type for value in given.values()])
         return Call(function, [*given.values()])
 
-    def _call_of(self, node: ast.Call, called: _Callable) -> Expression:
+    def _call_of(self, node: ast.Call, name: str) -> Expression:
         """A call of a local function."""
-        captured = [self._closed(node, name) for name in called.captured]
+        if name not in self.functions:
+            raise _Outside(node, f"{self._local(node, name).type.word} is called")
+        self._check_functions([name])
+        called = self.functions[name]
+        captured = [self._local(node, name) for name in called.captured]
         given = self._given(node, called.signature)
         return Call(called.function, [*given.values(), *captured])
 
@@ -2072,7 +2061,8 @@ class _Noting:
             error = _Outside(ast.Pass(), "too many calls within each other: join some functions")
         if isinstance(error, (_Outside, TypeError)):
             node = error.node if isinstance(error, _Outside) else self._node
-            line = getattr(node, "lineno", getattr(self._node, "lineno", 0))
+            places = (getattr(one, "lineno", 0) for one in (node, self._node, builder.node))
+            line = next(filter(None, places), 0)
             builder.program.refuse(f"{builder.path}:{line}: ", str(error))
             builder.has_mistakes = True
         elif not isinstance(error, _Follows):
@@ -2086,7 +2076,12 @@ def _both(one: _Known | None, other: _Known | None) -> _Known | None:
     """What has a value of one type on both ways; None: no step comes there."""
     if one is None or other is None:
         return one if other is None else other
-    return {name: type_ for name, type_ in one.items() if other.get(name) == type_}
+    types = {name: {type_, other[name]} for name, type_ in one.items() if name in other}
+    return {
+        name: UNKNOWN if UNKNOWN in both else one[name]
+        for name, both in types.items()
+        if len(both) == 1 or UNKNOWN in both
+    }
 
 
 def _first_name(target: ast.expr) -> str:

@@ -20,6 +20,11 @@ PLACED = re.compile(r".+?:\d+: ")
 _MOST_NUMBERS = 65_536
 
 
+def _one(made: type) -> str:
+    """A word for a value of a class."""
+    return f"{'an' if made.__name__[0] in 'AEIOU' else 'a'} {made.__name__}"
+
+
 @dataclass(frozen=True)
 class Scalar:
     """A number, or a text of a refusal.
@@ -72,7 +77,7 @@ class Record:
     @property
     def word(self) -> str:
         """What readers call it."""
-        return f"a {self.made.__name__}" if self.made else f"a tuple of {len(self.fields)}"
+        return _one(self.made) if self.made else f"a tuple of {len(self.fields)}"
 
 
 Type = Union[Scalar, Array, Record]
@@ -205,7 +210,7 @@ def enumeration(made: type[IntEnum]) -> Scalar:
     """The type of the members of an enumeration."""
     for one in made.__mro__[: made.__mro__.index(IntEnum)]:
         _check_plain(one)
-    return Scalar(f"a {made.__name__}", made)
+    return Scalar(_one(made), made)
 
 
 @cache
@@ -304,7 +309,7 @@ def check_value(value: Any, type_: Type, name: str) -> None:
         raise TypeError(f"{name} is an int where a float is wanted: write {value}.0")
     kind = type_.made or (float if type_ == FLOAT else int)
     if type(value) is not float if type_ == FLOAT else not isinstance(value, kind):
-        raise TypeError(f"{name} is a {type(value).__name__} where {type_.word} is wanted")
+        raise TypeError(f"{name} is {_one(type(value))} where {type_.word} is wanted")
     if not isinstance(value, float):
         check_int(value)
 

@@ -359,11 +359,11 @@ CONSTRUCTS = {
         "def f(x: float, k: int) -> float:\n"
         "    a, b = (x, k, 2.0 * x), ((x, k), 0.5)\n    return a[2] * b[1] + b[0][0] - a[1]\n"
     ),
-    "local function in an expression of its own names": (
+    "local function in an expression in an expression": (
         "def f(x: float, v: Annotated[Vector, 3]) -> Annotated[Vector, 3]:\n"
         "    def g(a: float) -> float:\n        return a + x\n"
-        "    w = Vector(Vector(g(x) for x in v).sum() for _ in range(3))\n"
-        "    return w + Vector(g(x) for x in v)\n"
+        "    w = Vector(Vector(g(b) for b in v).sum() for _ in range(3))\n"
+        "    return w + Vector(g(b) for b in v)\n"
     ),
     "stars are fitted": (
         "def f(x: float, k: int) -> Inner:\n"
@@ -578,10 +578,33 @@ CONSTRUCTS = {
     "sums and tests in loops": (
         "def f(x: float, v: Annotated[Vector, 4], k: int) -> tuple[int, bool, bool, float, int]:\n"
         "    def near(a: float) -> bool:\n        return abs(a - x) < 1.0\n"
-        "    n = sum(i for i, x in enumerate(v) if near(x) if x > 0.0) + sum(a > x for a in v)\n"
+        "    n = sum(i for i, b in enumerate(v) if near(b) if b > 0.0) + sum(a > x for a in v)\n"
         "    on = any(1.0 / a > x for a in v if a < 2.0)\n"
         "    y = max(a * x for a in v) + min(x - i for i in range(N))\n"
         "    return n, on, all(near(a) for a in v), y, max(i * k for i in range(3, 0, -1))\n"
+    ),
+    "a place in what a function gives": (
+        "def f(x: float, k: int, r: Record) -> tuple[float, float, float]:\n"
+        "    def g(a: float) -> Record:\n        return r._replace(x=a, v=a * r.v)\n"
+        "    row = (A if x > 0.0 else 2.0 * A)[k]\n"
+        "    return row[k] + g(x).v[k], (2.0 * A)[k - 1][k], (x, 2.0, r.x)[k]\n"
+    ),
+    "rows some times over": (
+        "def f(x: float, v: Annotated[Vector, 2]) -> Annotated[Matrix, 4, 2]:\n"
+        "    B = Matrix([a] * 2 for a in v) @ Matrix(((x, 1.0), *NESTED[:1]))\n"
+        "    return Matrix((v, *B, (x,) * 2))\n"
+    ),
+    "nothing is returned": (
+        "def f(x: float) -> float:\n"
+        "    def g(a: float, why: str = 'large') -> None:\n        if a < 0.0:\n"
+        "            return None\n        if a > 2.0:\n"
+        "            raise Refusal(f'{a:g} is {why}') from None\n        return\n"
+        "    g(x)\n    g(3.0 * x, why='larger')\n    return x\n"
+    ),
+    "an if of many branches": (
+        "def f(k: int) -> int:\n    if k == -1:\n        n = 1\n"
+        + "".join(f"    elif k == {i}:\n        n = {i * i}\n" for i in range(90))
+        + "    else:\n        n = -k // 2\n    return n\n"
     ),
     "a while that is left": (
         "def f(x: float, k: int) -> float:\n"
@@ -783,7 +806,30 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         (
             "z = 2.0\n    def g(a: float) -> float:\n        return a + z\n"
             "    def h(z: float) -> float:\n        return g(z)\n    y = h(y)",
-            "z has two meanings in h: rename one",
+            "z has two meanings here: rename one",
+        ),
+        (
+            "def g(a: float) -> float:\n        return a + y\n    w = Vector(g(y) for y in v)",
+            "y has two meanings here: rename one",
+        ),
+        ("for a in POWERS: y += a\n    for a in v: y += a\n    y += a", "a is an int and gets a f"),
+        ("y = math.foo(y)", "the name math.foo is not known here"),
+        ("y = 1.0\n    yield y", "yield is not in the language"),
+        ("raise Refusal('a\\0b')", "a text with a NUL"),
+        ("raise Refusal('a') from y", "a raise with from is not in the language"),
+        ("raise KeyError('a')", "KeyError may not be raised: write raise Refusal(...)"),
+        ("w = ((0.0,) * 10**9)[:1]", "a tuple of 1 times 1000000000 is too large for C"),
+        ("w = tuple(1.0 for _ in range(10**9))", "a tuple of 1000000000 is too large for C"),
+        ("def g(a: float) -> float:\n        return g(a)\n    y = g(y)", "g calls itself"),
+        ("y = v(1.0)", "a Vector of 3 is called"),
+        (
+            "if y < 0.0: y = 0.0\n" + "".join(f"    elif y < {i}: y += {i}\n" for i in range(110)),
+            "more than 100 branches: use a tuple of values, or functions",
+        ),
+        (
+            "k = int(y)\n    match k:\n"
+            + "".join(f"        case {i}: y += 1.0\n" for i in range(110)),
+            "more than 100 branches: use a tuple of values, or functions",
         ),
         ("k = (y, 3)\n    r = Inner(*k, 4)", "Inner takes a, n"),
         ("k = (3, y)\n    r = Inner(*k)", "*k is an int where a float is wanted"),
