@@ -10,14 +10,12 @@ import ast
 import inspect
 import math
 import operator
-import sys
 import tokenize
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
 from enum import IntEnum
 from functools import cache, partial
-from importlib.util import resolve_name
 from inspect import Parameter
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, ModuleType
@@ -26,7 +24,7 @@ from typing import Any, NamedTuple
 from auv_fmu import Refusal
 from auv_fmu.language.arrays import Matrix, Vector
 from fmus.language import arrays, tree
-from fmus.language.mathematics import BY_FUNCTION, FUNCTIONS
+from fmus.language.mathematics import BY_FUNCTION, CONSTANTS, FUNCTIONS
 from fmus.language.tree import (
     Call,
     Choice,
@@ -164,7 +162,7 @@ class Program:
     def __init__(self) -> None:
         """Begin with nothing."""
         self.functions = tree.Functions()
-        #: Of modules, by their module, name and value.
+        #: Of modules, by their name and value: the first that uses one gives it its own name.
         self.constants: dict[Hashable, tree.Constant] = {}
         self._begun: set[Hashable] = set()
         self._mistakes: dict[str, str] = {}
@@ -203,32 +201,25 @@ class Program:
 
         Args:
             function: of Python, made by `def` in a module.
-            types: of its arguments, of which some may be vectors of any size.
+            types: of its arguments, if some of them are vectors of any size.
 
         Raises:
             TypeError: it is none, or calls itself.
 
         """
-        path, line = str(inspect.getsourcefile(function)), function.__code__.co_firstlineno
-        try:
-            hints = hints_of(function)
-        except Exception as error:
-            raise TypeError(f"{path}:{line}: {type(error).__name__}: {error}") from None
-        hints.pop("return", None)
-        unsized = any(map(has_no_size, hints.values()))
-        key = (function, *types) if unsized else function
+        key = (function, *types)
         if key in self.functions:
             return self.functions[key]
         if key in self._begun:
             raise TypeError(f"{function.__name__} calls itself")
+        path, line = str(inspect.getsourcefile(function)), function.__code__.co_firstlineno
         node = _definition(path, line)
         if node is None:
             raise TypeError(f"{path}:{line}: {function.__name__} is not made by def in a module")
-        made = Function(function.__module__, function.__name__, {}, sizes=types if unsized else ())
-        builder = _Builder(self, path, function.__globals__, made, node)
-        given = dict(zip((argument.arg for argument in _arguments(node)), types))
+        made = Function(function.__module__, function.__name__, {}, sizes=types)
         self._begun.add(key)
-        builder.build(lambda name: given.get(name) or builder.sizeless(name))
+        given = dict(zip((argument.arg for argument in _arguments(node)), types))
+        _Builder(self, path, function.__globals__, made, node).build(given)
         self.functions[key] = made
         return made
 
@@ -265,36 +256,6 @@ def _comments(path: str) -> dict[int, str]:
             for token in tokenize.generate_tokens(file.readline)
             if token.type == tokenize.COMMENT and token.line[: token.start[1]].strip()
         }
-
-
-@cache
-def _origins(module: ModuleType) -> Mapping[str, str]:
-    """Where the names come from that a module imports."""
-    imports = [
-        n for n in ast.parse(inspect.getsource(module)).body if isinstance(n, ast.ImportFrom)
-    ]
-    return {
-        alias.asname or alias.name: resolve_name(
-            f"{'.' * node.level}{node.module or ''}", module.__package__
-        )
-        for node in imports
-        for alias in node.names
-    }
-
-
-def _home(module: ModuleType, name: str) -> str:
-    """The module that a constant was defined in, seen from one that uses it."""
-    seen: list[ModuleType] = []
-    while module not in seen:
-        seen.append(module)
-        try:
-            origin = _origins(module).get(name)
-        except (OSError, TypeError, ImportError, SyntaxError):
-            break
-        if origin == "math":
-            return origin
-        module = sys.modules.get(origin or "", module)
-    return module.__name__
 
 
 def _is_at_hand(function: FunctionType, path: str, module: str) -> bool:
@@ -510,13 +471,11 @@ class _Builder:
 
     # Functions
 
-    def build(
-        self, unsized: Callable[[str], Type], captured: Mapping[str, Type] | None = None
-    ) -> None:
+    def build(self, sized: Mapping[str, Type], captured: Mapping[str, Type] | None = None) -> None:
         """Build the tree of a function of Python.
 
         Args:
-            unsized: gives the type of an argument of any size.
+            sized: types of arguments that may be of any size.
             captured: variables of the function around it, which are further arguments.
 
         """
@@ -534,8 +493,11 @@ class _Builder:
             self.made.arguments[argument.arg] = UNKNOWN
             with _Noting(self):
                 what = f"the argument {argument.arg} of {node.name}"
-                type_ = self._hinted(argument, argument.annotation, what)
-                self.made.arguments[argument.arg] = type_ or unsized(argument.arg)
+                type_ = self._hinted(argument, argument.annotation, what) or sized.get(argument.arg)
+                if type_ is None:
+                    what += ": a Vector or Matrix has no size here: write Annotated[Vector, 3]"
+                    raise _Outside(node, what)
+                self.made.arguments[argument.arg] = type_
         self.made.arguments |= captured or {}
         self.names |= self.made.arguments.keys()
         self._start(self.made.arguments)
@@ -809,7 +771,7 @@ class _Builder:
             if self._counts[name] > (name not in self.made.arguments):
                 raise _Outside(node, f"{name}, which {node.name} uses, is changed")
         inner = self._inner(node.name, own, node)
-        inner.build(inner.sizeless, {name: self._local(node, name).type for name in captured})
+        inner.build({}, {name: self._local(node, name).type for name in captured})
         names, given = [argument.arg for argument in _arguments(node)], node.args
         types = {name: inner.made.arguments[name] for name in names}
         n = len(names) - len(given.kwonlyargs)
@@ -826,12 +788,6 @@ class _Builder:
         self.functions = {**self.functions, node.name: called}
         self.program.functions["inner", inner.made] = inner.made
         self._know(node.name, NOTHING)
-
-    def sizeless(self, name: str) -> Type:
-        """Refuse an argument of any size where it has none."""
-        assert self.node is not None
-        what = "a Vector or Matrix has no size here: write Annotated[Vector, 3]"
-        raise _Outside(self.node, f"the argument {name} of {self.node.name}: {what}")
 
     def _captured(self, node: ast.AST, names: Sequence[str], own: Set[str]) -> list[str]:
         """The variables that a function within this one uses, also in others that it calls."""
@@ -1375,21 +1331,18 @@ class _Builder:
             raise _Outside(node, f"{what} is not a value: name a part of it")
         if callable(value):
             raise self._cannot(node, f"the name {ast.unparse(node)}")
-        # It bears the name of the module that it stands in, wherever it was imported.
-        owner = self._meant(node.value) if isinstance(node, ast.Attribute) else None
-        here = sys.modules.get(self.scope["__name__"])
-        module = owner if isinstance(owner, ModuleType) else here
-        home = self.scope["__name__"] if module is None else _home(module, name)
-        if isinstance(value, IntEnum):
-            home, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
-        elif (home == "math" or owner is math) and type(value) is float:
+        if any(value is getattr(math, one) for one in CONSTANTS):
             return Number(value, FLOAT)
-        return self._constant_of(home, name, value)
+        owner = self._meant(node.value) if isinstance(node, ast.Attribute) else None
+        module = owner.__name__ if isinstance(owner, ModuleType) else self.scope["__name__"]
+        if isinstance(value, IntEnum):
+            module, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
+        return self._constant_of(module, name, value)
 
     def _constant_of(
         self, module: str, name: str, value: Any, wanted: Type | None = None
     ) -> Expression:
-        constants, key = self.program.constants, (module, name, id(value))
+        constants, key = self.program.constants, (name, id(value))
         if key not in constants:
             type_ = wanted or type_of_value(value, name)
             check_value(value, type_, name)
@@ -1971,7 +1924,10 @@ class _Builder:
         return Call(of, (given,))
 
     def _function(self, node: ast.Call, called: FunctionType) -> Expression:
-        hints, parameters = hints_of(called), inspect.signature(called).parameters.values()
+        hints: Mapping[str, Any] = {}
+        with suppress(Exception):  # its definition tells
+            hints = hints_of(called)
+        parameters = inspect.signature(called).parameters.values()
         unsized = [one.name for one in parameters if has_no_size(hints.get(one.name))]
         if unsized:
             function = None
