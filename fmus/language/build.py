@@ -299,13 +299,9 @@ def _free(*nodes: ast.AST) -> list[str]:
             found += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
             found += [name for name in _free(*node.body) if name not in own]
         elif isinstance(node, ast.GeneratorExp):
-            first, *others = node.generators
-            own = {name for one in node.generators for name in _names(one.target)}
-            inner = _free(
-                node.elt, *(i for one in node.generators for i in one.ifs),
-                *(one.iter for one in others),
-            )  # fmt: skip
-            found += [*_free(first.iter), *(name for name in inner if name not in own)]
+            generator, own = node.generators[0], _names(node.generators[0].target)
+            inner = _free(node.elt, *generator.ifs)
+            found += [*_free(generator.iter), *(name for name in inner if name not in own)]
         elif isinstance(node, ast.AnnAssign):
             found += _free(*filter(None, [node.value]))
         else:
