@@ -17,6 +17,7 @@ from contextlib import suppress
 from enum import IntEnum
 from functools import cache, partial
 from inspect import Parameter
+from itertools import chain, count
 from pathlib import Path
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any, NamedTuple
@@ -337,13 +338,15 @@ class _Loop(NamedTuple):
     """What a loop goes over.
 
     Attributes:
-        start, stop, step: of its counter.
+        counter: the number of the turn, or of a range.
+        start, stop, step: of it.
         turns: how often it runs; None: that is not known before.
         bound: names that get a value in each turn, and the value.
         is_wide: whether the counter may pass the largest int.
 
     """
 
+    counter: Local
     start: Expression
     stop: Expression
     step: int
@@ -351,11 +354,10 @@ class _Loop(NamedTuple):
     bound: Sequence[tuple[str, Expression]]
     is_wide: bool = False
 
-    def made(self, counter: Local, body: Sequence[Statement]) -> tree.For:
+    def made(self, body: Sequence[Statement]) -> tree.For:
         """It as a statement."""
-        return tree.For(
-            counter.name, self.start, self.stop, self.step, self.turns, body, self.is_wide
-        )
+        name, of = self.counter.name, (self.start, self.stop, self.step, self.turns)
+        return tree.For(name, *of, body, self.is_wide)
 
 
 #: Names that have a value here, with its type.
@@ -395,7 +397,7 @@ class _Each(NamedTuple):
     Attributes:
         builder: of the function.
         given: its arguments, by their names in it.
-        loop, counter: that it has.
+        loop: that it has.
         turn: statements of each turn.
         block: those that use the element: the same, or what stands under an `if` there.
 
@@ -404,7 +406,6 @@ class _Each(NamedTuple):
     builder: _Builder
     given: dict[str, Expression]
     loop: _Loop
-    counter: Local
     turn: list[Statement]
     block: list[Statement]
 
@@ -413,7 +414,7 @@ class _Each(NamedTuple):
         function = self.builder.made
         function.returns = after.type
         function.arguments = {name: value.type for name, value in self.given.items()}
-        function.end([*before, self.loop.made(self.counter, self.turn), tree.Return(after)])
+        function.end([*before, self.loop.made(self.turn), tree.Return(after)])
         self.builder.program.functions["inner", function] = function
         return Call(function, [*self.given.values()])
 
@@ -719,9 +720,8 @@ class _Builder:
                 return value
             return self._kept(value, f"{first}_{word}")
 
-        counter = Local(self._unused(f"{first}_at"), INT)
         try:
-            loop = self._loop(node.target, node.iter, counter, hold)
+            loop = self._loop(node, hold)
         except (_Outside, _Follows):
             before = self.known
             self._forget(node.target)
@@ -730,7 +730,7 @@ class _Builder:
             raise
         before = self.known
         used = {*_free(*node.body), *_stored(*node.body), *self._beyond_loops}
-        stores = self._turn(node, loop, counter, used)
+        stores = self._turn(node, loop, used)
         self._ends.append(None)
         body = self._block(node.body)
         self._ends.pop()
@@ -738,19 +738,20 @@ class _Builder:
             after = {n: v.type for n, v in loop.bound if n in self._beyond_loops}
             self.known = {**before, **after}
             self.known = self.known if loop.turns else _both(before, self.known)
-        found.append(loop.made(counter, [*stores, *body]))
+        found.append(loop.made([*stores, *body]))
 
     def _turn(
-        self, node: ast.AST, loop: _Loop, counter: Local, used: Set[str]
+        self, node: ast.For | ast.comprehension, loop: _Loop, used: Set[str]
     ) -> Sequence[Statement]:
         """The first statements in each turn of a loop: values of names that are used."""
-        bound = dict(loop.bound)
-        for name, value in loop.bound:
-            if value is counter and name not in self._beyond_loops:
-                counter.name = self._variable(name, INT)
-                self._know(name, INT)
-                del bound[name]
-                break
+        bound, counter = dict(loop.bound), loop.counter
+        names = [name for name, value in loop.bound if value is counter]
+        if names and names[0] not in self._beyond_loops:
+            counter.name = self._variable(names[0], INT)
+            self._know(names[0], INT)
+            del bound[names[0]]
+        else:
+            counter.name = self._unused(f"{_first_name(node.target)}_at")
         return [self._store(node, [each]) for each in bound.items() if each[0] in used]
 
     # Functions within this one
@@ -966,7 +967,7 @@ class _Builder:
 
     def _unused(self, name: str) -> str:
         """A name for the tree only, which the function has not and gets now."""
-        names = (name, *(f"{name}_{number}" for number in range(2, 10_000)))
+        names = chain([name], (f"{name}_{number}" for number in count(2)))
         found = next(n for n in names if n not in self._taken)
         self._taken.add(found)
         return found
@@ -1043,22 +1044,21 @@ class _Builder:
 
     # Loops
 
-    def _loop(self, target: ast.expr, iterable: ast.expr, counter: Local, hold: _Hold) -> _Loop:
+    def _loop(self, node: ast.For | ast.comprehension, hold: _Hold) -> _Loop:
         """What a loop goes over.
 
         Args:
-            target: what gets the values.
-            iterable: what they come from.
-            counter: the number of the turn, or of a range.
+            node: the loop.
             hold: makes a value one that can be read in each turn.
 
         """
-        called, call = self._called(iterable)
+        counter = Local("", INT)
+        called, call = self._called(node.iter)
         if not call or called is not range:
-            bound, n = self._items(target, iterable, counter, hold)
-            return _Loop(int_of(0), int_of(n), 1, n, bound)
-        if not isinstance(target, ast.Name):
-            raise _Outside(target, "more than one name for the numbers of a range")
+            bound, n = self._items(node.target, node.iter, counter, hold)
+            return _Loop(counter, int_of(0), int_of(n), 1, n, bound)
+        if not isinstance(node.target, ast.Name):
+            raise _Outside(node.target, "more than one name for the numbers of a range")
         bounds = self._bounds(call)
         first, last, step = map(_value, bounds)
         if not step:
@@ -1067,8 +1067,8 @@ class _Builder:
         turns = None if first is None or last is None else len(range(first, last, step))
         is_wide = abs(step) > 1 and (last is None or abs(last + step) >= 2**31)
         number: Expression = Operation(tree.NARROW, (counter,), INT) if is_wide else counter
-        bound = [] if target.id == "_" else [(target.id, number)]
-        return _Loop(start, stop, step, turns, bound, is_wide)
+        bound = [] if node.target.id == "_" else [(node.target.id, number)]
+        return _Loop(counter, start, stop, step, turns, bound, is_wide)
 
     def _called(self, node: ast.expr) -> tuple[Any, ast.Call | None]:
         return (self._meant(node.func), node) if isinstance(node, ast.Call) else (None, None)
@@ -1774,7 +1774,7 @@ class _Builder:
             type_ = Array(element.type, turns)
         elements = Local(inner._unused("elements"), type_)
         before: list[Statement] = [tree.Reserve(elements.name, type_)]
-        place = each.counter
+        place = each.loop.counter
         if _value(each.loop.start) == 0 and each.loop.step == 1:
             each.block.append(tree.StoreItem(elements.name, [place], element))
         else:
@@ -1812,7 +1812,7 @@ class _Builder:
             found = Local(inner._unused("found"), value.type)
             one = Local(inner._unused("each"), value.type)
             each.block.append(tree.Store([(one.name, value)]))
-            is_first = Operation(tree.EQUAL, (each.counter, loop.start), BOOL)
+            is_first = Operation(tree.EQUAL, (loop.counter, loop.start), BOOL)
             next_ = Choice(is_first, one, arrays.extreme_of_two(word, found, one))
         each.block.append(tree.Store([(found.name, next_)]))
         zero = Number(0.0, FLOAT) if found.type == FLOAT else int_of(0)
@@ -1832,7 +1832,6 @@ class _Builder:
         given: dict[str, Expression] = {name: self._local(node, name) for name in captured}
         inner.names = {*given, *own}
         inner._start({name: value.type for name, value in given.items()})
-        counter = Local(inner._unused(f"{first}_at"), INT)
 
         def hold(value: Expression, source: ast.expr, word: str) -> Expression:
             """Pass what the loop goes over."""
@@ -1844,15 +1843,15 @@ class _Builder:
             given[name] = value
             return Local(name, value.type)
 
-        loop = self._loop(generator.target, generator.iter, counter, hold)
-        turn = [*inner._turn(node, loop, counter, own)]
+        loop = self._loop(generator, hold)
+        turn = [*inner._turn(generator, loop, own)]
         block = turn
         for condition in generator.ifs:
             inner._before, outer = block, block
             test, block = inner.condition(condition), []
             outer.append(tree.If(test, block))
         inner._before = block
-        return _Each(inner, given, loop, counter, turn, block)
+        return _Each(inner, given, loop, turn, block)
 
     # Methods, records and functions
 
