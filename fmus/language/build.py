@@ -320,13 +320,11 @@ def _is_none(node: ast.expr | None) -> bool:
 
 
 def _beyond_loops(*nodes: ast.AST) -> set[str]:
-    """Names that occur elsewhere than in loops which give them their only value."""
+    """Names that occur elsewhere than in loops which give them a value."""
     found: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.For):
-            names, again = _names(node.target), {*_stored(*node.body)}
-            found |= {*_free(node.iter)} | names & again
-            found |= _beyond_loops(*node.body) - (names - again)
+            found |= {*_free(node.iter)} | _beyond_loops(*node.body) - _names(node.target)
         elif isinstance(node, (ast.FunctionDef, ast.expr)):
             found |= {*_free(node), *_stored(node)}
         else:
@@ -483,7 +481,7 @@ class _Builder:
         self.names = {*(argument.arg for argument in arguments), *_stored(*node.body)}
         self._taken |= {*self.names, *_names(node)}
         self._counts = Counter(_stored(*node.body))
-        self._beyond_loops = _beyond_loops(*node.body) | {one.arg for one in arguments}
+        self._beyond_loops = _beyond_loops(*node.body)
         with _Noting(self):
             self._check_head(node)
         for argument in arguments:
@@ -746,7 +744,8 @@ class _Builder:
         """The first statements in each turn of a loop: values of names that are used."""
         bound, counter = dict(loop.bound), loop.counter
         names = [name for name, value in loop.bound if value is counter]
-        if names and names[0] not in self._beyond_loops:
+        other = {*self._beyond_loops, *(self.known or ()), *_stored(*getattr(node, "body", ()))}
+        if names and names[0] not in other:
             counter.name = self._variable(names[0], INT)
             self._know(names[0], INT)
             del bound[names[0]]
@@ -930,7 +929,7 @@ class _Builder:
         stores = []
         for name, value in values:
             known = (self.known or {}).get(name)
-            if known == INT and getattr(value.type, "made", None):
+            if known == INT and is_whole(value.type) and value.type != BOOL:
                 value = _as_int(value)
             if known and known != value.type:
                 raise _Outside(node, self._other(name, known, value))
@@ -1199,13 +1198,13 @@ class _Builder:
             return value
         if wanted == UNKNOWN:
             raise _Follows
-        if wanted == INT and getattr(value.type, "made", None):
+        if wanted == INT and is_whole(value.type) and value.type != BOOL:
             return _as_int(value)
         if wanted == FLOAT and is_whole(value.type):
             text = ast.unparse(node)
             better = f"{text}.0" if text.removeprefix("-").isdecimal() else f"float({text})"
             raise _Outside(node, f"{text} is an int where a float is wanted: write {better}")
-        if value.type == INT and getattr(wanted, "made", None):
+        if value.type == INT and isinstance(wanted, Scalar) and wanted.made:
             what = f"an int where {wanted.word} is wanted: write {wanted.made.__name__}(...)"
             raise _Outside(node, what)
         raise _Outside(node, f"{value.type.word} where {wanted.word} is wanted")
@@ -1385,7 +1384,8 @@ class _Builder:
                 return Item(value, int_of(key % n))
             assert isinstance(type_, Record)
             return Field(value, *type_.fields[key])
-        if key is not None and (isinstance(type_, Record) or not _names(place)):
+        is_written = isinstance(place, (ast.Constant, ast.UnaryOp))
+        if key is not None and (is_written or isinstance(type_, Record)):
             raise _Outside(node, f"there is no element {ast.unparse(place)} here")
         if not isinstance(type_, Array):
             kinds = {*parts_of(type_)}

@@ -548,6 +548,12 @@ CONSTRUCTS = {
         "        y = y * 0.5 + k\n    for b in reversed(v):\n        y = y * x + b\n"
         "    return y, k + c, b\n"
     ),
+    "names of loops for other values": (
+        "def f(x: float, v: Annotated[Vector, 3], k: int) -> tuple[float, int]:\n"
+        "    for a in range(3):\n        a += 1\n        k += a % 5\n"
+        "    for a in v:\n        x += a\n    for i in range(2):\n        for i in range(2, 4):\n            x += i\n"
+        "        k += i % 7\n        for k in range(2):\n            pass\n    return x, k\n"
+    ),
     "names of loops that are over": (
         "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, int, int]:\n"
         "    for k in range(3):\n        pass\n    while k > -3:\n        k -= 2\n"
@@ -813,6 +819,8 @@ def test_an_integer_that_c_cannot_hold_is_refused(
             "y has two meanings here: rename one",
         ),
         ("for a in POWERS: y += a\n    for a in v: y += a\n    y += a", "a is an int and gets a f"),
+        ("k = 1\n    k = v", "k is an int and gets a Vector of 3: use another name"),
+        ("k = Inner(y, Inner(y))", "an Inner where an int is wanted"),
         ("y = math.foo(y)", "the name math.foo is not known here"),
         ("y = 1.0\n    yield y", "yield is not in the language"),
         ("raise Refusal('a\\0b')", "a text with a NUL"),
