@@ -551,7 +551,8 @@ CONSTRUCTS = {
     "names of loops for other values": (
         "def f(x: float, v: Annotated[Vector, 3], k: int) -> tuple[float, int]:\n"
         "    for a in range(3):\n        a += 1\n        k += a % 5\n"
-        "    for a in v:\n        x += a\n    for i in range(2):\n        for i in range(2, 4):\n            x += i\n"
+        "    for a in v:\n        x += a\n    for i in range(2):\n"
+        "        for i in range(2, 4):\n            x += i\n"
         "        k += i % 7\n        for k in range(2):\n            pass\n    return x, k\n"
     ),
     "names of loops that are over": (
