@@ -181,8 +181,6 @@ static void exit_initialisation(call *this) {
 
 static void terminate(call *this) { this->instance->run.mode = TERMINATED; }
 
-static void reset(call *this) { renew(this->instance); }
-
 /* Steps */
 
 /* The number of internal steps that a step is split into; -1: it is refused. */
