@@ -6,7 +6,7 @@
  * calls.c     what every call begins with, instances, and the host's states
  * functions.h the functions of FMI 2.0
  *
- * Names use a few verbs in one sense, as fmus/python/callbacks.py does:
+ * Names use a few verbs in one sense, as fmus/python/component.py does:
  *
  * check    whether something is good; writes or gives the reason if it is not
  * refuse   answer a call with another status than OK, and log the reason
