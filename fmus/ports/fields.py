@@ -10,7 +10,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.variable import Refusal, Variable
-from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
+from fmus.ports.groups import check_type, fields_of, is_record, word
 from fmus.ports.port import Array, Misdeclared, Port
 
 
@@ -40,7 +40,7 @@ _SOURCE = re.compile(r"[\w.,\[\]{}]+", re.ASCII)
 
 def declared(
     made: Any, causality: str, direct: tuple[str, ...] = (), initial: tuple[str, ...] = ()
-) -> dict[str, Field]:
+) -> dict[str, tuple[Port, ...]]:
     """The ports of each field of a class, by the names of its fields.
 
     Args:
@@ -57,9 +57,9 @@ def declared(
 
 def _declared(
     made: Any, causality: str, default: Variable, prefix: str, given: Any
-) -> dict[str, Field]:
+) -> dict[str, tuple[Port, ...]]:
     starts = dict(made._field_defaults) if given is None else given._asdict()
-    fields: dict[str, Field] = {}
+    fields: dict[str, tuple[Port, ...]] = {}
     for field, hint in fields_of(made).items():
         place, start = (made.__name__, field), starts.get(field)
         inner, notes = _annotated(hint)
@@ -68,7 +68,7 @@ def _declared(
                 raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
             before = prefix + _prefix(notes, field, place)
             below = _declared(inner, causality, default, before, start)
-            fields[field] = ParameterSet(inner, **below)
+            fields[field] = tuple(port for ports in below.values() for port in ports)
             continue
         said = _said(notes, causality, place, inner)
         check_type(hint, *place)
@@ -84,7 +84,7 @@ def _declared(
             shape = _shape(inner, notes, place)[0]
             array = Array(prefix + (said.name or field), said.description, shape)
             ports = [replace(port, array=array if shape else None) for port in ports]
-        fields[field] = tuple(ports) if parts[0].member else ports[0]
+        fields[field] = tuple(ports)
     return fields
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import IntEnum
-from itertools import groupby
+from functools import cache
+from itertools import count, groupby
 from types import GenericAlias
 from typing import (
     Annotated,
@@ -12,7 +13,6 @@ from typing import (
     Generic,
     NamedTuple,
     TypeVar,
-    Union,
     get_args,
     get_origin,
     get_type_hints,
@@ -56,9 +56,14 @@ def parts_of(hint: Any) -> list[Any] | None:
         if hint is Matrix:
             return [Annotated[Vector, sizes[1]]] * sizes[0]
     if is_record(hint):
-        return list(hints_of(hint).values())
+        return _parts_of_record(hint)
     arguments = get_args(hint)
     return [*arguments] if get_origin(hint) is tuple and Ellipsis not in arguments else None
+
+
+@cache
+def _parts_of_record(made: Any) -> list[Any]:
+    return [*hints_of(made).values()]
 
 
 def is_record(hint: Any) -> bool:
@@ -278,67 +283,29 @@ def _compiled(body: str, argument: str, scope: dict[str, Any]) -> Callable[..., 
     return function
 
 
-Field = Union[Port, tuple[Port, ...], "ParameterSet[Any]"]
-
-
-def ports_in(field: Field) -> Sequence[Port]:
-    """The ports of a field."""
-    if isinstance(field, Port):
-        return (field,)
-    return field if isinstance(field, tuple) else field.ports
-
-
 class ParameterSet(Generic[T]):
-    """Ports of the parameters that make one parameter set of the equations, field by field."""
+    """Ports of the parameters that make one parameter set of the equations, number by number."""
 
-    def __init__(self, made: Callable[..., T], /, **fields: Field) -> None:
+    def __init__(self, made: type[T], ports: Sequence[Port]) -> None:
         """Declare the set.
 
         Args:
             made: NamedTuple of the equations.
-            fields: for each field a port, the ports of a tuple, vector or matrix, or the set of a
-                nested NamedTuple.
+            ports: for each number in it.
 
         """
         self._made = made
-        self._hints = hints_of(made)
-        self._fields = fields
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """All parameters, in the order of their declaration."""
-        return tuple(port for port, _ in self._leaves())
+        self.ports = tuple(ports)
 
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:
         """Where each parameter lies in the set, by its name: fields, and places in tuples."""
-        return {port.name: path for port, path in self._leaves()}
-
-    def _leaves(self) -> Iterator[tuple[Port, tuple[str | int, ...]]]:
-        for name, field in self._fields.items():
-            if isinstance(field, Port):
-                yield field, (name,)
-            elif isinstance(field, tuple):
-                yield from (
-                    (port, (name, *at)) for port, at in zip(field, _places(self._hints[name]))
-                )
-            else:
-                yield from ((port, (name, *path)) for port, path in field._leaves())
+        return dict(zip((port.name for port in self.ports), _places(self._made)))
 
     def of(self, values: Mapping[str, Value]) -> T:
         """The parameter set with these values of its ports, by name."""
-        hints = self._hints
-        return self._made(
-            **{name: _taken(field, hints[name], values) for name, field in self._fields.items()}
-        )
-
-
-def _taken(field: Field, hint: Any, values: Mapping[str, Value]) -> object:
-    if isinstance(field, ParameterSet):
-        return field.of(values)
-    if isinstance(field, Port):
-        return field.meaning(values[field.name])
-    return filled(hint, iter([port.meaning(values[port.name]) for port in field]))
+        made: T = filled(self._made, iter([port.meaning(values[port.name]) for port in self.ports]))
+        return made
 
 
 def filled(hint: Any, values: Iterator[Any]) -> Any:
@@ -353,9 +320,9 @@ def filled(hint: Any, values: Iterator[Any]) -> Any:
 
 def _places(hint: Any) -> Iterator[tuple[str | int, ...]]:
     """Where the numbers of a type lie in it."""
-    parts = parts_of(hint)
+    parts, kind = parts_of(hint), class_of(hint)
     if parts is None:
         yield ()
         return
-    for i, part in enumerate(parts):
-        yield from ((i, *rest) for rest in _places(part))
+    for step, part in zip(kind._fields if is_record(kind) else count(), parts):
+        yield from ((step, *rest) for rest in _places(part))
