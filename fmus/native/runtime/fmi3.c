@@ -118,16 +118,7 @@ FUNCTION(fmi3DoStep, MASK_DoStep,
          *event_handling_needed = *terminate_simulation = *early_return = 0;
          *last_successful_time = time_of(&this))
 
-/* Values. A reference stands for a scalar, or for an array: that of its first element. */
-
-#ifdef ARRAYS
-static size_t span(uint32_t reference) {
-    uint32_t place = reference - FIRST_REFERENCE;
-    return place < N_PORTS ? elements[place] : 1;
-}
-#else
-#define span(reference) ((size_t)1)
-#endif
+/* Values */
 
 static string wrong_numbers(size_t n, const uint32_t r[], const void *values, size_t n_values) {
     size_t wanted = 0;
@@ -136,58 +127,34 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
                               : "the numbers of values and of references differ";
 }
 
-#define FOR_EACH(action)                                                                         \
-    for (size_t i = 0, k = 0; i < n; i++) {                                                      \
-        for (size_t e = 0; e < span(r[i]); e++, k++) {                                           \
-            uint32_t reference = r[i] + (uint32_t)e;                                             \
-            action;                                                                              \
-        }                                                                                        \
-    }
-
 #define GET(name, type, ...)                                                                     \
     FUNCTION(name, MASK_Get, wrong_numbers(n, r, v, n_v),                                        \
              (void *c, const uint32_t r[], size_t n, type v[], size_t n_v), __VA_ARGS__)
 #define SET(name, type, ...)                                                                     \
     FUNCTION(name, MASK_Set, wrong_numbers(n, r, v, n_v),                                        \
              (void *c, const uint32_t r[], size_t n, const type v[], size_t n_v), __VA_ARGS__)
-#define GET_EACH(name, type, get)                                                                \
-    GET(name, type, prepare_to_get(&this, r, n); FOR_EACH(v[k] = get(&this, reference)))
-#define SET_EACH(name, c_type, type, number)                                                     \
-    SET(name, c_type, {                                                                          \
-        setting it = begin_setting(&this, type, r, n);                                           \
-        FOR_EACH(set_value(&it, reference, (double)(number)));                                   \
-        end_setting(&it);                                                                        \
-    })
+
+static double get_float(call *this, uint32_t reference) {
+    return reference == TIME ? time_of(this) : get_real(this, reference);
+}
 
 static int64_t get_enumeration(call *this, uint32_t reference) {
     return (int64_t)number_of(this, reference, ENUMERATION);
 }
 
-GET_EACH(fmi3GetInt32, int32_t, get_integer)
-GET_EACH(fmi3GetBoolean, boolean, get_boolean)
-GET_EACH(fmi3GetInt64, int64_t, get_enumeration)
-SET_EACH(fmi3SetInt32, int32_t, INTEGER, v[k])
-SET_EACH(fmi3SetBoolean, boolean, BOOLEAN, v[k] != 0)
-SET_EACH(fmi3SetInt64, int64_t, ENUMERATION, v[k])
-
-#ifdef ARRAYS
-static double get_float(call *this, uint32_t reference) {
-    return reference == TIME ? time_of(this) : number_of(this, reference, REAL);
-}
-
-GET_EACH(fmi3GetFloat64, double, get_float)
-SET_EACH(fmi3SetFloat64, double, REAL, v[k])
-#else
 GET(fmi3GetFloat64, double, {
-    for (size_t i = 0, from = 0; i <= n; i++) {
-        if (i < n && r[i] != TIME) continue;
-        if (i > from) get_reals(&this, &r[from], i - from, &v[from]);
-        if (i < n) v[i] = time_of(&this);
-        from = i + 1;
-    }
+    prepare_to_get(&this, r, n);
+    if (n != n_v || !get_all_reals(&this, r, n, v)) GET_EACH(get_float);
 })
-SET(fmi3SetFloat64, double, set_reals(&this, r, n, v))
-#endif
+GET(fmi3GetInt32, int32_t, prepare_to_get(&this, r, n); GET_EACH(get_integer))
+GET(fmi3GetBoolean, boolean, prepare_to_get(&this, r, n); GET_EACH(get_boolean))
+GET(fmi3GetInt64, int64_t, prepare_to_get(&this, r, n); GET_EACH(get_enumeration))
+SET(fmi3SetFloat64, double, if (n != n_v || !set_all_reals(&this, r, n, v)) {
+    SET_EACH(REAL, v[k]);
+})
+SET(fmi3SetInt32, int32_t, SET_EACH(INTEGER, v[k]))
+SET(fmi3SetBoolean, boolean, SET_EACH(BOOLEAN, v[k] != 0))
+SET(fmi3SetInt64, int64_t, SET_EACH(ENUMERATION, v[k]))
 
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 

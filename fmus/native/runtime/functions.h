@@ -23,31 +23,27 @@ FORWARDED(fmi2CancelStep, MASK_NotSupported, NULL, (void *c), (c),
 
 /* Values */
 
-#define FOR_EACH(action)                                                                         \
-    for (size_t i = 0; i < n; i++) action
-
 #define GET(name, type, ...)                                                                     \
     FORWARDED(name, MASK_Get, wrong_values(n, r, v),                                             \
-              (void *c, const uint32_t r[], size_t n, type v[]), (c, r, n, v), __VA_ARGS__)
+              (void *c, const uint32_t r[], size_t n, type v[]), (c, r, n, v),                   \
+              prepare_to_get(&this, r, n); __VA_ARGS__)
 #define SET(name, type, wrong, ...)                                                              \
     FORWARDED(name, MASK_Set, wrong, (void *c, const uint32_t r[], size_t n, const type v[]),    \
               (c, r, n, v), __VA_ARGS__)
-#define SET_EACH(name, c_type, type, number)                                                     \
-    SET(name, c_type, wrong_values(n, r, v), {                                                   \
-        setting it = begin_setting(&this, type, r, n);                                           \
-        FOR_EACH(set_value(&it, r[i], number));                                                  \
-        end_setting(&it);                                                                        \
-    })
 
-GET(fmi2GetReal, double, get_reals(&this, r, n, v))
-GET(fmi2GetInteger, int, prepare_to_get(&this, r, n); FOR_EACH(v[i] = get_integer(&this, r[i])))
-GET(fmi2GetBoolean, int, prepare_to_get(&this, r, n); FOR_EACH(v[i] = get_boolean(&this, r[i])))
-SET(fmi2SetReal, double, wrong_values(n, r, v), set_reals(&this, r, n, v))
-SET_EACH(fmi2SetInteger, int, INTEGER, v[i])
-SET_EACH(fmi2SetBoolean, int, BOOLEAN, v[i] != 0)
+GET(fmi2GetReal, double, if (!get_all_reals(&this, r, n, v)) GET_EACH(get_real))
+GET(fmi2GetInteger, int, GET_EACH(get_integer))
+GET(fmi2GetBoolean, int, GET_EACH(get_boolean))
+SET(fmi2SetReal, double, wrong_values(n, r, v),
+    if (!set_all_reals(&this, r, n, v)) { SET_EACH(REAL, v[k]); })
+SET(fmi2SetInteger, int, wrong_values(n, r, v), SET_EACH(INTEGER, v[k]))
+SET(fmi2SetBoolean, int, wrong_values(n, r, v), SET_EACH(BOOLEAN, v[k] != 0))
 
 /* No variable is a text. */
-GET(fmi2GetString, string, FOR_EACH(v[i] = ""); get_unknown(&this, "String", r, n))
+FORWARDED(fmi2GetString, MASK_Get, wrong_values(n, r, v),
+          (void *c, const uint32_t r[], size_t n, string v[]), (c, r, n, v),
+          for (size_t i = 0; i < n; i++) v[i] = "";
+          get_unknown(&this, "String", r, n))
 SET(fmi2SetString, string, wrong_strings(n, r, v), set_unknown(&this, "String", r, n))
 
 /* States */
