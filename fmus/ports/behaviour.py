@@ -242,18 +242,12 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
 def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The type that each argument has in all hooks: what most of them say."""
     found: dict[str, list[Any]] = {}
-    for name, hint in _said_of_groups(hints):
-        found.setdefault(name, []).append(form(hint))
+    for name, hint in hints.items():
+        said = [(argument, argument) for argument in _GROUPS if argument in hint]
+        for group, place in [*said, *([(_SAME[name], "return")] if name in _SAME else [])]:
+            found.setdefault(group, []).append(form(hint[place]))
     types = {name: max(forms, key=forms.count) for name, forms in found.items()}
     return {**types, **_ARGUMENTS}
-
-
-def _said_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any]]:
-    """The types of the component's own groups, as each hook takes or returns them."""
-    for name, found in hints.items():
-        yield from ((argument, found[argument]) for argument in _GROUPS if argument in found)
-        if name in _SAME:
-            yield _SAME[name], found["return"]
 
 
 def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:

@@ -45,14 +45,8 @@ _CAPABILITIES = {**CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFM
 #: The file of a component's sources that includes all others, and what it is written in.
 SOURCE, _LANGUAGE = "fmi3.c", "C99"
 
-#: What is linked besides the C library, by platform: mathematics may be apart from it.
-_LIBRARIES = {
-    "x86_64-linux": ("m",),
-    "aarch64-linux": ("m",),
-    "x86_64-windows": (),
-    "x86_64-darwin": (),
-    "aarch64-darwin": (),
-}
+#: The platforms that a build is described for.
+_PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
 
 
 def fmi3_description(definition: Definition, token: str, arrays: bool = False) -> bytes:
@@ -84,12 +78,13 @@ def fmi3_description(definition: Definition, token: str, arrays: bool = False) -
 def fmi3_build_description(name: str) -> bytes:
     """What an importer has to compile: one file, with any compiler and no options."""
     root = Element("fmiBuildDescription", fmiVersion=_VERSION)
-    for platform, libraries in _LIBRARIES.items():
+    for platform in _PLATFORMS:
         built = SubElement(root, "BuildConfiguration", modelIdentifier=name, platform=platform)
         sources = SubElement(built, "SourceFileSet", language=_LANGUAGE)
         SubElement(sources, "SourceFile", name=SOURCE)
-        for library in libraries:
-            SubElement(built, "Library", name=library, external="true")
+        if platform.endswith("-linux"):
+            # There mathematics is apart from the C library.
+            SubElement(built, "Library", name="m", external="true")
     return text(root)
 
 

@@ -6,11 +6,11 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, get_args, get_origin
+from typing import Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.variable import Refusal, Variable
-from fmus.ports.groups import check_type, fields_of, is_record, word
+from fmus.ports.groups import check_type, fields_of, is_record, sizes_in, split, word
 from fmus.ports.port import Array, Misdeclared, Port
 
 
@@ -62,7 +62,7 @@ def _declared(
     fields: dict[str, tuple[Port, ...]] = {}
     for field, hint in fields_of(made).items():
         place, start = (made.__name__, field), starts.get(field)
-        inner, notes = _annotated(hint)
+        inner, notes = split(hint)
         if is_record(inner):
             if start is not None and not isinstance(start, inner):
                 raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
@@ -144,14 +144,6 @@ def _is_member(name: object) -> bool:
     return type(name) is int and name >= 0
 
 
-def _annotated(hint: Any) -> tuple[Any, tuple[Any, ...]]:
-    """A type without what is noted of it, and that."""
-    if get_origin(hint) is Annotated:
-        inner, *notes = get_args(hint)
-        return inner, tuple(notes)
-    return hint, ()
-
-
 def _word(hint: Any) -> str:
     """A type as it is written."""
     if hint in (Vector, Matrix):
@@ -194,12 +186,12 @@ def _shape(
 ) -> tuple[tuple[int, ...], Any]:
     """How many numbers a type has along each dimension, and of which type."""
     if hint in (Vector, Matrix):
-        return tuple(note for note in notes if type(note) is int), float
+        return sizes_in(notes), float
     if get_origin(hint) is tuple:
         elements = [*dict.fromkeys(get_args(hint))]
         if len(elements) != 1 or get_args(hint) == ((),):
             raise _wrong(place, "has elements of several types; write a NamedTuple")
-        below, number = _shape(*_annotated(elements[0]), place)
+        below, number = _shape(*split(elements[0]), place)
         return (len(get_args(hint)), *below), number
     if is_record(hint):
         raise _wrong(place, "is a tuple of NamedTuples; write a NamedTuple of them")

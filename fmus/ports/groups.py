@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from functools import cache
 from itertools import count, groupby
@@ -48,13 +48,12 @@ def hints_of(owner: Any) -> dict[str, Any]:
 
 def parts_of(hint: Any) -> list[Any] | None:
     """The types of the elements of a tuple, a vector, a matrix or a NamedTuple; None: a number."""
-    if get_origin(hint) is Annotated:
-        hint, *notes = get_args(hint)
-        sizes = [note for note in notes if type(note) is int]
-        if hint is Vector:
-            return [float] * sizes[0]
-        if hint is Matrix:
-            return [Annotated[Vector, sizes[1]]] * sizes[0]
+    hint, notes = split(hint)
+    sizes = sizes_in(notes)
+    if hint is Vector and sizes:
+        return [float] * sizes[0]
+    if hint is Matrix and sizes:
+        return [Annotated[Vector, sizes[1]]] * sizes[0]
     if is_record(hint):
         return _parts_of_record(hint)
     arguments = get_args(hint)
@@ -76,15 +75,27 @@ def is_class(hint: Any, base: type) -> bool:
     return isinstance(hint, type) and get_origin(hint) is None and issubclass(hint, base)
 
 
+def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
+    """A type without what is noted beside it, and that."""
+    if get_origin(hint) is Annotated:
+        inner, *notes = get_args(hint)
+        return inner, tuple(notes)
+    return hint, ()
+
+
+def sizes_in(notes: Iterable[Any]) -> tuple[int, ...]:
+    """The sizes of a vector or a matrix, of what is noted beside its type."""
+    return tuple(note for note in notes if type(note) is int)
+
+
 def class_of(hint: Any) -> Any:
     """A type without what is noted beside it."""
-    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    return split(hint)[0]
 
 
 def count_values(hint: Any) -> int:
     """How many numbers a type holds."""
-    parts = parts_of(hint)
-    return 1 if parts is None else sum(map(count_values, parts))
+    return sum(1 for _ in scalars_of(hint))
 
 
 def scalars_of(hint: Any) -> Iterator[Any]:
@@ -105,8 +116,8 @@ def is_whole(hint: Any) -> bool:
 def form(hint: Any) -> Any:
     """A type that equals all others whose values are alike: with its sizes, without other notes."""
     if get_origin(hint) is Annotated:
-        inner, *notes = get_args(hint)
-        sizes = tuple(note for note in notes if type(note) is int)
+        inner, notes = split(hint)
+        sizes = sizes_in(notes)
         return Annotated[(inner, *sizes)] if inner in (Vector, Matrix) and sizes else form(inner)
     if get_origin(hint) is tuple:
         return GenericAlias(tuple, tuple(map(form, get_args(hint))))
@@ -137,10 +148,9 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
         Misdeclared: it is none of the language of equations.
 
     """
-    kind, where = class_of(hint), f"{'.'.join(place)} " if place else ""
+    (kind, notes), where = split(hint), f"{'.'.join(place)} " if place else ""
     if kind in (Vector, Matrix):
-        notes = get_args(hint)[1:]
-        sizes = [note for note in notes if type(note) is int]
+        sizes = sizes_in(notes)
         if len(sizes) != (1 if kind is Vector else 2) or min(sizes) < 1:
             said = f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
             why = f"is a {kind.__name__} without its size; write Annotated[{said}]"

@@ -207,14 +207,14 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     def set_real(self, vrs: list[int], values: list[Any]) -> None:
         store = self._store
         # A sum is finite only if every value is; _set finds out which one was not.
-        if vrs == store.only_inputs and self._mode == STEPPING and isfinite(sum(values)):
+        if vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
+            if not store.has_only_reals:
+                values = [*values, *store.inputs[len(values) :]]
             store.inputs, store.groups = values, self.unpack(values)
             if self._outputs_follow:
                 store.fresh = False
             if self._derived_follows:
                 store.derived = None
-        elif vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
-            self._take_inputs([*values, *store.inputs[len(values) :]])
         else:
             self._set(vrs, values, "Real")
 

@@ -78,17 +78,6 @@ _GUID = re.compile(rb'guid="[^"]*"')
 _TIME = re.compile(rb' generationDateAndTime="[^"]*"')
 
 
-def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
-    """Lay out a script and the modules it needs the way PythonFMU wants them."""
-    path = stage / f"{script}.py"
-    path.write_text(text, encoding="utf-8")
-    for place, source in modules_of(text, _FOLDERS, own).items():
-        target = stage / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
-    return path
-
-
 def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:
     """The contents of an FMU, before it is sealed.
 
@@ -107,7 +96,12 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
         # Not the name itself: some file systems would take lag.py, beside it, for Lag.py.
-        path = _stage(text, stage, f"{name}_fmu", own)
+        path = stage / f"{name}_fmu.py"
+        path.write_text(text, encoding="utf-8")
+        for place, source in modules_of(text, _FOLDERS, own).items():
+            target = stage / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
         raw = pythonfmu.FmuBuilder.build_FMU(
             path, dest=built, project_files=set(stage.iterdir()) - {path}
         )

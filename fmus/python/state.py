@@ -67,7 +67,8 @@ class Store:
         all_outputs: the references of all outputs but `fault`.
         real_outputs: the references of the Reals among them.
         free_inputs: the references of the Real inputs, if none of them has a range; else None.
-        only_inputs, only_outputs: these, if there are no others; else None.
+        has_only_reals: whether all inputs are Reals.
+        only_outputs: the references of all outputs, if these are Reals; else None.
         parameters: by name.
         fault: whether a value or a step was discarded.
         fresh: whether the outputs are up to date: nothing has changed that they depend on.
@@ -90,7 +91,7 @@ class Store:
         real_inputs = [r for r in self.input_references if ports[r].type == "Real"]
         limits = [limit for r in real_inputs for limit in (ports[r].minimum, ports[r].maximum)]
         self.free_inputs = real_inputs if all(limit is None for limit in limits) else None
-        self.only_inputs = self.free_inputs if real_inputs == self.input_references else None
+        self.has_only_reals = real_inputs == self.input_references
         self.real_outputs = [r for r in self.output_references if ports[r].type == "Real"]
         has_others = self.real_outputs != self.output_references
         self.only_outputs = None if has_others else self.real_outputs

@@ -217,20 +217,6 @@ static int check_settable(const run *run, const port *port, double number, messa
            compose(why, "%s is fixed and cannot change after initialisation", port->name);
 }
 
-static int take_value(setting *it, const port *port, double number, message *why) {
-    instance *instance = it->call->instance;
-    if (is_settled(&instance->run, port)) return 1;
-    if (!check_range(port, number, why)) return 0;
-    if (port->causality == INPUT) {
-        instance->set_inputs.values[port->place] = number;
-        it->changes_inputs = 1;
-    } else {
-        it->changes_parameters = 1;
-        put_parameter(&instance->set_parameters, port, number);
-    }
-    return 1;
-}
-
 /* A run with another parameter than the host asked for must not begin. */
 static void refuse_setting(setting *it, message *why) {
     it->good = 0;
@@ -243,14 +229,23 @@ static void refuse_setting(setting *it, message *why) {
 }
 
 static void set_value(setting *it, uint32_t reference, double number) {
-    message why;
+    instance *instance = it->call->instance;
     const port *port = port_at(reference);
+    message why;
     if (!it->good) return;
-    if (!check_settable(&it->call->instance->run, port, number, &why)) {
+    if (!check_settable(&instance->run, port, number, &why)) {
         it->good = 0;
         fail(it->call, &why);
-    } else if (!take_value(it, port, number, &why)) {
+    } else if (is_settled(&instance->run, port)) {
+        return;
+    } else if (!check_range(port, number, &why)) {
         refuse_setting(it, &why);
+    } else if (port->causality == INPUT) {
+        instance->set_inputs.values[port->place] = number;
+        it->changes_inputs = 1;
+    } else {
+        put_parameter(&instance->set_parameters, port, number);
+        it->changes_parameters = 1;
     }
 }
 
