@@ -27,20 +27,6 @@ static void call_logger(const logger *host, string name, int status, string cate
     ((fmi2_logger)host->function)(host->environment, name, status, category, format);
 }
 
-EXPORT string NAMED(fmi2GetTypesPlatform)(void) { return "default"; }
-
-EXPORT string NAMED(fmi2GetVersion)(void) { return "2.0"; }
-
-/* The component needs no resources. */
-EXPORT void *NAMED(fmi2Instantiate)(string name, int type, string guid, string location,
-                                    const callbacks *functions, int visible, int logging) {
-    return instantiate("fmi2Instantiate",
-                       type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only", name,
-                       version.token, guid, location, visible, logger_of(functions), logging);
-}
-
-EXPORT void NAMED(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }
-
 FUNCTION(fmi2Reset, MASK_Reset, NULL, (void *c), renew(this.instance))
 FUNCTION(fmi2SetupExperiment, MASK_SetupExperiment, NULL,
          (void *c, int has_tolerance, double tolerance, double start, int has_stop, double stop),

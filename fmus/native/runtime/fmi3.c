@@ -224,8 +224,8 @@ UNSUPPORTED(fmi3EnterContinuousTimeMode, void *c)
 UNSUPPORTED(fmi3EnterConfigurationMode, void *c)
 UNSUPPORTED(fmi3ExitConfigurationMode, void *c)
 UNSUPPORTED(fmi3EvaluateDiscreteStates, void *c)
-UNSUPPORTED(fmi3UpdateDiscreteStates, void *c, boolean *needed, boolean *terminate, boolean *nominals,
-            boolean *values, boolean *defined, double *next)
+UNSUPPORTED(fmi3UpdateDiscreteStates, void *c, boolean *needed, boolean *terminate,
+            boolean *nominals, boolean *values, boolean *defined, double *next)
 UNSUPPORTED(fmi3GetNumberOfVariableDependencies, void *c, uint32_t variable, size_t *n)
 UNSUPPORTED(fmi3GetVariableDependencies, void *c, uint32_t variable, size_t elements[],
             uint32_t independents[], size_t independent_elements[], int kinds[], size_t n)
@@ -245,13 +245,14 @@ UNSUPPORTED(fmi3GetShiftDecimal, void *c, const uint32_t r[], size_t n, double s
 UNSUPPORTED(fmi3GetShiftFraction, void *c, const uint32_t r[], size_t n, uint64_t counters[],
             uint64_t resolutions[])
 UNSUPPORTED(fmi3SetIntervalDecimal, void *c, const uint32_t r[], size_t n, const double intervals[])
-UNSUPPORTED(fmi3SetIntervalFraction, void *c, const uint32_t r[], size_t n, const uint64_t counters[],
-            const uint64_t resolutions[])
+UNSUPPORTED(fmi3SetIntervalFraction, void *c, const uint32_t r[], size_t n,
+            const uint64_t counters[], const uint64_t resolutions[])
 UNSUPPORTED(fmi3SetShiftDecimal, void *c, const uint32_t r[], size_t n, const double shifts[])
 UNSUPPORTED(fmi3SetShiftFraction, void *c, const uint32_t r[], size_t n, const uint64_t counters[],
             const uint64_t resolutions[])
 UNSUPPORTED(fmi3ActivateModelPartition, void *c, uint32_t clock, double time)
-UNSUPPORTED(fmi3CompletedIntegratorStep, void *c, boolean no_set, boolean *event, boolean *terminate)
+UNSUPPORTED(fmi3CompletedIntegratorStep, void *c, boolean no_set, boolean *event,
+            boolean *terminate)
 UNSUPPORTED(fmi3SetTime, void *c, double time)
 UNSUPPORTED(fmi3SetContinuousStates, void *c, const double states[], size_t n)
 UNSUPPORTED(fmi3GetContinuousStateDerivatives, void *c, double derivatives[], size_t n)

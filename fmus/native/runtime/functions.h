@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0 that are called with an instance, for both kinds of component.
+/* The functions of FMI 2.0 for both kinds of component. Those that are called with an instance:
  *
  *     FUNCTION(name, allowed, wrong, parameters, action)
  *     FORWARDED(name, allowed, wrong, parameters, arguments, action)
@@ -6,6 +6,19 @@
  * Components in C do the action of both. For those in Python the loader does that of the first, and
  * forwards the second with these arguments to PythonFMU.
  */
+
+EXPORT string NAMED(fmi2GetTypesPlatform)(void) { return "default"; }
+
+EXPORT string NAMED(fmi2GetVersion)(void) { return "2.0"; }
+
+EXPORT void *NAMED(fmi2Instantiate)(string name, int type, string guid, string location,
+                                    const callbacks *functions, int visible, int logging) {
+    string wrong = type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only";
+    return instantiate("fmi2Instantiate", wrong, name, "GUID", guid, location, visible,
+                       logger_of(functions), logging);
+}
+
+EXPORT void NAMED(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }
 
 FUNCTION(fmi2SetDebugLogging, MASK_SetDebugLogging, wrong_texts(n, categories),
          (void *c, int on, size_t n, const string categories[]),
@@ -81,8 +94,8 @@ STATUS(fmi2GetStatus, int, FMI_ERROR)
 STATUS(fmi2GetIntegerStatus, int, FMI_DISCARD)
 STATUS(fmi2GetStringStatus, string, FMI_DISCARD)
 
-/* No answer: with "true", which is PythonFMU's after each refused step, hosts would end the run as a
- * success; with "false" FMPy would repeat the step without end. */
+/* No answer: with "true", which is PythonFMU's after each refused step, hosts would end the run as
+ * a success; with "false" FMPy would repeat the step without end. */
 FUNCTION(fmi2GetBooleanStatus, MASK_Get, wrong_place(v), (void *c, int kind, int *v), {
     *v = 0;
     this.status = FMI_DISCARD;

@@ -215,7 +215,8 @@ static int check_noise(const generator *noise, const double draws[], message *wh
 /* Whether all that was read of a run can be one's. */
 static int check_run(const run *it, message *why) {
     const moment *now = &it->moments[it->now];
-    if ((uint32_t)it->mode > TERMINATED) return compose(why, "%u is not a mode", (uint32_t)it->mode);
+    const uint32_t mode = (uint32_t)it->mode;
+    if (mode > TERMINATED) return compose(why, "%u is not a mode", mode);
     if (!isfinite(it->start_time) || isnan(now->time)) {
         return compose(why, "a value is not finite");
     }

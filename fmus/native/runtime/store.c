@@ -285,8 +285,8 @@ static int set_all_reals(call *this, const uint32_t references[], size_t n, cons
 
 /* References and values of a call, one by one */
 
-/* How many values a reference stands for: those of a scalar, or of an array, whose reference is that
- * of its first element. */
+/* How many values a reference stands for: that of a scalar, or those of an array, whose reference
+ * is that of its first element. */
 static size_t span(uint32_t reference) {
 #ifdef ARRAYS
     uint32_t place = reference - FIRST_REFERENCE;

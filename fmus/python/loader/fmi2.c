@@ -24,21 +24,6 @@
         take_answer(call);                                                                       \
     } while (0)
 
-EXPORT string fmi2GetTypesPlatform(void) { return "default"; }
-
-EXPORT string fmi2GetVersion(void) { return "2.0"; }
-
-EXPORT void *fmi2Instantiate(string name, int type, string guid, string location,
-                             const callbacks *functions, int visible, int logging) {
-    string wrong = type != CO_SIMULATION ? "this FMU is for co-simulation only"
-                   : location == NULL    ? "there is no resource location"
-                                         : NULL;
-    return instantiate("fmi2Instantiate", wrong, name, "GUID", guid, location, visible,
-                       logger_of(functions), logging);
-}
-
-EXPORT void fmi2FreeInstance(void *c) { free_instance(c, "fmi2FreeInstance"); }
-
 /* After a call: steps have come to a time, unless the slave has told another. */
 static void come_to(call *this, double time) {
     instance *it = this->instance;

@@ -152,7 +152,11 @@ static void *new_component(instance *it, string guid, string location, int visib
     void *handle = NULL;
     it->heard = (callbacks){.logger = log_of_slave, .environment = it};
     compose(why, "the slave cannot be created");
-    if (plain_path(location, &path, why)) handle = make(it, guid, path, visible, why);
+    if (location == NULL) {
+        compose(why, "there is no resource location");
+    } else if (plain_path(location, &path, why)) {
+        handle = make(it, guid, path, visible, why);
+    }
     free(path);
     if (it->has_logged_error) clear(why);
     log_queue(it);
