@@ -6,6 +6,7 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.language.arrays import Matrix, Vector
@@ -39,7 +40,12 @@ _SOURCE = re.compile(r"[\w.,\[\]{}]+", re.ASCII)
 
 
 def declared(
-    made: Any, causality: str, direct: tuple[str, ...] = (), initial: tuple[str, ...] = ()
+    made: Any,
+    causality: str,
+    direct: tuple[str, ...] = (),
+    initial: tuple[str, ...] = (),
+    prefix: str = "",
+    given: Any = None,
 ) -> dict[str, tuple[Port, ...]]:
     """The ports of each field of a class, by the names of its fields.
 
@@ -47,17 +53,13 @@ def declared(
         made: the class, a NamedTuple.
         causality: of the ports: `input`, `output` or `parameter`.
         direct, initial: `feedthrough` and `initially` of outputs that do not say it.
+        prefix: what the names of the ports begin with.
+        given: the start values, if they are others than those of the class.
 
     Raises:
         Misdeclared: a field is wrong, or says too little.
 
     """
-    return _declared(made, causality, Variable(feedthrough=direct, initially=initial), "", None)
-
-
-def _declared(
-    made: Any, causality: str, default: Variable, prefix: str, given: Any
-) -> dict[str, tuple[Port, ...]]:
     starts = dict(made._field_defaults) if given is None else given._asdict()
     fields: dict[str, tuple[Port, ...]] = {}
     for field, hint in fields_of(made).items():
@@ -67,8 +69,8 @@ def _declared(
             if start is not None and not isinstance(start, inner):
                 raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
             before = prefix + _prefix(notes, field, place)
-            below = _declared(inner, causality, default, before, start)
-            fields[field] = tuple(port for ports in below.values() for port in ports)
+            below = declared(inner, causality, direct, initial, before, start)
+            fields[field] = tuple(chain(*below.values()))
             continue
         said = _said(notes, causality, place, inner)
         check_type(hint, *place)
@@ -76,9 +78,10 @@ def _declared(
         if causality == "parameter" and any(part.start is None for part in parts):
             raise _wrong(place, "has no default value, which a parameter starts with")
         if causality == "output":
-            for name in ("feedthrough", "initially"):
-                if getattr(said, name) is None:
-                    said = replace(said, **{name: getattr(default, name)})
+            if said.feedthrough is None:
+                said = replace(said, feedthrough=direct)
+            if said.initially is None:
+                said = replace(said, initially=initial)
         ports = [_port(causality, said, part, place) for part in parts]
         if len({part.unit for part in parts}) == 1 and "{}" not in (said.name or ""):
             shape = _shape(inner, notes, place)[0]

@@ -212,7 +212,7 @@ def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]
     ordered = [name for name, _ in sorted(zip(names, ports), key=lambda one: one[1].type != "Real")]
     scope = {**SCOPE}
     result = gathered(made, iter(names), scope)
-    return _compiled(f"({', '.join(ordered)},) = values\n return {result}", "values", scope)
+    return compiled("values", f"({', '.join(ordered)},) = values\n return {result}", scope)
 
 
 def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
@@ -282,14 +282,14 @@ def whole(value: int) -> int:
 SCOPE: Mapping[str, Any] = {"make": tuple.__new__, "whole": whole}
 
 
-def _compiled(body: str, argument: str, scope: dict[str, Any]) -> Callable[..., Any]:
+def compiled(argument: str, body: str, scope: dict[str, Any]) -> Callable[[Any], Any]:
     """A function from its text.
 
     It runs once a step in each component, and a loop over the groups costs several times the
     same thing written out.
     """
     exec(f"def function({argument}):\n {body}", scope)
-    function: Callable[..., Any] = scope["function"]
+    function: Callable[[Any], Any] = scope["function"]
     return function
 
 

@@ -1,8 +1,6 @@
-"""The values of an instance, and the state of an FMU that is made of them.
+"""The values of an instance, and the state of its FMU: complete, exact, and checked when taken.
 
-A state is complete, exact, in memory or as bytes, and checked before it is taken.
-
-That of a component is a NamedTuple of numbers, truth values, members of enumerations, and of
+The state of a component is a NamedTuple of numbers, truth values, members of enumerations, and of
 tuples, vectors, matrices and NamedTuples of them.
 """
 
@@ -20,7 +18,7 @@ from typing import Any, Callable, TypedDict
 
 from auv_fmu.language.variable import Refusal
 from fmus.ports.behaviour import Behaviour
-from fmus.ports.groups import class_of, is_class, parts_of, whole
+from fmus.ports.groups import class_of, compiled, is_class, parts_of, whole
 from fmus.ports.port import FAULT, Port, Value, is_int32
 from fmus.python.loading import MISSING
 from fmus.python.noise import Noise, check_draws
@@ -195,10 +193,7 @@ def measuring(hint: type) -> Callable[[Any], float]:
 
     pattern = target(hint)
     norm = f"hypot({', '.join(floats)})" if floats else "0.0"
-    text = f"def function(state):\n {pattern} = state\n {''.join(integers)}return {norm}"
-    exec(text, scope)
-    function: Callable[[Any], float] = scope["function"]
-    return function
+    return compiled("state", f"{pattern} = state\n {''.join(integers)}return {norm}", scope)
 
 
 def _member(value: int, kind: type[IntEnum]) -> IntEnum:

@@ -20,10 +20,12 @@ static void *new_component(instance *it, string token, string location, int visi
 static void free_component(call *this);
 static void release_instance(instance *it);
 
-/* What the handle of a state stands for: makes it; NULL: it could not be made, for want of memory
- * if the call has not been refused. The same from bytes, and to bytes. Frees it. */
+/* Makes what the handle of a state stands for, of an instance or of bytes; NULL: it could not be
+ * made, for want of memory if the call has not been refused. */
 static void *make_saved(call *this);
 static void *read_saved(call *this, const void *bytes, size_t size);
+
+/* Its bytes, and its end. */
 static size_t size_of_saved(call *this, void *saved);
 static void write_saved(call *this, void *saved, void *bytes, size_t size);
 static void free_saved(instance *it, void *saved);
