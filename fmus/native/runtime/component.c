@@ -1,7 +1,7 @@
 /* The component: what the equations and ports of a model need to be an FMU.
  *
- * fmi2.c and fmi3.c are written over this, each one translation unit. They define what a version
- * calls things, and what is declared here of it, and include this file. A function of FMI is then
+ * fmi2.c and fmi3.c are written over this, each one translation unit: they define NAMED,
+ * FIRST_REFERENCE, `version` and call_logger, and include this file. A function of FMI is then
  *
  *     FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
  *

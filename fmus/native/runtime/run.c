@@ -24,7 +24,6 @@ static void renew_run(run *it) {
     it->moments[it->now].outputs_are = FRESH;
 }
 
-/* Makes everything what it is after instantiation. */
 static void renew(instance *it) {
     renew_run(&it->run);
     it->stale = 0;
