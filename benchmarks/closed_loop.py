@@ -28,8 +28,8 @@ from measuring import options, python, steps_time, timed
 from auv_fmu.loop.closed_loop import closed_loop
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
-from fmus.python.callbacks import STEPPING
 from fmus.python.component import Component
+from fmus.python.state import STEPPING
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import Instance
 from orchestrator.master.fmi.slaves import FMU2OfOthers

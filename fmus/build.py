@@ -27,8 +27,7 @@ from fmus.discovery import (
 from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
 from fmus.native.packaging import NativeKind
 from fmus.python.modules import modules_of
-from fmus.python.own import build_script
-from fmus.python.packaging import LOADERS, PythonKind, best_loader
+from fmus.python.packaging import LOADERS, PythonKind, best_loader, build_script
 from fmus.script import (
     data_files,
     is_component,

@@ -60,69 +60,52 @@ def run(
     """
     if not (step > 0.0 and isfinite(step) and stop_time >= start_time):
         raise ValueError(f"no run from {start_time:g} s to {stop_time:g} s by steps of {step:g} s")
-    one = _Trial(module, start_time)
+    name = name_of(module.__name__.rpartition(".")[2])
+    base: Any = slave_of(name, module)
+    slave: Any = type(name, (base,), {"describe": _raised})(instance_name=name)
     given = inputs if callable(inputs) else lambda t: inputs or {}
-    one.set("parameter", parameters or {})
-    one.set("input", given(start_time))
-    one.begin()
-    outputs = [port for port in one.ports.values() if port.causality == "output"]
-    result: dict[str, list[Any]] = {"time": [], **{port.name: [] for port in outputs}}
+    slave.setup_experiment(start_time)
+    _set(slave, "parameter", parameters or {})
+    _set(slave, "input", given(start_time))
+    slave.enter_initialization_mode()
+    slave.exit_initialization_mode()
+    outputs = _ports(slave, "output")
+    result: dict[str, list[Any]] = {"time": [], **{port.name: [] for _, port in outputs}}
     count = round((stop_time - start_time) / step)
     for k in range(count + 1):
         t = start_time + k * step
         if k > 0:
-            one.set("input", given(t))
+            _set(slave, "input", given(t))
         result["time"].append(t)
-        for port in outputs:
-            result[port.name].append(one.get(port))
+        for reference, port in outputs:
+            result[port.name] += getattr(slave, f"get_{_passed_as(port)}")([reference])
         if k < count:
-            one.step(t, step)
+            slave.do_step(t, step)
     return result
 
 
-class _Trial:
-    """One instance, whose refusals are raised."""
+def _ports(slave: Any, causality: str) -> list[tuple[int, Port]]:
+    """The ports of a causality, and their value references."""
+    ports = enumerate(slave._store.ports)
+    return [(reference, port) for reference, port in ports if port.causality == causality]
 
-    def __init__(self, module: ModuleType, start_time: float) -> None:
-        name = name_of(module.__name__.rpartition(".")[2])
-        base: Any = slave_of(name, module)
-        self._slave: Any = type(name, (base,), {"describe": _raised})(instance_name=name)
-        self._slave.setup_experiment(start_time)
-        self.ports = {port.name: port for port in self._slave._store.ports}
-        self._references = {name: reference for reference, name in enumerate(self.ports)}
 
-    def set(self, causality: str, values: Mapping[str, Any]) -> None:
-        """Set ports of a causality, one by one or all of a vector."""
-        known = [port for port in self.ports.values() if port.causality == causality]
-        for name, value in values.items():
-            ports = [port for port in known if name in (port.name, group_name(port.name))]
-            if not ports:
-                names = ", ".join(port.name for port in known) or "none"
-                raise ValueError(f"no {causality} {name!r}; there are: {names}")
-            given = [value] if ports[0].name == name else _flat(value)
-            if len(given) != len(ports):
-                raise ValueError(f"{name}: {len(given)} values for {len(ports)} ports")
-            for port, one in zip(ports, given):
-                put = getattr(self._slave, f"set_{_passed_as(port)}")
-                put([self._references[port.name]], [_meant(port, one)])
-        if causality == "input":
-            # Those that stay as they are belong to a new time.
-            self._slave._forget("inputs")
-
-    def get(self, port: Port) -> Any:
-        """The value of an output."""
-        read = getattr(self._slave, f"get_{_passed_as(port)}")
-        [value] = read([self._references[port.name]])
-        return value
-
-    def begin(self) -> None:
-        """Enter the run."""
-        self._slave.enter_initialization_mode()
-        self._slave.exit_initialization_mode()
-
-    def step(self, t: float, h: float) -> None:
-        """Take a step."""
-        self._slave.do_step(t, h)
+def _set(slave: Any, causality: str, values: Mapping[str, Any]) -> None:
+    """Set ports of a causality, one by one or all of a vector."""
+    known = _ports(slave, causality)
+    for name, value in values.items():
+        found = [one for one in known if name in (one[1].name, group_name(one[1].name))]
+        if not found:
+            names = ", ".join(port.name for _, port in known) or "none"
+            raise ValueError(f"no {causality} {name!r}; there are: {names}")
+        given = [value] if found[0][1].name == name else _flat(value)
+        if len(given) != len(found):
+            raise ValueError(f"{name}: {len(given)} values for {len(found)} ports")
+        for (reference, port), one in zip(found, given):
+            getattr(slave, f"set_{_passed_as(port)}")([reference], [_meant(port, one)])
+    if causality == "input":
+        # Those that stay as they are belong to a new time.
+        slave._forget("inputs")
 
 
 def _raised(slave: object, error: BaseException) -> str:

@@ -1,8 +1,8 @@
 """What a component may say: the hooks that both kinds of FMU call.
 
-The functions of a component are the :class:`Hooks`, and those that they call. A hook takes the
-arguments that it needs, under their names and in any order. All of it is in the language of
-equations (language.md), because the C kind runs its translation.
+They are those of x_k+1 = update(x_k, u_k) and y_k = outputs(x_k, u_k). A hook takes the arguments
+that it needs, under their names and in any order. All of it is in the language of equations
+(language.md), because the C kind runs its translation.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from inspect import signature
 from math import isfinite
 from string import Formatter
 from types import CodeType, FunctionType, ModuleType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from fmus.ports.groups import (
     Nothing,
@@ -29,132 +29,23 @@ from fmus.ports.groups import (
 )
 from fmus.ports.port import Misdeclared
 
-
-class Hooks(Protocol):
-    """The hooks, of x_k+1 = update(x_k, u_k) and y_k = outputs(x_k, u_k).
-
-    A component has `outputs`; with a state also `start` and `update`; all others are optional.
-
-    Args:
-        parameters: NamedTuple of all parameters.
-        inputs: NamedTuple with a number, tuple, vector or matrix for each group of input ports.
-        state: NamedTuple of all that the rest of a run depends on besides inputs and parameters.
-        derived: what `derive` returns.
-        t: time [s].
-        h: length of a step [s], at most `h_max`.
-
-    """
-
-    #: What is logged, once an instance, when `restarted` is called; `{t}` or `{t:g}` is the time.
-    RESTARTED: str
-
-    #: Whether the outputs belong to the last communication point, until inputs arrive: those of a
-    #: digital controller with a zero-order hold do. Others follow the state, and the time.
-    SAMPLED: bool
-
-    #: Default of the parameter `h_max` [s]: a longer step is split evenly. Without it there is no
-    #: such parameter, and no step is split.
-    H_MAX: float
-
-    #: The experiment that a host runs if nothing else is asked for [s].
-    STEP_SIZE: float
-    STOP_TIME: float
-
-    @staticmethod
-    def check(parameters: Any) -> None:
-        """Refuse parameters, each of which is in its range, that do not fit together.
-
-        Called before `start`, for each new value of a tunable parameter, and for a state that is
-        restored.
-
-        Raises:
-            Refusal: they do not fit; the text says why.
-
-        """
-
-    @staticmethod
-    def start(parameters: Any, inputs: Any, t: float) -> Any:
-        """Return the state at the start time.
-
-        Called at the end of the initialisation, and during it each time that outputs are read after
-        a value was set.
-        """
-
-    @staticmethod
-    def derive(parameters: Any, state: Any, inputs: Any, t: float) -> Any:
-        """Return what `outputs` and `update` both need.
-
-        Called once, until something that it takes has changed.
-        """
-
-    @staticmethod
-    def outputs(parameters: Any, state: Any, derived: Any, inputs: Any, t: float) -> Any:
-        """Return the outputs: a NamedTuple of numbers, tuples, vectors and matrices.
-
-        Called when they are read, until something that it takes has changed.
-        """
-
-    @staticmethod
-    def update(parameters: Any, state: Any, derived: Any, inputs: Any, t: float, h: float) -> Any:
-        """Return the state after a step of h seconds with held inputs.
-
-        Called once for each internal step of a communication step. What is not finite is refused,
-        and with it the step.
-        """
-
-    @staticmethod
-    def credible(parameters: Any, state: Any, inputs: Any) -> bool:
-        """Return whether a run may go on from the state, with these inputs.
-
-        Called before `outputs`, and before the first `update` of a communication step.
-        """
-
-    @staticmethod
-    def restarted(parameters: Any, state: Any, inputs: Any) -> Any:
-        """Return the state that it goes on from instead, where `credible` says no.
-
-        A step that begins so logs `RESTARTED`.
-        """
-
-    @staticmethod
-    def seed(parameters: Any) -> int:
-        """Return the seed of the noise of `measured`.
-
-        Called before `start`.
-        """
-
-    @staticmethod
-    def measured(parameters: Any, n: Any) -> Any:
-        """Return one group of outputs with noise.
-
-        A further argument has the name of the group, and gets it without noise.
-
-        Args:
-            parameters: as above.
-            n: as many independent standard normal numbers as the type of this argument has, which
-                is of floats only; they are drawn at the start and in each communication step.
-
-        """
-
-    @staticmethod
-    def check_state(parameters: Any, state: Any) -> None:
-        """Refuse a state that is to be restored, and that no run can have led to.
-
-        Raises:
-            Refusal: none can; the text says why.
-
-        """
-
+#: The functions that a component may have, and their arguments: docs/explanation/component.md says
+#: when each is called, and what it returns. `measured` also takes the group that it returns.
+HOOKS: Mapping[str, tuple[str, ...]] = {
+    "check": ("parameters",),
+    "start": ("parameters", "inputs", "t"),
+    "derive": ("parameters", "state", "inputs", "t"),
+    "outputs": ("parameters", "state", "derived", "inputs", "t"),
+    "update": ("parameters", "state", "derived", "inputs", "t", "h"),
+    "credible": ("parameters", "state", "inputs"),
+    "restarted": ("parameters", "state", "inputs"),
+    "seed": ("parameters",),
+    "measured": ("parameters", "n"),
+    "check_state": ("parameters", "state"),
+}
 
 #: How a number in a text may be written: as C writes it, too.
 NUMBER_FORMAT = re.compile(r"[+ ]?(?:[1-9][0-9]{0,2})?(?:\.[0-9]{1,3})?[efgEG]")
-
-#: Arguments of each hook, by its name.
-HOOKS: Mapping[str, tuple[str, ...]] = {
-    name: tuple(signature(hook.__func__).parameters)
-    for name, hook in vars(Hooks).items()
-    if isinstance(hook, staticmethod)
-}
 
 #: What goes together.
 _TOGETHER = (("start", "update"), ("credible", "restarted", "RESTARTED"), ("seed", "measured"))
@@ -351,18 +242,12 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
 def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The type that each argument has in all hooks: what most of them say."""
     found: dict[str, list[Any]] = {}
-    for name, hint in _said_of_groups(hints):
-        found.setdefault(name, []).append(form(hint))
+    for name, hint in hints.items():
+        said = [(argument, argument) for argument in _GROUPS if argument in hint]
+        for group, place in [*said, *([(_SAME[name], "return")] if name in _SAME else [])]:
+            found.setdefault(group, []).append(form(hint[place]))
     types = {name: max(forms, key=forms.count) for name, forms in found.items()}
     return {**types, **_ARGUMENTS}
-
-
-def _said_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, Any]]:
-    """The types of the component's own groups, as each hook takes or returns them."""
-    for name, found in hints.items():
-        yield from ((argument, found[argument]) for argument in _GROUPS if argument in found)
-        if name in _SAME:
-            yield _SAME[name], found["return"]
 
 
 def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
+from itertools import chain
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from fmus.ports.behaviour import Behaviour, read_behaviour
 from fmus.ports.fields import declared
-from fmus.ports.groups import Field, ParameterSet, ports_in
+from fmus.ports.groups import ParameterSet
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, is_line, largest_step
 from fmus.ports.units import unit_of
 
@@ -80,9 +81,9 @@ def define(name: str, module: ModuleType) -> Definition:
     outputs = declared(
         said.outputs, "output", direct, tuple(inputs) if said.takes("start", "inputs") else ()
     )
-    own = ParameterSet(said.parameters, **declared(said.parameters, "parameter"))
+    own = ParameterSet(said.parameters, [*chain(*declared(said.parameters, "parameter").values())])
     ports = (
-        *(port for field in inputs.values() for port in ports_in(field)),
+        *chain(*inputs.values()),
         *_fed_through(said, outputs, inputs),
         *own.ports,
         *([] if said.h_max is None else [largest_step(said.h_max)]),
@@ -94,19 +95,19 @@ def define(name: str, module: ModuleType) -> Definition:
     for place, text in {"its docstring": summary, **origin._asdict()}.items():
         if not is_line(text.replace("\n", " ").replace("\t", " ")):
             raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
-    noisy = tuple(port.name for port in ports_in(outputs[said.noisy])) if said.noisy else ()
+    noisy = tuple(port.name for port in outputs[said.noisy]) if said.noisy else ()
     return Definition(name, summary, origin, ports, own, noisy, said)
 
 
 def _fed_through(
-    said: Behaviour, outputs: Mapping[str, Field], inputs: Mapping[str, Field]
+    said: Behaviour, outputs: Mapping[str, tuple[Port, ...]], inputs: Mapping[str, tuple[Port, ...]]
 ) -> Iterator[Port]:
     """The outputs, with the names of ports where the fields of the inputs stood."""
-    names = {field: [port.name for port in ports_in(ports)] for field, ports in inputs.items()}
+    names = {field: [port.name for port in ports] for field, ports in inputs.items()}
     names |= {name: [name] for found in [*names.values()] for name in found}
     names[TIME.name] = [TIME.name]
     for field, ports in outputs.items():
-        for port in ports_in(ports):
+        for port in ports:
             place = (said.outputs.__name__, field)
             for one in (*port.feedthrough, *port.initially):
                 if one not in names:

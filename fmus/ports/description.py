@@ -6,7 +6,8 @@ from the ports.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import count
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
@@ -31,12 +32,9 @@ _INITIAL = {"output": "calculated", "parameter": "exact"}
 
 
 class Dependency(NamedTuple):
-    """What an output depends on, all by places among the variables, of which the first is 1.
+    """What an output depends on: all by numbers, in FMI 2.0 an index, in FMI 3.0 a reference."""
 
-    FMI 2.0 calls a place an index; in FMI 3.0 it is the value reference, which hosts take for one.
-    """
-
-    place: int  #: of the output
+    number: int  #: of the output
     direct: list[int]  #: what its value depends on without a state between
     initial: list[int]  #: what its value at the start time depends on
 
@@ -99,17 +97,6 @@ def value_attributes(port: Port) -> dict[str, str]:
     }
 
 
-def enumerations_of(ports: Sequence[Port]) -> dict[str, Mapping[str, int]]:
-    """The types of enumerations that ports have, with their items."""
-    return {port.enumeration: port.choices for port in ports if port.enumeration}
-
-
-def add_items(parent: Element, choices: Mapping[str, int]) -> None:
-    """Add the items of an enumeration."""
-    for name, value in choices.items():
-        SubElement(parent, "Item", name=name, value=str(int(value)))
-
-
 def units_of(ports: Sequence[Port]) -> list[str]:
     """The units that ports have, each once."""
     return sorted({port.unit for port in ports if port.unit})
@@ -132,9 +119,27 @@ def unit_definitions(units: Sequence[str]) -> Element:
     return definitions
 
 
-def dependencies(ports: Sequence[Port]) -> Iterator[Dependency]:
-    """What each output depends on: its direct feedthrough, and at the start the parameters too."""
-    places = {port.name: place for place, port in enumerate(ports, start=1)}
+def type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Element:
+    """The types of units and of enumerations; `add` makes the element of one."""
+    definitions = Element("TypeDefinitions")
+    for unit in units_of(ports):
+        name = unit_of(unit).type_name
+        add(definitions, "Real", name, quantity=name, unit=unit)
+    for name, choices in {port.enumeration: port.choices for port in ports if port.choices}.items():
+        enumeration = add(definitions, "Enumeration", name)
+        for item, value in choices.items():
+            SubElement(enumeration, "Item", name=item, value=str(int(value)))
+    return definitions
+
+
+def dependencies(
+    ports: Sequence[Port], numbers: Iterable[int] | None = None
+) -> Iterator[Dependency]:
+    """What each output depends on: its direct feedthrough, and at the start the parameters too.
+
+    Without other numbers for all ports, they are counted from one, as FMI 2.0 does.
+    """
+    places = {port.name: place for port, place in zip(ports, numbers or count(1))}
     parameters = [places[port.name] for port in ports if port.causality == "parameter"]
     for port in ports:
         if port.causality == "output":
@@ -216,7 +221,7 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
     implementation.attrib.update(_CAPABILITIES)
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
-    types = _type_definitions(ports)
+    types = type_definitions(ports, _add_type)
     if units := units_of(ports):
         root.insert(1, unit_definitions(units))
     if len(types):
@@ -230,16 +235,8 @@ def _variable(reference: int, port: Port) -> Element:
     return variable
 
 
-def _type_definitions(ports: Sequence[Port]) -> Element:
-    definitions = Element("TypeDefinitions")
-    for unit in units_of(ports):
-        name = unit_of(unit).type_name
-        simple_type = SubElement(definitions, "SimpleType", name=name)
-        SubElement(simple_type, "Real", quantity=name, unit=unit)
-    for name, choices in enumerations_of(ports).items():
-        simple_type = SubElement(definitions, "SimpleType", name=name)
-        add_items(SubElement(simple_type, "Enumeration"), choices)
-    return definitions
+def _add_type(parent: Element, kind: str, name: str, **said: str) -> Element:
+    return SubElement(SubElement(parent, "SimpleType", name=name), kind, said)
 
 
 def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
@@ -247,6 +244,5 @@ def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
     for output in dependencies(ports):
         for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
-            # FMI 2.0 counts variables from one.
-            SubElement(parent, "Unknown", dependent_on(known), index=str(output.place))
+            SubElement(parent, "Unknown", dependent_on(known), index=str(output.number))
     return outputs, initial_unknowns

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import groupby
-from operator import attrgetter, itemgetter
+from operator import itemgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
@@ -18,14 +18,13 @@ from auv_fmu.language.quantities import member_of
 from fmus.ports.definition import Definition
 from fmus.ports.description import (
     CAPABILITIES,
-    add_items,
     default_experiment,
     dependencies,
     dependent_on,
-    enumerations_of,
     log_categories,
     root_of,
     text,
+    type_definitions,
     unit_definitions,
     units_of,
     value_attributes,
@@ -33,7 +32,6 @@ from fmus.ports.description import (
 )
 from fmus.ports.groups import slices
 from fmus.ports.port import FAULT, TIME, Port
-from fmus.ports.units import unit_of
 
 #: What FMI 3.0 calls the types of variables.
 TYPES = {
@@ -47,14 +45,8 @@ _CAPABILITIES = {**CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFM
 #: The file of a component's sources that includes all others, and what it is written in.
 SOURCE, _LANGUAGE = "fmi3.c", "C99"
 
-#: What is linked besides the C library, by platform: mathematics may be apart from it.
-_LIBRARIES = {
-    "x86_64-linux": ("m",),
-    "aarch64-linux": ("m",),
-    "x86_64-windows": (),
-    "x86_64-darwin": (),
-    "aarch64-darwin": (),
-}
+#: The platforms that a build is described for.
+_PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
 
 
 def fmi3_description(definition: Definition, token: str, arrays: bool = False) -> bytes:
@@ -68,13 +60,12 @@ def fmi3_description(definition: Definition, token: str, arrays: bool = False) -
     """
     ports = (*definition.ports, FAULT, TIME)
     variables = variables_of(ports, arrays)
-    units = units_of(ports)
     root = root_of(_VERSION, definition, instantiationToken=token)
     SubElement(root, "CoSimulation", _CAPABILITIES, modelIdentifier=definition.name)
     root.extend(
         (
-            unit_definitions(units),
-            _type_definitions(ports),
+            unit_definitions(units_of(ports)),
+            type_definitions(ports, _add_type),
             log_categories("fmi3"),
             default_experiment(definition.behaviour),
             _variables(variables),
@@ -87,23 +78,18 @@ def fmi3_description(definition: Definition, token: str, arrays: bool = False) -
 def fmi3_build_description(name: str) -> bytes:
     """What an importer has to compile: one file, with any compiler and no options."""
     root = Element("fmiBuildDescription", fmiVersion=_VERSION)
-    for platform, libraries in _LIBRARIES.items():
+    for platform in _PLATFORMS:
         built = SubElement(root, "BuildConfiguration", modelIdentifier=name, platform=platform)
         sources = SubElement(built, "SourceFileSet", language=_LANGUAGE)
         SubElement(sources, "SourceFile", name=SOURCE)
-        for library in libraries:
-            SubElement(built, "Library", name=library, external="true")
+        if platform.endswith("-linux"):
+            # There mathematics is apart from the C library.
+            SubElement(built, "Library", name="m", external="true")
     return text(root)
 
 
-def _type_definitions(ports: Sequence[Port]) -> Element:
-    definitions = Element("TypeDefinitions")
-    for unit in units_of(ports):
-        name = unit_of(unit).type_name
-        SubElement(definitions, "Float64Type", name=name, quantity=name, unit=unit)
-    for name, choices in enumerations_of(ports).items():
-        add_items(SubElement(definitions, "EnumerationType", name=name), choices)
-    return definitions
+def _add_type(parent: Element, kind: str, name: str, **said: str) -> Element:
+    return SubElement(parent, f"{TYPES[kind]}Type", {"name": name, **said})
 
 
 class _Variable(NamedTuple):
@@ -158,17 +144,12 @@ def _variables(variables: Sequence[_Variable]) -> Element:
 
 def _structure(variables: Sequence[_Variable]) -> Element:
     """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
-
-    def referred(places: Sequence[int]) -> list[int]:
-        return [variables[place - 1].reference for place in places]
-
-    outputs = list(dependencies([variable.port for variable in variables]))
+    outputs = [*dependencies([one.port for one in variables], [one.reference for one in variables])]
     structure = Element("ModelStructure")
-    for name, of in (("Output", attrgetter("direct")), ("InitialUnknown", attrgetter("initial"))):
-        for out in outputs:
-            [reference] = referred([out.place])
-            known = dependent_on(referred(of(out)))
-            SubElement(structure, name, known, valueReference=str(reference))
+    for name, on in (("Output", "direct"), ("InitialUnknown", "initial")):
+        for output in outputs:
+            known = dependent_on(getattr(output, on))
+            SubElement(structure, name, known, valueReference=str(output.number))
     return structure
 
 

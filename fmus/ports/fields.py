@@ -6,11 +6,12 @@ import re
 import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple, get_args, get_origin
+from itertools import chain
+from typing import Any, NamedTuple, get_args, get_origin
 
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.variable import Refusal, Variable
-from fmus.ports.groups import Field, ParameterSet, check_type, fields_of, is_record, word
+from fmus.ports.groups import check_type, fields_of, is_record, sizes_in, split, word
 from fmus.ports.port import Array, Misdeclared, Port
 
 
@@ -39,36 +40,37 @@ _SOURCE = re.compile(r"[\w.,\[\]{}]+", re.ASCII)
 
 
 def declared(
-    made: Any, causality: str, direct: tuple[str, ...] = (), initial: tuple[str, ...] = ()
-) -> dict[str, Field]:
+    made: Any,
+    causality: str,
+    direct: tuple[str, ...] = (),
+    initial: tuple[str, ...] = (),
+    prefix: str = "",
+    given: Any = None,
+) -> dict[str, tuple[Port, ...]]:
     """The ports of each field of a class, by the names of its fields.
 
     Args:
         made: the class, a NamedTuple.
         causality: of the ports: `input`, `output` or `parameter`.
         direct, initial: `feedthrough` and `initially` of outputs that do not say it.
+        prefix: what the names of the ports begin with.
+        given: the start values, if they are others than those of the class.
 
     Raises:
         Misdeclared: a field is wrong, or says too little.
 
     """
-    return _declared(made, causality, Variable(feedthrough=direct, initially=initial), "", None)
-
-
-def _declared(
-    made: Any, causality: str, default: Variable, prefix: str, given: Any
-) -> dict[str, Field]:
     starts = dict(made._field_defaults) if given is None else given._asdict()
-    fields: dict[str, Field] = {}
+    fields: dict[str, tuple[Port, ...]] = {}
     for field, hint in fields_of(made).items():
         place, start = (made.__name__, field), starts.get(field)
-        inner, notes = _annotated(hint)
+        inner, notes = split(hint)
         if is_record(inner):
             if start is not None and not isinstance(start, inner):
                 raise _wrong(place, f"starts with {start!r:.40}, which is no {inner.__name__}")
             before = prefix + _prefix(notes, field, place)
-            below = _declared(inner, causality, default, before, start)
-            fields[field] = ParameterSet(inner, **below)
+            below = declared(inner, causality, direct, initial, before, start)
+            fields[field] = tuple(chain(*below.values()))
             continue
         said = _said(notes, causality, place, inner)
         check_type(hint, *place)
@@ -76,15 +78,16 @@ def _declared(
         if causality == "parameter" and any(part.start is None for part in parts):
             raise _wrong(place, "has no default value, which a parameter starts with")
         if causality == "output":
-            for name in ("feedthrough", "initially"):
-                if getattr(said, name) is None:
-                    said = replace(said, **{name: getattr(default, name)})
+            if said.feedthrough is None:
+                said = replace(said, feedthrough=direct)
+            if said.initially is None:
+                said = replace(said, initially=initial)
         ports = [_port(causality, said, part, place) for part in parts]
         if len({part.unit for part in parts}) == 1 and "{}" not in (said.name or ""):
             shape = _shape(inner, notes, place)[0]
             array = Array(prefix + (said.name or field), said.description, shape)
             ports = [replace(port, array=array if shape else None) for port in ports]
-        fields[field] = tuple(ports) if parts[0].member else ports[0]
+        fields[field] = tuple(ports)
     return fields
 
 
@@ -144,14 +147,6 @@ def _is_member(name: object) -> bool:
     return type(name) is int and name >= 0
 
 
-def _annotated(hint: Any) -> tuple[Any, tuple[Any, ...]]:
-    """A type without what is noted of it, and that."""
-    if get_origin(hint) is Annotated:
-        inner, *notes = get_args(hint)
-        return inner, tuple(notes)
-    return hint, ()
-
-
 def _word(hint: Any) -> str:
     """A type as it is written."""
     if hint in (Vector, Matrix):
@@ -194,12 +189,12 @@ def _shape(
 ) -> tuple[tuple[int, ...], Any]:
     """How many numbers a type has along each dimension, and of which type."""
     if hint in (Vector, Matrix):
-        return tuple(note for note in notes if type(note) is int), float
+        return sizes_in(notes), float
     if get_origin(hint) is tuple:
         elements = [*dict.fromkeys(get_args(hint))]
         if len(elements) != 1 or get_args(hint) == ((),):
             raise _wrong(place, "has elements of several types; write a NamedTuple")
-        below, number = _shape(*_annotated(elements[0]), place)
+        below, number = _shape(*split(elements[0]), place)
         return (len(get_args(hint)), *below), number
     if is_record(hint):
         raise _wrong(place, "is a tuple of NamedTuples; write a NamedTuple of them")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from enum import IntEnum
-from itertools import groupby
+from functools import cache
+from itertools import count, groupby
 from types import GenericAlias
 from typing import (
     Annotated,
@@ -12,7 +13,6 @@ from typing import (
     Generic,
     NamedTuple,
     TypeVar,
-    Union,
     get_args,
     get_origin,
     get_type_hints,
@@ -48,17 +48,21 @@ def hints_of(owner: Any) -> dict[str, Any]:
 
 def parts_of(hint: Any) -> list[Any] | None:
     """The types of the elements of a tuple, a vector, a matrix or a NamedTuple; None: a number."""
-    if get_origin(hint) is Annotated:
-        hint, *notes = get_args(hint)
-        sizes = [note for note in notes if type(note) is int]
-        if hint is Vector:
-            return [float] * sizes[0]
-        if hint is Matrix:
-            return [Annotated[Vector, sizes[1]]] * sizes[0]
+    hint, notes = split(hint)
+    sizes = sizes_in(notes)
+    if hint is Vector and sizes:
+        return [float] * sizes[0]
+    if hint is Matrix and sizes:
+        return [Annotated[Vector, sizes[1]]] * sizes[0]
     if is_record(hint):
-        return list(hints_of(hint).values())
+        return _parts_of_record(hint)
     arguments = get_args(hint)
     return [*arguments] if get_origin(hint) is tuple and Ellipsis not in arguments else None
+
+
+@cache
+def _parts_of_record(made: Any) -> list[Any]:
+    return [*hints_of(made).values()]
 
 
 def is_record(hint: Any) -> bool:
@@ -71,15 +75,27 @@ def is_class(hint: Any, base: type) -> bool:
     return isinstance(hint, type) and get_origin(hint) is None and issubclass(hint, base)
 
 
+def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
+    """A type without what is noted beside it, and that."""
+    if get_origin(hint) is Annotated:
+        inner, *notes = get_args(hint)
+        return inner, tuple(notes)
+    return hint, ()
+
+
+def sizes_in(notes: Iterable[Any]) -> tuple[int, ...]:
+    """The sizes of a vector or a matrix, of what is noted beside its type."""
+    return tuple(note for note in notes if type(note) is int)
+
+
 def class_of(hint: Any) -> Any:
     """A type without what is noted beside it."""
-    return get_args(hint)[0] if get_origin(hint) is Annotated else hint
+    return split(hint)[0]
 
 
 def count_values(hint: Any) -> int:
     """How many numbers a type holds."""
-    parts = parts_of(hint)
-    return 1 if parts is None else sum(map(count_values, parts))
+    return sum(1 for _ in scalars_of(hint))
 
 
 def scalars_of(hint: Any) -> Iterator[Any]:
@@ -100,8 +116,8 @@ def is_whole(hint: Any) -> bool:
 def form(hint: Any) -> Any:
     """A type that equals all others whose values are alike: with its sizes, without other notes."""
     if get_origin(hint) is Annotated:
-        inner, *notes = get_args(hint)
-        sizes = tuple(note for note in notes if type(note) is int)
+        inner, notes = split(hint)
+        sizes = sizes_in(notes)
         return Annotated[(inner, *sizes)] if inner in (Vector, Matrix) and sizes else form(inner)
     if get_origin(hint) is tuple:
         return GenericAlias(tuple, tuple(map(form, get_args(hint))))
@@ -132,10 +148,9 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
         Misdeclared: it is none of the language of equations.
 
     """
-    kind, where = class_of(hint), f"{'.'.join(place)} " if place else ""
+    (kind, notes), where = split(hint), f"{'.'.join(place)} " if place else ""
     if kind in (Vector, Matrix):
-        notes = get_args(hint)[1:]
-        sizes = [note for note in notes if type(note) is int]
+        sizes = sizes_in(notes)
         if len(sizes) != (1 if kind is Vector else 2) or min(sizes) < 1:
             said = f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
             why = f"is a {kind.__name__} without its size; write Annotated[{said}]"
@@ -197,7 +212,7 @@ def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]
     ordered = [name for name, _ in sorted(zip(names, ports), key=lambda one: one[1].type != "Real")]
     scope = {**SCOPE}
     result = gathered(made, iter(names), scope)
-    return _compiled(f"({', '.join(ordered)},) = values\n return {result}", "values", scope)
+    return compiled("values", f"({', '.join(ordered)},) = values\n return {result}", scope)
 
 
 def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
@@ -267,78 +282,40 @@ def whole(value: int) -> int:
 SCOPE: Mapping[str, Any] = {"make": tuple.__new__, "whole": whole}
 
 
-def _compiled(body: str, argument: str, scope: dict[str, Any]) -> Callable[..., Any]:
+def compiled(argument: str, body: str, scope: dict[str, Any]) -> Callable[[Any], Any]:
     """A function from its text.
 
     It runs once a step in each component, and a loop over the groups costs several times the
     same thing written out.
     """
     exec(f"def function({argument}):\n {body}", scope)
-    function: Callable[..., Any] = scope["function"]
+    function: Callable[[Any], Any] = scope["function"]
     return function
 
 
-Field = Union[Port, tuple[Port, ...], "ParameterSet[Any]"]
-
-
-def ports_in(field: Field) -> Sequence[Port]:
-    """The ports of a field."""
-    if isinstance(field, Port):
-        return (field,)
-    return field if isinstance(field, tuple) else field.ports
-
-
 class ParameterSet(Generic[T]):
-    """Ports of the parameters that make one parameter set of the equations, field by field."""
+    """Ports of the parameters that make one parameter set of the equations, number by number."""
 
-    def __init__(self, made: Callable[..., T], /, **fields: Field) -> None:
+    def __init__(self, made: type[T], ports: Sequence[Port]) -> None:
         """Declare the set.
 
         Args:
             made: NamedTuple of the equations.
-            fields: for each field a port, the ports of a tuple, vector or matrix, or the set of a
-                nested NamedTuple.
+            ports: for each number in it.
 
         """
         self._made = made
-        self._hints = hints_of(made)
-        self._fields = fields
-
-    @property
-    def ports(self) -> tuple[Port, ...]:
-        """All parameters, in the order of their declaration."""
-        return tuple(port for port, _ in self._leaves())
+        self.ports = tuple(ports)
 
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:
         """Where each parameter lies in the set, by its name: fields, and places in tuples."""
-        return {port.name: path for port, path in self._leaves()}
-
-    def _leaves(self) -> Iterator[tuple[Port, tuple[str | int, ...]]]:
-        for name, field in self._fields.items():
-            if isinstance(field, Port):
-                yield field, (name,)
-            elif isinstance(field, tuple):
-                yield from (
-                    (port, (name, *at)) for port, at in zip(field, _places(self._hints[name]))
-                )
-            else:
-                yield from ((port, (name, *path)) for port, path in field._leaves())
+        return dict(zip((port.name for port in self.ports), _places(self._made)))
 
     def of(self, values: Mapping[str, Value]) -> T:
         """The parameter set with these values of its ports, by name."""
-        hints = self._hints
-        return self._made(
-            **{name: _taken(field, hints[name], values) for name, field in self._fields.items()}
-        )
-
-
-def _taken(field: Field, hint: Any, values: Mapping[str, Value]) -> object:
-    if isinstance(field, ParameterSet):
-        return field.of(values)
-    if isinstance(field, Port):
-        return field.meaning(values[field.name])
-    return filled(hint, iter([port.meaning(values[port.name]) for port in field]))
+        made: T = filled(self._made, iter([port.meaning(values[port.name]) for port in self.ports]))
+        return made
 
 
 def filled(hint: Any, values: Iterator[Any]) -> Any:
@@ -353,9 +330,9 @@ def filled(hint: Any, values: Iterator[Any]) -> Any:
 
 def _places(hint: Any) -> Iterator[tuple[str | int, ...]]:
     """Where the numbers of a type lie in it."""
-    parts = parts_of(hint)
+    parts, kind = parts_of(hint), class_of(hint)
     if parts is None:
         yield ()
         return
-    for i, part in enumerate(parts):
-        yield from ((i, *rest) for rest in _places(part))
+    for step, part in zip(kind._fields if is_record(kind) else count(), parts):
+        yield from ((step, *rest) for rest in _places(part))

@@ -1,4 +1,4 @@
-"""The base of all components: their runs.
+"""The base of all components: what PythonFMU calls, and their runs.
 
 PythonFMU turns a Python class into an FMU. What it leaves to the class is done here, once:
 
@@ -6,6 +6,13 @@ PythonFMU turns a Python class into an FMU. What it leaves to the class is done 
 - Outputs are evaluated when they are read, until something has changed that they depend on.
 - A step is a transaction: all changes together, after everything was computed and found finite.
 - The state of the FMU is complete and exact, in memory and serialised.
+
+No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. Nor
+does PythonFMU learn that a call was refused; it answers fmi2OK. The native loader learns it by a
+log entry of its own category, and answers fmi2Discard or fmi2Error to that very call. Without a
+loader every step after a call that failed is discarded, until a reset or a state that is restored.
+
+Verbs are those of `fmus/native/runtime/host.h`: check, refuse, fail, log.
 """
 
 from __future__ import annotations
@@ -15,9 +22,11 @@ from abc import abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from math import inf, isfinite
 from random import Random
+from struct import pack
 from typing import Any, ClassVar
 from xml.etree.ElementTree import Element
 
+from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import __version__
@@ -32,28 +41,46 @@ from auv_fmu.paper.euler import (
 )
 from fmus.ports.definition import Definition
 from fmus.ports.description import complete
-from fmus.ports.port import H_MAX, Value
-from fmus.python.callbacks import (
+from fmus.ports.port import H_MAX, Port, Value
+from fmus.python.loading import ANSWER, MISSING, has_loader, place
+from fmus.python.noise import Noise
+from fmus.python.state import (
     INITIALISING,
     INSTANTIATED,
     STEPPING,
     TERMINATED,
-    Callbacks,
+    Snapshot,
+    Store,
+    checked,
+    from_bytes,
+    to_bytes,
 )
-from fmus.python.noise import Noise
-from fmus.python.state import Snapshot, checked, from_bytes, to_bytes
+
+#: Different messages that an instance logs: a host may step on after a refusal for ever.
+MOST_MESSAGES = 100
+
+#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
+LONGEST_MESSAGE = 500
 
 #: Longest step of a component that has no internal steps [s].
 _NO_LIMIT = sys.float_info.max
 
 
-class Component(Callbacks):
+class Illegal(Refusal):
+    """A value that the standard does not let a port be set to, now or ever."""
+
+
+class Component(Fmi2Slave):  # type: ignore[misc]
     """Base of all components; :func:`fmus.python.slave.slave_of` makes the class of one.
 
     The methods that call hooks may raise: what they raise becomes a refusal.
     """
 
     definition: ClassVar[Definition]
+    #: Ports without `fault`, inputs first, then outputs, then parameters.
+    ports: ClassVar[tuple[Port, ...]]
+    #: What makes groups of the values of all inputs.
+    unpack: Callable[[Sequence[Value]], Any]
     #: Of which of `inputs`, `parameters`, `t` and `state` outputs are made, and what is derived.
     outputs_of: ClassVar[frozenset[str]]
     derived_of: ClassVar[frozenset[str]]
@@ -93,13 +120,176 @@ class Component(Callbacks):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         said = self.definition.behaviour
+        self._store = Store(self.ports)
+        self._store.groups = self.unpack(self._store.inputs)
+        self._mode = INSTANTIATED
+        #: Whether a value has changed that the state at the start time depends on.
+        self._stale = False
+        self._logged: set[str] = set()
         self._longest_step, self._latest_end = 0.0, inf
+        #: Whether inputs change the outputs, and what is derived, before the next step.
         self._outputs_follow = "inputs" in self.outputs_of
         self._derived_follows = "inputs" in self.derived_of
         self._is_timed = "t" in self.outputs_of | self.derived_of
         self._is_sampled = said.is_sampled
         #: Whether a step evaluates the outputs at its end: no input changes them.
         self._is_prompt = not (said.is_sampled or self._outputs_follow)
+        self._has_loader = has_loader(self.resources)
+        #: Why a call failed, which PythonFMU has answered with fmi2OK; without a loader only.
+        self._failure = ""
+
+    # Refusals and messages
+
+    def _refuse(self, status: Fmi2Status, why: str, key: str | None = None) -> None:
+        """Answer the call with a status, and log why."""
+        self.log_once(why, status, key)
+        if self._has_loader:
+            self.log("", status, ANSWER)
+
+    def _fail(self, why: str, status: Fmi2Status = Fmi2Status.error) -> None:
+        """Refuse a call that changes the run: without a loader, all steps from now on."""
+        self._refuse(status, why)
+        if not self._has_loader:
+            self._failure = self._failure or why
+
+    def _pass_time(self, time: float) -> None:
+        """Let the native loader know a time that the arguments of the call do not lead to."""
+        if self._has_loader:
+            self.log(pack(">d", time).hex(), Fmi2Status.ok, ANSWER)
+
+    def describe(self, error: BaseException) -> str:
+        """Give the reason in an exception; one that is not a Refusal is named by its type."""
+        if isinstance(error, Refusal):
+            return str(error)
+        return f"{place(error)}{type(error).__name__}: {error}"
+
+    def log_once(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
+        """Log a message only the first time that its key, or else its text, occurs.
+
+        The host adds the name of the instance.
+        """
+        key = (key or message)[:LONGEST_MESSAGE]
+        if key in self._logged or len(self._logged) >= MOST_MESSAGES:
+            return
+        self._logged.add(key)
+        if len(self._logged) == MOST_MESSAGES:
+            message += "; further messages are not logged"
+        # FMI defines a log message as a format: a host would take a % for a directive.
+        self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
+
+    def _check_mode(self, call: str, mode: str) -> bool:
+        """Whether a call comes in the one mode that it is allowed in; else it fails."""
+        if self._mode != mode:
+            self._fail(f"{call} is not allowed when {self._mode}")
+        return self._mode == mode
+
+    # Values
+
+    def get_real(self, vrs: list[int]) -> list[Any]:
+        store = self._store
+        if vrs != store.real_outputs:
+            return self._get(vrs, "Real")
+        if not store.fresh:
+            self._refuse_outdated()
+        # PythonFMU reads the list and lets go of it, so it need not be a copy.
+        return store.outputs if store.only_outputs else store.outputs[: len(vrs)]
+
+    def get_integer(self, vrs: list[int]) -> list[int]:
+        return self._get(vrs, "Integer")
+
+    def get_boolean(self, vrs: list[int]) -> list[bool]:
+        store = self._store
+        return [store.fault] if vrs == store.fault_references else self._get(vrs, "Boolean")
+
+    def get_string(self, vrs: list[int]) -> list[str]:
+        return self._get(vrs, "String")
+
+    def set_real(self, vrs: list[int], values: list[Any]) -> None:
+        store = self._store
+        # A sum is finite only if every value is; _set finds out which one was not.
+        if vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
+            if not store.has_only_reals:
+                values = [*values, *store.inputs[len(values) :]]
+            store.inputs, store.groups = values, self.unpack(values)
+            if self._outputs_follow:
+                store.fresh = False
+            if self._derived_follows:
+                store.derived = None
+        else:
+            self._set(vrs, values, "Real")
+
+    def set_integer(self, vrs: list[int], values: list[int]) -> None:
+        self._set(vrs, values, "Integer")
+
+    def set_boolean(self, vrs: list[int], values: list[bool]) -> None:
+        self._set(vrs, values, "Boolean")
+
+    def set_string(self, vrs: list[int], values: list[str]) -> None:
+        self._set(vrs, values, "String")
+
+    def _refuse_outdated(self) -> None:
+        """Refuse to give outputs that cannot be brought up to date."""
+        if why := self._refresh():
+            self._refuse(Fmi2Status.error, why)
+
+    def _get(self, vrs: list[int], fmi_type: str) -> list[Any]:
+        store, values = self._store, []
+        if not store.fresh and fmi_type != "String" and not store.all_outputs.isdisjoint(vrs):
+            self._refuse_outdated()
+        for reference in vrs:
+            try:
+                values.append(store.get(reference, fmi_type))
+            except Refusal as refusal:
+                self._refuse(Fmi2Status.error, str(refusal))
+                values.append(MISSING[fmi_type])
+        return values
+
+    def _set(self, vrs: list[int], values: Sequence[Any], fmi_type: str) -> None:
+        """Take all values of a call, or none."""
+        if self._mode == TERMINATED:
+            self._check_mode(f"fmi2Set{fmi_type}", STEPPING)
+            return
+        try:
+            ports = [self._store.port(reference, fmi_type) for reference in vrs]
+        except Refusal as refusal:
+            self._fail(str(refusal))
+            return
+        try:
+            self._take(ports, vrs, values)
+        except Illegal as refusal:
+            self._fail(str(refusal))
+        except BaseException as error:
+            # A run with another parameter than the host asked for must not begin.
+            begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
+            self._store.fault = True
+            self._fail(self.describe(error), Fmi2Status.error if begins else Fmi2Status.discard)
+
+    def _take(self, ports: list[Port], vrs: list[int], values: Sequence[Value]) -> None:
+        store = self._store
+        inputs, parameters = list(store.inputs), store.parameters
+        for port, reference, value in zip(ports, vrs, values):
+            if port.causality == "output":
+                raise Illegal(f"{port.name} is an output and cannot be set")
+            if port.variability == "fixed" and self._mode == STEPPING:
+                if value != parameters[port.name]:
+                    raise Illegal(f"{port.name} is fixed and cannot change after initialisation")
+                continue
+            port.checked(value)
+            if port.causality == "input":
+                inputs[store.places[reference]] = float(value) if port.type == "Real" else value
+            else:
+                parameters = {**parameters, port.name: value}
+        if parameters is not store.parameters:
+            if self._mode == STEPPING:
+                self._adopt(parameters, self._meaning(parameters))
+            store.parameters = parameters
+            self._forget("parameters")
+        if any(port.causality == "input" for port in ports):
+            self._take_inputs(inputs)
+
+    def _take_inputs(self, values: list[Value]) -> None:
+        self._store.inputs, self._store.groups = values, self.unpack(values)
+        self._forget("inputs")
 
     # Experiment
 
@@ -161,9 +351,6 @@ class Component(Callbacks):
         h_max = float(values.get(H_MAX, _NO_LIMIT))
         return parameters, min(longest_step(h_max), _NO_LIMIT)
 
-    def _retune(self, parameters: dict[str, Value]) -> None:
-        self._adopt(parameters, self._meaning(parameters))
-
     def _adopt(self, values: dict[str, Value], meaning: tuple[Any, float]) -> None:
         self._store.parameters = values
         self.parameters, self._longest_step = meaning
@@ -171,6 +358,12 @@ class Component(Callbacks):
     # Outputs
 
     def _refresh(self) -> str:
+        """Bring the outputs up to date, and before a run the state at the start time, too.
+
+        Returns:
+            Why that cannot be; empty: they are.
+
+        """
         store = self._store
         if store.fresh:
             return ""
@@ -192,6 +385,7 @@ class Component(Callbacks):
         return ""
 
     def _forget(self, what: str) -> None:
+        """Discard what has been computed of `inputs` or `parameters`, which have changed."""
         if self._mode == STEPPING:
             if what in self.outputs_of:
                 self._store.fresh = False

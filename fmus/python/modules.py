@@ -32,65 +32,51 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
         SyntaxError: one of them is no Python.
 
     """
-    return _Search(packages, own).files(text)
+    files: dict[str, Path] = {}
+    #: The folders that the modules in each are found in; none, if it is no package.
+    places: dict[str, Sequence[str]] = {}
 
-
-class _Search:
-    """A search for modules."""
-
-    def __init__(self, packages: Mapping[str, Path], own: Path | None) -> None:
-        self._packages, self._own = packages, own
-        #: The folders that the modules in each are found in; none, if it is no package.
-        self._places: dict[str, Sequence[str]] = {}
-        self._files: dict[str, Path] = {}
-
-    def files(self, text: str) -> dict[str, Path]:
-        wanted = [*_imported(ast.parse(text), "")]
-        while wanted:
-            name = wanted.pop()
-            if name.endswith(".*"):
-                wanted += self._within(name[:-2])
-            elif name not in self._places:
-                wanted += self._imported_by(name)
-        return self._files
-
-    def _imported_by(self, name: str) -> Iterator[str]:
+    def imported_by(name: str) -> Iterator[str]:
         """The names that a module imports; it and the packages that it is in are needed."""
         parent, _, last = name.rpartition(".")
-        if parent and parent not in self._places:
-            yield from self._imported_by(parent)
-        root = self._root(name.partition(".")[0])
-        within = self._places.get(parent, () if parent or root is None else [str(root)])
+        if parent and parent not in places:
+            yield from imported_by(parent)
+        root = _root(name.partition(".")[0], packages, own)
+        within = places.get(parent, () if parent or root is None else [str(root)])
         # By the last part: Python would look up the packages before it, which are not imported.
         found = PathFinder.find_spec(last, [*within])
-        self._places[name] = [*((found and found.submodule_search_locations) or ())]
+        places[name] = [*((found and found.submodule_search_locations) or ())]
         file = Path(found.origin) if found and found.origin else None
         if root is None or file is None or root not in file.parents:
             return
-        self._files[file.relative_to(root).as_posix()] = file
+        files[file.relative_to(root).as_posix()] = file
         if file.suffix in SOURCE_SUFFIXES:
             tree = ast.parse(decode_source(file.read_bytes()), filename=str(file))
-            yield from _imported(tree, name if self._places[name] else parent)
+            yield from _imported(tree, name if places[name] else parent)
 
-    def _root(self, top: str) -> Path | None:
-        """The folder that a top-level module lies in; None: it is not to be followed."""
-        if top in self._packages:
-            return self._packages[top].parent
-        if self._own is None or top in sys.builtin_module_names:
-            return None
-        # A folder that is no package gives way to a package elsewhere.
-        found = PathFinder.find_spec(top, [str(self._own), *sys.path])
-        places = [*(found.submodule_search_locations or (found.origin,))] if found else []
-        return (
-            self._own
-            if any(place and Path(place).parent == self._own for place in places)
-            else None
-        )
+    wanted = [*_imported(ast.parse(text), "")]
+    while wanted:
+        name = wanted.pop()
+        if name.endswith(".*"):
+            # Any module of the package may be meant.
+            package = name[:-2]
+            for place in places.get(package, ()):
+                wanted += (f"{package}.{it.stem}" for it in sorted(Path(place).glob("*.py")))
+        elif name not in places:
+            wanted += imported_by(name)
+    return files
 
-    def _within(self, package: str) -> Iterator[str]:
-        """All modules of a package, of which any may be meant by a star."""
-        for place in self._places.get(package, ()):
-            yield from (f"{package}.{path.stem}" for path in sorted(Path(place).glob("*.py")))
+
+def _root(top: str, packages: Mapping[str, Path], own: Path | None) -> Path | None:
+    """The folder that a top-level module lies in; None: it is not to be followed."""
+    if top in packages:
+        return packages[top].parent
+    if own is None or top in sys.builtin_module_names:
+        return None
+    # A folder that is no package gives way to a package elsewhere.
+    found = PathFinder.find_spec(top, [str(own), *sys.path])
+    places = [*(found.submodule_search_locations or (found.origin,))] if found else []
+    return own if any(place and Path(place).parent == own for place in places) else None
 
 
 def _imported(tree: ast.AST, package: str) -> Iterator[str]:

@@ -12,6 +12,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 
 import pythonfmu
+from pythonfmu.builder import get_model_class
 
 from fmus import documentation
 from fmus.compilers import machines_compiler, run_compiler
@@ -25,7 +26,7 @@ from fmus.discovery import (
 )
 from fmus.kinds import PYTHON
 from fmus.python.modules import modules_of, with_other_imports
-from fmus.script import data_files
+from fmus.script import data_files, import_from, no_component
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
@@ -37,6 +38,14 @@ from fmus.python.slave import slave_of
 
 {component} = slave_of("{component}", {module})
 settle({component}, globals(), locals())
+"""
+
+#: That of a slave of the user's own, which may raise.
+_OWN_SCRIPT = """\
+from fmus.python.loading import caught, settle
+from {module} import {component}
+
+settle(caught({component}), globals(), locals())
 """
 
 #: How FMUs are loaded: by a library of our own, or by PythonFMU's.
@@ -69,17 +78,6 @@ _GUID = re.compile(rb'guid="[^"]*"')
 _TIME = re.compile(rb' generationDateAndTime="[^"]*"')
 
 
-def _stage(text: str, stage: Path, script: str, own: Path | None) -> Path:
-    """Lay out a script and the modules it needs the way PythonFMU wants them."""
-    path = stage / f"{script}.py"
-    path.write_text(text, encoding="utf-8")
-    for place, source in modules_of(text, _FOLDERS, own).items():
-        target = stage / place
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(source, target)
-    return path
-
-
 def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:
     """The contents of an FMU, before it is sealed.
 
@@ -98,7 +96,12 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
         # Not the name itself: some file systems would take lag.py, beside it, for Lag.py.
-        path = _stage(text, stage, f"{name}_fmu", own)
+        path = stage / f"{name}_fmu.py"
+        path.write_text(text, encoding="utf-8")
+        for place, source in modules_of(text, _FOLDERS, own).items():
+            target = stage / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(source, target)
         raw = pythonfmu.FmuBuilder.build_FMU(
             path, dest=built, project_files=set(stage.iterdir()) - {path}
         )
@@ -228,3 +231,33 @@ class PythonKind:
         entries = fmu_entries(source.name, text, self.loader, source.root)
         entries |= documentation.fmu_documents(source)
         seal(entries, path)
+
+
+def build_script(script: Path, destination: Path, loader: str | None = None) -> Path:
+    """Build the FMU of a user's own script, whose class of PythonFMU is plain or on our base.
+
+    Modules that lie beside the script are in it, and data files that were read while the script was
+    imported and its slave was made.
+
+    Args:
+        script: a Python file with one slave.
+        destination: folder of the FMU, which gets the name of the slave's class.
+        loader: `native` or `plain`; None: native where it can be compiled.
+
+    Raises:
+        Exception: whatever the script raises when it is imported or its slave is made.
+
+    """
+    own = script.resolve().parent
+    import_from(own)
+    try:
+        component = get_model_class(script).__name__
+    except ValueError as error:
+        if str(error).startswith("No child class of Fmi2Slave"):
+            why = f"{no_component(script)}, and has no class of PythonFMU (Fmi2Slave)"
+            raise ValueError(why) from None
+        raise
+    text = _OWN_SCRIPT.format(module=script.stem, component=component)
+    path = destination / f"{component}.fmu"
+    seal(fmu_entries(component, text, loader or best_loader(), own), path)
+    return path

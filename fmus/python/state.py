@@ -1,4 +1,4 @@
-"""The state of an FMU: complete, exact, in memory and as bytes, and checked before it is taken.
+"""The values of an instance, and the state of its FMU: complete, exact, and checked when taken.
 
 The state of a component is a NamedTuple of numbers, truth values, members of enumerations, and of
 tuples, vectors, matrices and NamedTuples of them.
@@ -18,10 +18,29 @@ from typing import Any, Callable, TypedDict
 
 from auv_fmu.language.variable import Refusal
 from fmus.ports.behaviour import Behaviour
-from fmus.ports.groups import class_of, is_class, parts_of, whole
-from fmus.ports.port import Value, is_int32
-from fmus.python.callbacks import INITIALISING, INSTANTIATED, MODES, STEPPING, Store
-from fmus.python.noise import check_draws
+from fmus.ports.groups import class_of, compiled, is_class, parts_of, whole
+from fmus.ports.port import FAULT, Port, Value, is_int32
+from fmus.python.loading import MISSING
+from fmus.python.noise import Noise, check_draws
+
+#: Types of ports, by those of the calls that pass their values; no port is a text.
+_PASSED = {
+    "Real": ("Real",),
+    "Integer": ("Integer", "Enumeration"),
+    "Boolean": ("Boolean",),
+    "String": (),
+}
+
+#: Values of ports that have none.
+_NOTHING = {**MISSING, "Enumeration": 0}
+
+#: Modes of an instance.
+INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
+    "instantiated",
+    "initialising",
+    "stepping",
+    "terminated",
+)
 
 #: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
 #: reported, so they are refused when they are set.
@@ -29,6 +48,123 @@ _UNUSABLE = "unusable"
 
 #: Key of the checksum in the bytes of a state.
 _CHECKSUM = "checksum"
+
+
+class Store:
+    """Values of all ports, and what else a run is made of.
+
+    A port's value reference is its place among the ports. All inputs and all outputs lie in lists
+    of their own, Reals first and in their order, so that a host that passes these all in one call
+    costs one comparison instead of one look-up a value.
+
+    Attributes:
+        ports: of the component, `fault` last.
+        inputs, outputs: values of all but `fault`.
+        input_references, output_references: of them, in the order of their values.
+        places: where the values lie, by their references.
+        all_outputs: the references of all outputs but `fault`.
+        real_outputs: the references of the Reals among them.
+        free_inputs: the references of the Real inputs, if none of them has a range; else None.
+        has_only_reals: whether all inputs are Reals.
+        only_outputs: the references of all outputs, if these are Reals; else None.
+        parameters: by name.
+        fault: whether a value or a step was discarded.
+        fresh: whether the outputs are up to date: nothing has changed that they depend on.
+        held: whether they are those of the beginning of the last step; the next evaluates its own.
+        groups: the inputs as the equations take them.
+        state: of the component; None before the initialisation.
+        derived: what was derived of it; None: it is to be derived when it is needed.
+        start_time, stop_time, time: where the run begins, where it ends, and where it is [s].
+        noise, draws: the generator of the noise of outputs, None without it, and what it has given.
+
+    """
+
+    def __init__(self, ports: Sequence[Port]) -> None:
+        self.ports = (*ports, FAULT)
+        references = [*range(len(ports))]
+        references.sort(key=lambda reference: ports[reference].type != "Real")
+        self.input_references = [r for r in references if ports[r].causality == "input"]
+        self.output_references = [r for r in references if ports[r].causality == "output"]
+        self.all_outputs = frozenset(self.output_references)
+        real_inputs = [r for r in self.input_references if ports[r].type == "Real"]
+        limits = [limit for r in real_inputs for limit in (ports[r].minimum, ports[r].maximum)]
+        self.free_inputs = real_inputs if all(limit is None for limit in limits) else None
+        self.has_only_reals = real_inputs == self.input_references
+        self.real_outputs = [r for r in self.output_references if ports[r].type == "Real"]
+        has_others = self.real_outputs != self.output_references
+        self.only_outputs = None if has_others else self.real_outputs
+        self.fault_references = [len(ports)]
+        self.inputs: list[Value] = [
+            _NOTHING[ports[r].type] if ports[r].start is None else ports[r].start
+            for r in self.input_references
+        ]
+        self.outputs = self.no_outputs()
+        self.places = {
+            reference: place
+            for found in (self.input_references, self.output_references)
+            for place, reference in enumerate(found)
+        }
+        self.parameters: dict[str, Value] = {
+            port.name: port.start
+            for port in ports
+            if port.causality == "parameter" and port.start is not None
+        }
+        self.fault = False
+        self.fresh = True
+        self.held = False
+        self.groups: Any = None
+        self.state: Any = None
+        self.derived: Any = None
+        self.start_time = self.time = 0.0
+        self.stop_time = inf  # there is none
+        self.noise: Noise | None = None
+        self.draws: tuple[float, ...] = ()
+
+    def no_outputs(self) -> list[Value]:
+        """The outputs where there is no state."""
+        return [_NOTHING[self.ports[reference].type] for reference in self.output_references]
+
+    def check_outputs(self, values: Sequence[Value]) -> None:
+        """Refuse outputs that are not finite.
+
+        Raises:
+            Refusal: one of them is not.
+
+        """
+        for reference, value in zip(self.output_references, values):
+            self.ports[reference].sound(value)
+
+    def port(self, reference: int, fmi_type: str) -> Port:
+        """The port that has a value reference, if its values are passed by the calls for a type.
+
+        Raises:
+            Refusal: there is none.
+
+        """
+        if 0 <= reference < len(self.ports):
+            port = self.ports[reference]
+            if port.type in _PASSED[fmi_type]:
+                return port
+        # PythonFMU hands references from 2^31 over as negative numbers.
+        raise Refusal(f"no {fmi_type} has the value reference {reference % 2**32}")
+
+    def get(self, reference: int, fmi_type: str) -> Value:
+        """The value of a port. Hosts read all outputs with fmi2GetReal.
+
+        Raises:
+            Refusal: no port with the reference has a value of this type.
+
+        """
+        as_real = fmi_type == "Real" and 0 <= reference < len(self.ports)
+        port = self.ports[reference] if as_real else self.port(reference, fmi_type)
+        if port is FAULT:
+            value: Value = self.fault
+        elif port.causality == "parameter":
+            value = self.parameters[port.name]
+        else:
+            values = self.inputs if port.causality == "input" else self.outputs
+            value = values[self.places[reference]]
+        return float(value) if as_real else value
 
 
 def measuring(hint: type) -> Callable[[Any], float]:
@@ -57,10 +193,7 @@ def measuring(hint: type) -> Callable[[Any], float]:
 
     pattern = target(hint)
     norm = f"hypot({', '.join(floats)})" if floats else "0.0"
-    text = f"def function(state):\n {pattern} = state\n {''.join(integers)}return {norm}"
-    exec(text, scope)
-    function: Callable[[Any], float] = scope["function"]
-    return function
+    return compiled("state", f"{pattern} = state\n {''.join(integers)}return {norm}", scope)
 
 
 def _member(value: int, kind: type[IntEnum]) -> IntEnum:
@@ -164,7 +297,9 @@ def _checksum(snapshot: Mapping[str, Any]) -> int:
     return crc32(_text(snapshot))
 
 
-def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behaviour) -> Snapshot:
+def checked(
+    saved: Mapping[str, Any], identity: str, store: Store, said: Behaviour
+) -> dict[str, Any]:
     """A copy of a saved state, if it can be one of this component.
 
     Args:
@@ -209,22 +344,17 @@ def checked(saved: Mapping[str, Any], identity: str, store: Store, said: Behavio
     declared = [port for port in store.ports if port.causality == "parameter"]
     if not isinstance(parameters, dict) or parameters.keys() != store.parameters.keys():
         raise Refusal("it has missing or unknown parameters")
-    return Snapshot(
-        identity=identity,
-        mode=mode,
-        start_time=start_time,
-        stop_time=stop_time,
-        time=time,
-        parameters={port.name: port.checked(parameters[port.name]) for port in declared},
-        inputs=_values(store, store.input_references, saved["inputs"]),
-        outputs=_values(store, sampled, saved["outputs"]),
-        fresh=bool(sampled) and saved["fresh"],
-        held=bool(sampled) and saved["held"],
-        state=None if state is None else restored(said.state, state),
-        draws=draws,
-        generator=_frozen(saved["generator"]),
-        fault=saved["fault"],
-    )
+    return {
+        **saved,
+        "parameters": {port.name: port.checked(parameters[port.name]) for port in declared},
+        "inputs": _values(store, store.input_references, saved["inputs"]),
+        "outputs": _values(store, sampled, saved["outputs"]),
+        "fresh": bool(sampled) and saved["fresh"],
+        "held": bool(sampled) and saved["held"],
+        "state": None if state is None else restored(said.state, state),
+        "draws": draws,
+        "generator": _frozen(saved["generator"]),
+    }
 
 
 def _time(value: Any) -> Any:

@@ -22,9 +22,8 @@ from typing import Any
 import fmpy
 import pytest
 
-from fmus.python.callbacks import LONGEST_MESSAGE
-from fmus.python.own import build_script
-from fmus.python.packaging import loader_compiler
+from fmus.python.component import LONGEST_MESSAGE
+from fmus.python.packaging import build_script, loader_compiler
 from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
 from support.raw import (

@@ -11,8 +11,7 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.python.own import build_script
-from fmus.python.packaging import LOADER, LOADER_FLAGS, loader_compiler
+from fmus.python.packaging import LOADER, LOADER_FLAGS, build_script, loader_compiler
 from orchestrator.runs import bundle
 from support.hosts import bare_root, host, unpacked
 from support.settings import NAMES

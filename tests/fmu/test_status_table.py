@@ -164,8 +164,8 @@ def test_what_is_said_of_a_plain_fmu(plain: Worker[Place, str], key: tuple[str, 
 
 
 def test_page_has_the_modes_of_the_runtime():
-    """In a mode that modes.h does not name, whatever a function is called with is an error."""
-    text = (RUNTIME / "modes.h").read_text(encoding="utf-8")
+    """In a mode that host.h does not name, whatever a function is called with is an error."""
+    text = (RUNTIME / "host.h").read_text(encoding="utf-8")
     masks = dict(re.findall(r"^#define (\w+) ([^/\n]+)", text, re.MULTILINE))
     modes = dict(zip(("INSTANTIATED", "INITIALISING", "STEPPING", "TERMINATED", "AFTER_ERROR"),
                      STATES, strict=True))  # fmt: skip

@@ -14,8 +14,8 @@ from fmpy.fmi2 import FMU2Slave
 from pythonfmu.enums import Fmi2Status
 
 from fmus.discovery import source_of
-from fmus.python.callbacks import ANSWER
 from fmus.python.component import Component
+from fmus.python.loading import ANSWER
 from fmus.python.slave import slave_of
 
 

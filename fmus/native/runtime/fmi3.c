@@ -3,25 +3,25 @@
  * What co-simulation without events, clocks and derivatives does not need is not supported,
  * and answered with fmi3Error.
  */
-#include "component.h"
+#include "platform.h"
 
-#include <math.h>
+#include "host.h"
 
-static const names version = {
-    .types = {"Float64", "Int32", "Boolean", "Enumeration"},
-    .token = "instantiation token",
-};
+#if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
+#define NAMED(name) PREFIXED(FMI3_FUNCTION_PREFIX, name)
+#else
+#define NAMED(name) name
+#endif
 
 /* Value references are places among the variables, from 1: some hosts take them for indices. */
 enum { FIRST_REFERENCE = 1 };
 
 #include "component.c"
 
-#if defined(FMI3_FUNCTION_PREFIX) && !defined(FMI3_OVERRIDE_FUNCTION_PREFIX)
-#define FMI3(name) PREFIXED(FMI3_FUNCTION_PREFIX, name)
-#else
-#define FMI3(name) name
-#endif
+static const names version = {
+    .types = {"Float64", "Int32", "Boolean", "Enumeration"},
+    .token = "instantiation token",
+};
 
 /* fmi3Boolean and fmi3Clock. A host may pass any byte, where a bool is 0 or 1. */
 typedef uint8_t boolean;
@@ -55,93 +55,70 @@ static void switch_categories(call *this, int on, size_t n, const string names[]
     choose_messages(this, n_chosen > 0, n_chosen, chosen);
 }
 
-EXPORT int FMI3(fmi3SetDebugLogging)(void *handle, boolean on, size_t n, const string names[]) {
-    call this = begin(handle, "fmi3SetDebugLogging", MASK_SetDebugLogging);
-    if (GOES_ON(this, wrong_texts(n, names))) switch_categories(&this, on, n, names);
-    return end(&this);
-}
+FUNCTION(fmi3SetDebugLogging, MASK_SetDebugLogging, wrong_texts(n, names),
+         (void *c, boolean on, size_t n, const string names[]),
+         switch_categories(&this, on, n, names))
 
 /* Making and freeing */
 
-EXPORT string FMI3(fmi3GetVersion)(void) { return "3.0"; }
+EXPORT string NAMED(fmi3GetVersion)(void) { return "3.0"; }
 
-EXPORT void *FMI3(fmi3InstantiateCoSimulation)(
+static void *make(string function, string wrong, string name, string token, boolean logging,
+                  void *environment, fmi3_logger log) {
+    logger host = {(void (*)(void))log, environment};
+    return instantiate(function, wrong, name, version.token, token, NULL, 0, host, logging != 0);
+}
+
+EXPORT void *NAMED(fmi3InstantiateCoSimulation)(
     string name, string token, string resources, boolean visible, boolean logging,
     boolean event_mode_used, boolean early_return_allowed, const uint32_t intermediate[],
     size_t n_intermediate, void *environment, fmi3_logger log, void (*update)(void)) {
-    return instantiate("fmi3InstantiateCoSimulation",
-                       event_mode_used ? "this FMU has no event mode" : NULL, name, token,
-                       (logger){(void (*)(void))log, environment}, logging != 0);
+    return make("fmi3InstantiateCoSimulation",
+                event_mode_used ? "this FMU has no event mode" : NULL, name, token, logging,
+                environment, log);
 }
 
 static const char ANOTHER_TYPE[] = "this FMU is for co-simulation only";
 
-EXPORT void *FMI3(fmi3InstantiateModelExchange)(string name, string token, string resources,
-                                                boolean visible, boolean logging,
-                                                void *environment, fmi3_logger log) {
-    return instantiate("fmi3InstantiateModelExchange", ANOTHER_TYPE, name, token,
-                       (logger){(void (*)(void))log, environment}, logging != 0);
+EXPORT void *NAMED(fmi3InstantiateModelExchange)(string name, string token, string resources,
+                                                 boolean visible, boolean logging,
+                                                 void *environment, fmi3_logger log) {
+    return make("fmi3InstantiateModelExchange", ANOTHER_TYPE, name, token, logging, environment,
+                log);
 }
 
-EXPORT void *FMI3(fmi3InstantiateScheduledExecution)(
+EXPORT void *NAMED(fmi3InstantiateScheduledExecution)(
     string name, string token, string resources, boolean visible, boolean logging,
     void *environment, fmi3_logger log, void (*update)(void *), void (*lock)(void),
     void (*unlock)(void)) {
-    return instantiate("fmi3InstantiateScheduledExecution", ANOTHER_TYPE, name, token,
-                       (logger){(void (*)(void))log, environment}, logging != 0);
+    return make("fmi3InstantiateScheduledExecution", ANOTHER_TYPE, name, token, logging,
+                environment, log);
 }
 
-EXPORT void FMI3(fmi3FreeInstance)(void *handle) { free_instance(handle, "fmi3FreeInstance"); }
+EXPORT void NAMED(fmi3FreeInstance)(void *c) { free_instance(c, "fmi3FreeInstance"); }
 
-/* Modes */
+/* Modes and steps */
 
-EXPORT int FMI3(fmi3EnterInitializationMode)(void *handle, boolean has_tolerance, double tolerance,
-                                             double start, boolean has_stop, double stop) {
-    call this = begin(handle, "fmi3EnterInitializationMode", MASK_EnterInitializationMode);
-    if (GOES_ON(this, NULL)) {
-        set_experiment(&this, start, has_stop ? stop : INFINITY);
-        if (this.status == FMI_OK) enter_initialisation(&this);
-    }
-    return end(&this);
-}
+FUNCTION(fmi3EnterInitializationMode, MASK_EnterInitializationMode, NULL,
+         (void *c, boolean has_tolerance, double tolerance, double start, boolean has_stop,
+          double stop),
+         set_experiment(&this, start, has_stop ? stop : INFINITY);
+         if (this.status == FMI_OK) enter_initialisation(&this))
+FUNCTION(fmi3ExitInitializationMode, MASK_ExitInitializationMode, NULL, (void *c),
+         exit_initialisation(&this))
+FUNCTION(fmi3Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
+FUNCTION(fmi3Reset, MASK_Reset, NULL, (void *c), renew(this.instance))
+FUNCTION(fmi3DoStep, MASK_DoStep,
+         event_handling_needed && terminate_simulation && early_return && last_successful_time
+             ? NULL
+             : "NULL",
+         (void *c, double time, double step, boolean no_set, boolean *event_handling_needed,
+          boolean *terminate_simulation, boolean *early_return, double *last_successful_time),
+         take_step(&this, time, step);
+         *event_handling_needed = *terminate_simulation = *early_return = 0;
+         *last_successful_time = time_of(&this))
 
-#define MODE(name, allowed, action)                                                              \
-    EXPORT int FMI3(name)(void *handle) {                                                        \
-        call this = begin(handle, #name, allowed);                                               \
-        if (GOES_ON(this, NULL)) action(&this);                                                  \
-        return end(&this);                                                                       \
-    }
-
-MODE(fmi3ExitInitializationMode, MASK_ExitInitializationMode, exit_initialisation)
-MODE(fmi3Terminate, MASK_Terminate, terminate)
-MODE(fmi3Reset, MASK_Reset, reset)
-
-/* Steps */
-
-EXPORT int FMI3(fmi3DoStep)(void *handle, double time, double step, boolean no_set,
-                            boolean *event_handling_needed, boolean *terminate_simulation,
-                            boolean *early_return, double *last_successful_time) {
-    call this = begin(handle, "fmi3DoStep", MASK_DoStep);
-    int complete = event_handling_needed && terminate_simulation && early_return &&
-                   last_successful_time;
-    if (GOES_ON(this, complete ? NULL : "NULL")) {
-        take_step(&this, time, step);
-        *event_handling_needed = *terminate_simulation = *early_return = 0;
-        *last_successful_time = time_of(&this);
-    }
-    return end(&this);
-}
-
-/* Values. A reference stands for a scalar, or for an array: that of its first element. */
-
-#ifdef ARRAYS
-static size_t span(uint32_t reference) {
-    uint32_t place = reference - FIRST_REFERENCE;
-    return place < N_PORTS ? elements[place] : 1;
-}
-#else
-#define span(reference) ((size_t)1)
-#endif
+/* Values */
 
 static string wrong_numbers(size_t n, const uint32_t r[], const void *values, size_t n_values) {
     size_t wanted = 0;
@@ -150,126 +127,54 @@ static string wrong_numbers(size_t n, const uint32_t r[], const void *values, si
                               : "the numbers of values and of references differ";
 }
 
-#define FOR_EACH(action)                                                                         \
-    for (size_t i = 0, k = 0; i < n; i++) {                                                      \
-        for (size_t e = 0; e < span(r[i]); e++, k++) {                                           \
-            uint32_t reference = r[i] + (uint32_t)e;                                             \
-            action;                                                                              \
-        }                                                                                        \
-    }
+#define GET(name, type, ...)                                                                     \
+    FUNCTION(name, MASK_Get, wrong_numbers(n, r, v, n_v),                                        \
+             (void *c, const uint32_t r[], size_t n, type v[], size_t n_v), __VA_ARGS__)
+#define SET(name, type, ...)                                                                     \
+    FUNCTION(name, MASK_Set, wrong_numbers(n, r, v, n_v),                                        \
+             (void *c, const uint32_t r[], size_t n, const type v[], size_t n_v), __VA_ARGS__)
 
-#define GET(name, type, get)                                                                     \
-    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, type v[], size_t n_v) {   \
-        call this = begin(handle, #name, MASK_Get);                                              \
-        if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
-            prepare_to_get(&this, r, n);                                                         \
-            FOR_EACH(v[k] = get(&this, reference));                                              \
-        }                                                                                        \
-        return end(&this);                                                                       \
-    }
-
-#define SET(name, c_type, type, number)                                                          \
-    EXPORT int FMI3(name)(void *handle, const uint32_t r[], size_t n, const c_type v[],         \
-                          size_t n_v) {                                                          \
-        call this = begin(handle, #name, MASK_Set);                                              \
-        if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {                                        \
-            setting it = begin_setting(&this, type, r, n);                                       \
-            FOR_EACH(set_value(&it, reference, (double)(number)));                               \
-            end_setting(&it);                                                                    \
-        }                                                                                        \
-        return end(&this);                                                                       \
-    }
+static double get_float(call *this, uint32_t reference) {
+    return reference == TIME ? time_of(this) : get_real(this, reference);
+}
 
 static int64_t get_enumeration(call *this, uint32_t reference) {
     return (int64_t)number_of(this, reference, ENUMERATION);
 }
 
-GET(fmi3GetInt32, int32_t, get_integer)
-GET(fmi3GetBoolean, boolean, get_boolean)
-GET(fmi3GetInt64, int64_t, get_enumeration)
-SET(fmi3SetInt32, int32_t, INTEGER, v[k])
-SET(fmi3SetBoolean, boolean, BOOLEAN, v[k] != 0)
-SET(fmi3SetInt64, int64_t, ENUMERATION, v[k])
-
-#ifdef ARRAYS
-static double get_float(call *this, uint32_t reference) {
-    return reference == TIME ? time_of(this) : number_of(this, reference, REAL);
-}
-
-GET(fmi3GetFloat64, double, get_float)
-SET(fmi3SetFloat64, double, REAL, v[k])
-#else
-EXPORT int FMI3(fmi3GetFloat64)(void *handle, const uint32_t r[], size_t n, double v[],
-                                size_t n_v) {
-    call this = begin(handle, "fmi3GetFloat64", MASK_Get);
-    if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) {
-        for (size_t i = 0, from = 0; i <= n; i++) {
-            if (i < n && r[i] != TIME) continue;
-            if (i > from) get_reals(&this, &r[from], i - from, &v[from]);
-            if (i < n) v[i] = time_of(&this);
-            from = i + 1;
-        }
-    }
-    return end(&this);
-}
-
-EXPORT int FMI3(fmi3SetFloat64)(void *handle, const uint32_t r[], size_t n, const double v[],
-                                size_t n_v) {
-    call this = begin(handle, "fmi3SetFloat64", MASK_Set);
-    if (GOES_ON(this, wrong_numbers(n, r, v, n_v))) set_reals(&this, r, n, v);
-    return end(&this);
-}
-#endif
+GET(fmi3GetFloat64, double, {
+    prepare_to_get(&this, r, n);
+    if (n != n_v || !get_all_reals(&this, r, n, v)) GET_EACH(get_float);
+})
+GET(fmi3GetInt32, int32_t, prepare_to_get(&this, r, n); GET_EACH(get_integer))
+GET(fmi3GetBoolean, boolean, prepare_to_get(&this, r, n); GET_EACH(get_boolean))
+GET(fmi3GetInt64, int64_t, prepare_to_get(&this, r, n); GET_EACH(get_enumeration))
+SET(fmi3SetFloat64, double, if (n != n_v || !set_all_reals(&this, r, n, v)) {
+    SET_EACH(REAL, v[k]);
+})
+SET(fmi3SetInt32, int32_t, SET_EACH(INTEGER, v[k]))
+SET(fmi3SetBoolean, boolean, SET_EACH(BOOLEAN, v[k] != 0))
+SET(fmi3SetInt64, int64_t, SET_EACH(ENUMERATION, v[k]))
 
 /* Types that no variable has: every reference is a wrong one, for which 0 is given. */
 
-static int get_none(void *handle, string function, string type, const uint32_t r[], size_t n,
-                    string wrong) {
-    call this = begin(handle, function, MASK_Get);
-    if (GOES_ON(this, wrong)) get_unknown(&this, type, r, n);
-    return end(&this);
-}
+#define GIVE(nothing)                                                                            \
+    for (size_t i = 0; i < n_v; i++) v[i] = nothing
+#define NO_VARIABLE(type, c_type, wrong_to_set, nothing)                                         \
+    GET(fmi3Get##type, c_type, GIVE(nothing); get_unknown(&this, #type, r, n))                   \
+    FUNCTION(fmi3Set##type, MASK_Set, wrong_to_set,                                              \
+             (void *c, const uint32_t r[], size_t n, const c_type v[], size_t n_v),              \
+             set_unknown(&this, #type, r, n))
 
-static int set_none(void *handle, string function, string type, const uint32_t r[], size_t n,
-                    string wrong) {
-    call this = begin(handle, function, MASK_Set);
-    if (GOES_ON(this, wrong)) set_unknown(&this, type, r, n);
-    return end(&this);
-}
-
-#define NO_VARIABLE(type, c_type)                                                                \
-    EXPORT int FMI3(fmi3Get##type)(void *handle, const uint32_t r[], size_t n, c_type v[],       \
-                                   size_t n_v) {                                                 \
-        string wrong = wrong_numbers(n, r, v, n_v);                                              \
-        for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = 0;                                \
-        return get_none(handle, "fmi3Get" #type, #type, r, n, wrong);                            \
-    }                                                                                            \
-    EXPORT int FMI3(fmi3Set##type)(void *handle, const uint32_t r[], size_t n, const c_type v[], \
-                                   size_t n_v) {                                                 \
-        return set_none(handle, "fmi3Set" #type, #type, r, n, wrong_numbers(n, r, v, n_v));      \
-    }
-
-NO_VARIABLE(Float32, float)
-NO_VARIABLE(Int8, int8_t)
-NO_VARIABLE(UInt8, uint8_t)
-NO_VARIABLE(Int16, int16_t)
-NO_VARIABLE(UInt16, uint16_t)
-NO_VARIABLE(UInt32, uint32_t)
-NO_VARIABLE(UInt64, uint64_t)
-
-EXPORT int FMI3(fmi3GetString)(void *handle, const uint32_t r[], size_t n, string v[],
-                               size_t n_v) {
-    string wrong = wrong_numbers(n, r, v, n_v);
-    for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = "";
-    return get_none(handle, "fmi3GetString", "String", r, n, wrong);
-}
-
-EXPORT int FMI3(fmi3SetString)(void *handle, const uint32_t r[], size_t n, const string v[],
-                               size_t n_v) {
-    string wrong = wrong_numbers(n, r, v, n_v);
-    return set_none(handle, "fmi3SetString", "String", r, n,
-                    wrong != NULL ? wrong : wrong_strings(n, r, v));
-}
+NO_VARIABLE(Float32, float, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(Int8, int8_t, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(UInt8, uint8_t, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(Int16, int16_t, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(UInt16, uint16_t, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(UInt32, uint32_t, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(UInt64, uint64_t, wrong_numbers(n, r, v, n_v), 0)
+NO_VARIABLE(String, string, wrong_numbers(n, r, v, n_v) ? wrong_numbers(n, r, v, n_v)
+                                                        : wrong_strings(n, r, v), "")
 
 static string wrong_binaries(size_t n, const uint32_t r[], const size_t sizes[], const void *values,
                              size_t n_values) {
@@ -277,103 +182,82 @@ static string wrong_binaries(size_t n, const uint32_t r[], const size_t sizes[],
     return wrong != NULL ? wrong : wrong_values(n, r, sizes);
 }
 
-EXPORT int FMI3(fmi3GetBinary)(void *handle, const uint32_t r[], size_t n, size_t sizes[],
-                               const uint8_t *v[], size_t n_v) {
-    string wrong = wrong_binaries(n, r, sizes, v, n_v);
-    for (size_t i = 0; i < n && wrong == NULL; i++) {
-        v[i] = NULL;
-        sizes[i] = 0;
-    }
-    return get_none(handle, "fmi3GetBinary", "Binary", r, n, wrong);
-}
-
-EXPORT int FMI3(fmi3SetBinary)(void *handle, const uint32_t r[], size_t n, const size_t sizes[],
-                               const uint8_t *const v[], size_t n_v) {
-    return set_none(handle, "fmi3SetBinary", "Binary", r, n, wrong_binaries(n, r, sizes, v, n_v));
-}
-
-EXPORT int FMI3(fmi3GetClock)(void *handle, const uint32_t r[], size_t n, boolean v[]) {
-    string wrong = wrong_values(n, r, v);
-    for (size_t i = 0; i < n && wrong == NULL; i++) v[i] = 0;
-    return get_none(handle, "fmi3GetClock", "Clock", r, n, wrong);
-}
-
-EXPORT int FMI3(fmi3SetClock)(void *handle, const uint32_t r[], size_t n, const boolean v[]) {
-    return set_none(handle, "fmi3SetClock", "Clock", r, n, wrong_values(n, r, v));
-}
+FUNCTION(fmi3GetBinary, MASK_Get, wrong_binaries(n, r, sizes, v, n_v),
+         (void *c, const uint32_t r[], size_t n, size_t sizes[], const uint8_t *v[], size_t n_v),
+         GIVE(NULL);
+         for (size_t i = 0; i < n; i++) sizes[i] = 0;
+         get_unknown(&this, "Binary", r, n))
+FUNCTION(fmi3SetBinary, MASK_Set, wrong_binaries(n, r, sizes, v, n_v),
+         (void *c, const uint32_t r[], size_t n, const size_t sizes[], const uint8_t *const v[],
+          size_t n_v),
+         set_unknown(&this, "Binary", r, n))
+FUNCTION(fmi3GetClock, MASK_Get, wrong_values(n, r, v),
+         (void *c, const uint32_t r[], size_t n, boolean v[]),
+         for (size_t i = 0; i < n; i++) v[i] = 0;
+         get_unknown(&this, "Clock", r, n))
+FUNCTION(fmi3SetClock, MASK_Set, wrong_values(n, r, v),
+         (void *c, const uint32_t r[], size_t n, const boolean v[]),
+         set_unknown(&this, "Clock", r, n))
 
 /* States */
 
-#define STATE_FUNCTION(name, parameters, action)                                                 \
-    EXPORT int FMI3(name) parameters {                                                           \
-        call this = begin(handle, #name, MASK_FMUstate);                                         \
-        if (GOES_ON(this, NULL)) action;                                                         \
-        return end(&this);                                                                       \
-    }
-
-STATE_FUNCTION(fmi3GetFMUState, (void *handle, void **state), get_state(&this, state))
-STATE_FUNCTION(fmi3SetFMUState, (void *handle, void *state), set_state(&this, state))
-STATE_FUNCTION(fmi3FreeFMUState, (void *handle, void **state), free_state(&this, state))
-STATE_FUNCTION(fmi3SerializedFMUStateSize, (void *handle, void *state, size_t *size),
-               size_of_state(&this, state, size))
-STATE_FUNCTION(fmi3SerializeFMUState, (void *handle, void *state, uint8_t bytes[], size_t size),
-               serialise_state(&this, state, bytes, size))
-STATE_FUNCTION(fmi3DeserializeFMUState,
-               (void *handle, const uint8_t bytes[], size_t size, void **state),
-               deserialise_state(&this, bytes, size, state))
+FUNCTION(fmi3GetFMUState, MASK_FMUstate, NULL, (void *c, void **state), get_state(&this, state))
+FUNCTION(fmi3SetFMUState, MASK_FMUstate, NULL, (void *c, void *state), set_state(&this, state))
+FUNCTION(fmi3FreeFMUState, MASK_FMUstate, NULL, (void *c, void **state), free_state(&this, state))
+FUNCTION(fmi3SerializedFMUStateSize, MASK_FMUstate, NULL, (void *c, void *state, size_t *size),
+         size_of_state(&this, state, size))
+FUNCTION(fmi3SerializeFMUState, MASK_FMUstate, NULL,
+         (void *c, void *state, uint8_t bytes[], size_t size),
+         serialise_state(&this, state, bytes, size))
+FUNCTION(fmi3DeserializeFMUState, MASK_FMUstate, NULL,
+         (void *c, const uint8_t bytes[], size_t size, void **state),
+         deserialise_state(&this, bytes, size, state))
 
 /* What is not supported */
 
-static int unsupported(void *handle, string function) {
-    call this = begin(handle, function, MASK_NotSupported);
-    if (GOES_ON(this, NULL)) refuse_unsupported(&this, FMI_ERROR);
-    return end(&this);
-}
-
 #define UNSUPPORTED(name, ...)                                                                   \
-    EXPORT int FMI3(name)(void *handle, __VA_ARGS__) { return unsupported(handle, #name); }
-#define UNSUPPORTED_MODE(name)                                                                   \
-    EXPORT int FMI3(name)(void *handle) { return unsupported(handle, #name); }
+    FUNCTION(name, MASK_NotSupported, NULL, (__VA_ARGS__), refuse_unsupported(&this, FMI_ERROR))
 
-UNSUPPORTED_MODE(fmi3EnterEventMode)
-UNSUPPORTED_MODE(fmi3EnterStepMode)
-UNSUPPORTED_MODE(fmi3EnterContinuousTimeMode)
-UNSUPPORTED_MODE(fmi3EnterConfigurationMode)
-UNSUPPORTED_MODE(fmi3ExitConfigurationMode)
-UNSUPPORTED_MODE(fmi3EvaluateDiscreteStates)
-UNSUPPORTED(fmi3UpdateDiscreteStates, boolean *needed, boolean *terminate, boolean *nominals,
-            boolean *values, boolean *defined, double *next)
-UNSUPPORTED(fmi3GetNumberOfVariableDependencies, uint32_t variable, size_t *n)
-UNSUPPORTED(fmi3GetVariableDependencies, uint32_t variable, size_t elements[],
+UNSUPPORTED(fmi3EnterEventMode, void *c)
+UNSUPPORTED(fmi3EnterStepMode, void *c)
+UNSUPPORTED(fmi3EnterContinuousTimeMode, void *c)
+UNSUPPORTED(fmi3EnterConfigurationMode, void *c)
+UNSUPPORTED(fmi3ExitConfigurationMode, void *c)
+UNSUPPORTED(fmi3EvaluateDiscreteStates, void *c)
+UNSUPPORTED(fmi3UpdateDiscreteStates, void *c, boolean *needed, boolean *terminate,
+            boolean *nominals, boolean *values, boolean *defined, double *next)
+UNSUPPORTED(fmi3GetNumberOfVariableDependencies, void *c, uint32_t variable, size_t *n)
+UNSUPPORTED(fmi3GetVariableDependencies, void *c, uint32_t variable, size_t elements[],
             uint32_t independents[], size_t independent_elements[], int kinds[], size_t n)
-UNSUPPORTED(fmi3GetOutputDerivatives, const uint32_t r[], size_t n, const int32_t orders[],
+UNSUPPORTED(fmi3GetOutputDerivatives, void *c, const uint32_t r[], size_t n, const int32_t orders[],
             double v[], size_t n_v)
-UNSUPPORTED(fmi3GetDirectionalDerivative, const uint32_t unknowns[], size_t n_unknowns,
+UNSUPPORTED(fmi3GetDirectionalDerivative, void *c, const uint32_t unknowns[], size_t n_unknowns,
             const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
             double sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(fmi3GetAdjointDerivative, const uint32_t unknowns[], size_t n_unknowns,
+UNSUPPORTED(fmi3GetAdjointDerivative, void *c, const uint32_t unknowns[], size_t n_unknowns,
             const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
             double sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(fmi3GetIntervalDecimal, const uint32_t r[], size_t n, double intervals[],
+UNSUPPORTED(fmi3GetIntervalDecimal, void *c, const uint32_t r[], size_t n, double intervals[],
             int qualifiers[])
-UNSUPPORTED(fmi3GetIntervalFraction, const uint32_t r[], size_t n, uint64_t counters[],
+UNSUPPORTED(fmi3GetIntervalFraction, void *c, const uint32_t r[], size_t n, uint64_t counters[],
             uint64_t resolutions[], int qualifiers[])
-UNSUPPORTED(fmi3GetShiftDecimal, const uint32_t r[], size_t n, double shifts[])
-UNSUPPORTED(fmi3GetShiftFraction, const uint32_t r[], size_t n, uint64_t counters[],
+UNSUPPORTED(fmi3GetShiftDecimal, void *c, const uint32_t r[], size_t n, double shifts[])
+UNSUPPORTED(fmi3GetShiftFraction, void *c, const uint32_t r[], size_t n, uint64_t counters[],
             uint64_t resolutions[])
-UNSUPPORTED(fmi3SetIntervalDecimal, const uint32_t r[], size_t n, const double intervals[])
-UNSUPPORTED(fmi3SetIntervalFraction, const uint32_t r[], size_t n, const uint64_t counters[],
+UNSUPPORTED(fmi3SetIntervalDecimal, void *c, const uint32_t r[], size_t n, const double intervals[])
+UNSUPPORTED(fmi3SetIntervalFraction, void *c, const uint32_t r[], size_t n,
+            const uint64_t counters[], const uint64_t resolutions[])
+UNSUPPORTED(fmi3SetShiftDecimal, void *c, const uint32_t r[], size_t n, const double shifts[])
+UNSUPPORTED(fmi3SetShiftFraction, void *c, const uint32_t r[], size_t n, const uint64_t counters[],
             const uint64_t resolutions[])
-UNSUPPORTED(fmi3SetShiftDecimal, const uint32_t r[], size_t n, const double shifts[])
-UNSUPPORTED(fmi3SetShiftFraction, const uint32_t r[], size_t n, const uint64_t counters[],
-            const uint64_t resolutions[])
-UNSUPPORTED(fmi3ActivateModelPartition, uint32_t clock, double time)
-UNSUPPORTED(fmi3CompletedIntegratorStep, boolean no_set, boolean *event, boolean *terminate)
-UNSUPPORTED(fmi3SetTime, double time)
-UNSUPPORTED(fmi3SetContinuousStates, const double states[], size_t n)
-UNSUPPORTED(fmi3GetContinuousStateDerivatives, double derivatives[], size_t n)
-UNSUPPORTED(fmi3GetEventIndicators, double indicators[], size_t n)
-UNSUPPORTED(fmi3GetContinuousStates, double states[], size_t n)
-UNSUPPORTED(fmi3GetNominalsOfContinuousStates, double nominals[], size_t n)
-UNSUPPORTED(fmi3GetNumberOfEventIndicators, size_t *n)
-UNSUPPORTED(fmi3GetNumberOfContinuousStates, size_t *n)
+UNSUPPORTED(fmi3ActivateModelPartition, void *c, uint32_t clock, double time)
+UNSUPPORTED(fmi3CompletedIntegratorStep, void *c, boolean no_set, boolean *event,
+            boolean *terminate)
+UNSUPPORTED(fmi3SetTime, void *c, double time)
+UNSUPPORTED(fmi3SetContinuousStates, void *c, const double states[], size_t n)
+UNSUPPORTED(fmi3GetContinuousStateDerivatives, void *c, double derivatives[], size_t n)
+UNSUPPORTED(fmi3GetEventIndicators, void *c, double indicators[], size_t n)
+UNSUPPORTED(fmi3GetContinuousStates, void *c, double states[], size_t n)
+UNSUPPORTED(fmi3GetNominalsOfContinuousStates, void *c, double nominals[], size_t n)
+UNSUPPORTED(fmi3GetNumberOfEventIndicators, void *c, size_t *n)
+UNSUPPORTED(fmi3GetNumberOfContinuousStates, void *c, size_t *n)

@@ -1,37 +1,71 @@
-/* Making and freeing instances, and what every call ends with. */
+/* An instance, what it logs, and refusals. */
 #include <stdlib.h>
 #include <string.h>
+
+/* Messages */
+
+static void log_message(instance *it, int status, string text) {
+    if (is_wanted(&it->host, status, CATEGORIES[status])) {
+        log_to_host(&it->host, status, CATEGORIES[status], text);
+    }
+}
+
+/* 64-bit FNV-1a. */
+static uint64_t hash(string text) {
+    uint64_t sum = 0xcbf29ce484222325u;
+    for (; *text != '\0'; text++) sum = (sum ^ (unsigned char)*text) * 0x100000001b3u;
+    return sum;
+}
+
+/* Logs a message only the first time that its key, or else its text, occurs. */
+static void log_once(instance *it, message *text, int status, string key) {
+    uint64_t sum = hash(key != NULL ? key : text->text);
+    for (size_t i = 0; i < it->n_logged; i++) {
+        if (it->logged[i] == sum) return;
+    }
+    if (it->n_logged == MOST_MESSAGES) return;
+    it->logged[it->n_logged++] = sum;
+    if (it->n_logged == MOST_MESSAGES) append_text(text, "; further messages are not logged");
+    log_message(it, status, text->text);
+}
+
+static void refuse(call *this, int status, message *why, string key) {
+    this->status = status;
+    if (status == FMI_DISCARD) this->instance->run.fault = 1;
+    log_once(this->instance, why, status, key);
+}
+
+static void fail(call *this, message *why) {
+    this->instance->in_error = 1;
+    refuse(this, FMI_ERROR, why, NULL);
+}
 
 /* Calls */
 
 static void give_way(void) { wait_a_moment(); }
 
-static int fail_in_mode(call *this) {
+static call begin(void *handle, string function, int allowed) {
+    return lock_instance(handle, function, allowed);
+}
+
+static int check_mode(call *this) {
     static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
     message why;
+    if (this->allowed & WHEN(this->instance->run.mode)) return 1;
     compose(&why, "%s is not allowed when %s", this->function, names[this->instance->run.mode]);
     fail(this, &why);
     return 0;
 }
 
-/* Whether a call may come in the mode of the instance; else it fails. */
-static int check_mode(call *this) {
-    return this->allowed & WHEN(this->instance->run.mode) || fail_in_mode(this);
-}
-
-/* Lets the next call of the instance begin; the status of this one. */
 static int end(call *this) {
     if (this->instance != NULL) unlock_entry(this->entry);
     return this->status;
 }
 
-static void choose_messages(call *this, int logging, size_t n, const string categories[]) {
-    if (!choose_categories(&this->instance->host, logging, n, categories)) {
-        check(this, "out of memory");
-    }
-}
-
 /* Instances */
+
+/* Makes everything what it is after instantiation. */
+static void renew(instance *it);
 
 /* Where a GUID begins and how long it is, without braces. */
 static size_t without_braces(string *token) {
@@ -60,42 +94,17 @@ static int check_token(string token, message *why) {
            compose(why, "%s %s does not match this FMU's, %s", version.token, token, MODEL_GUID);
 }
 
+static void *new_component(instance *it, string token, string location, int visible, message *why) {
+    (void)location, (void)visible;
+    if (!check_token(token, why)) return NULL;
+    renew(it);
+    compose(why, "out of memory");
+    return new_handle(INSTANCE, it, NULL);
+}
+
 static void release_instance(instance *it) {
     release_listener(&it->host);
     free(it);
 }
 
-/* A handle of a new instance; NULL, with a message that says why, if anything is wrong.
- *
- * wrong: what is, with arguments that only the version knows; NULL: nothing.
- * token: the FMU's, with braces or without; NULL and "" go with any FMU. */
-static void *instantiate(string function, string wrong, string name, string token, logger host,
-                         int logging) {
-    message why;
-    instance *it = calloc(1, sizeof *it);
-    void *handle = NULL;
-    if (it == NULL) return NULL;
-    if (!listen(&it->host, name, host, logging)) {
-        free(it);
-        return NULL;
-    }
-    if (check_instance(wrong, name, version.token, token, &why) && check_token(token, &why)) {
-        renew(it);
-        handle = new_handle(INSTANCE, it, NULL);
-        if (handle == NULL) compose(&why, "out of memory");
-    }
-    if (handle == NULL) {
-        log_error(it, function, why.text);
-        release_instance(it);
-    }
-    return handle;
-}
-
-/* Frees an instance and its states; ignores anything that is not a live instance. */
-static void free_instance(void *handle, string function) {
-    if (handle == NULL) return;
-    call this = begin(handle, function, MASK_FreeInstance);
-    if (this.instance == NULL) return;
-    free_handles(&this);
-    release_instance(this.instance);
-}
+static void free_component(call *this) { release_instance(this->instance); }

@@ -14,6 +14,11 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
+/* The name of a function: where a prefix for it is defined, as the standards have it, several FMUs
+ * can be linked into one program. */
+#define PASTE(prefix, name) prefix##name
+#define PREFIXED(prefix, name) PASTE(prefix, name)
+
 #if defined(_MSC_VER)
 #include <intrin.h>
 #endif

@@ -24,7 +24,6 @@ static void renew_run(run *it) {
     it->moments[it->now].outputs_are = FRESH;
 }
 
-/* Makes everything what it is after instantiation. */
 static void renew(instance *it) {
     renew_run(&it->run);
     it->stale = 0;
@@ -180,8 +179,6 @@ static void exit_initialisation(call *this) {
 }
 
 static void terminate(call *this) { this->instance->run.mode = TERMINATED; }
-
-static void reset(call *this) { renew(this->instance); }
 
 /* Steps */
 

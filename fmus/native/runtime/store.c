@@ -135,15 +135,17 @@ static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     if (has_output(references, n) && !refresh(it, &why)) refuse(this, FMI_ERROR, &why, NULL);
 }
 
+/* Whether references are those of all Real outputs, whose values are then got at once. */
+static int get_all_reals(call *this, const uint32_t references[], size_t n, double values[]) {
+    const run *run = &this->instance->run;
+    if (n != REAL_OUTPUTS || !are_all(references, output_references, n)) return 0;
+    memcpy(values, run->outputs[run->shown].values, n * sizeof *values);
+    return 1;
+}
+
 /* All values can be got as Reals. */
-static void get_reals(call *this, const uint32_t references[], size_t n, double values[]) {
-    instance *it = this->instance;
-    prepare_to_get(this, references, n);
-    if (n == REAL_OUTPUTS && are_all(references, output_references, n)) {
-        memcpy(values, it->run.outputs[it->run.shown].values, n * sizeof *values);
-        return;
-    }
-    for (size_t i = 0; i < n; i++) values[i] = number_of(this, references[i], REAL);
+static double get_real(call *this, uint32_t reference) {
+    return number_of(this, reference, REAL);
 }
 
 static int32_t get_integer(call *this, uint32_t reference) {
@@ -215,20 +217,6 @@ static int check_settable(const run *run, const port *port, double number, messa
            compose(why, "%s is fixed and cannot change after initialisation", port->name);
 }
 
-static int take_value(setting *it, const port *port, double number, message *why) {
-    instance *instance = it->call->instance;
-    if (is_settled(&instance->run, port)) return 1;
-    if (!check_range(port, number, why)) return 0;
-    if (port->causality == INPUT) {
-        instance->set_inputs.values[port->place] = number;
-        it->changes_inputs = 1;
-    } else {
-        it->changes_parameters = 1;
-        put_parameter(&instance->set_parameters, port, number);
-    }
-    return 1;
-}
-
 /* A run with another parameter than the host asked for must not begin. */
 static void refuse_setting(setting *it, message *why) {
     it->good = 0;
@@ -241,14 +229,23 @@ static void refuse_setting(setting *it, message *why) {
 }
 
 static void set_value(setting *it, uint32_t reference, double number) {
-    message why;
+    instance *instance = it->call->instance;
     const port *port = port_at(reference);
+    message why;
     if (!it->good) return;
-    if (!check_settable(&it->call->instance->run, port, number, &why)) {
+    if (!check_settable(&instance->run, port, number, &why)) {
         it->good = 0;
         fail(it->call, &why);
-    } else if (!take_value(it, port, number, &why)) {
+    } else if (is_settled(&instance->run, port)) {
+        return;
+    } else if (!check_range(port, number, &why)) {
         refuse_setting(it, &why);
+    } else if (port->causality == INPUT) {
+        instance->set_inputs.values[port->place] = number;
+        it->changes_inputs = 1;
+    } else {
+        put_parameter(&instance->set_parameters, port, number);
+        it->changes_parameters = 1;
     }
 }
 
@@ -274,15 +271,41 @@ static int all_finite(const double values[], size_t n) {
     return 1;
 }
 
-static void set_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
+/* Whether references are those of all Real inputs, whose values are then set at once. */
+static int set_all_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
     run *run = &this->instance->run;
-    if (n == REAL_INPUTS && !INPUTS_HAVE_RANGES && run->mode == STEPPING &&
-        are_all(references, input_references, n) && all_finite(values, n)) {
-        memcpy(run->inputs.values, values, n * sizeof *values);
-        note_change(this->instance, 1, 0);
-        return;
+    if (n != REAL_INPUTS || INPUTS_HAVE_RANGES || run->mode != STEPPING ||
+        !are_all(references, input_references, n) || !all_finite(values, n)) {
+        return 0;
     }
-    setting it = begin_setting(this, REAL, references, n);
-    for (size_t i = 0; i < n; i++) set_value(&it, references[i], values[i]);
-    end_setting(&it);
+    memcpy(run->inputs.values, values, n * sizeof *values);
+    note_change(this->instance, 1, 0);
+    return 1;
 }
+
+/* References and values of a call, one by one */
+
+/* How many values a reference stands for: that of a scalar, or those of an array, whose reference
+ * is that of its first element. */
+static size_t span(uint32_t reference) {
+#ifdef ARRAYS
+    uint32_t place = reference - FIRST_REFERENCE;
+    return place < N_PORTS ? elements[place] : 1;
+#else
+    (void)reference;
+    return 1;
+#endif
+}
+
+#define FOR_EACH(action)                                                                         \
+    for (size_t i = 0, k = 0; i < n; i++) {                                                      \
+        for (size_t e = 0; e < span(r[i]); e++, k++) {                                           \
+            uint32_t reference = r[i] + (uint32_t)e;                                             \
+            action;                                                                              \
+        }                                                                                        \
+    }
+#define GET_EACH(get) FOR_EACH(v[k] = get(&this, reference))
+#define SET_EACH(type, number)                                                                   \
+    setting it = begin_setting(&this, type, r, n);                                               \
+    FOR_EACH(set_value(&it, reference, (double)(number)));                                       \
+    end_setting(&it)

@@ -74,27 +74,102 @@ static void log_of_slave(void *environment, string name, int status, string cate
     }
 }
 
+/* The resource location */
+
+static int hex(char digit) {
+    if (digit >= '0' && digit <= '9') return digit - '0';
+    digit |= 0x20;
+    return digit >= 'a' && digit <= 'f' ? digit - 'a' + 10 : -1;
+}
+
+/* PythonFMU takes the path once more for a URI: it would read another folder. */
+static int is_read_otherwise(string path) {
+    return strstr(path, "%20") != NULL || strstr(path, "file://") != NULL;
+}
+
+/* file:///a%20b or file:/a%20b as the plain path /a b, which PythonFMU takes as it is. */
+static int plain_path(string uri, char **path, message *why) {
+    char *end = *path = malloc(strlen(uri) + 1);
+    if (end == NULL) return compose(why, "out of memory");
+    if (strncmp(uri, "file://", 7) == 0) {
+        uri = strchr(uri + 7, '/') != NULL ? strchr(uri + 7, '/') : uri + 7;
+    } else if (strncmp(uri, "file:", 5) == 0) {
+        uri += 5;
+    }
+    while (*uri != '\0') {
+        if (uri[0] == '%' && hex(uri[1]) >= 0 && hex(uri[2]) >= 0) {
+            *end = (char)(16 * hex(uri[1]) + hex(uri[2]));
+            uri += 3;
+        } else {
+            *end = *uri++;
+        }
+        if (*end++ == '\0') return compose(why, "the resource location has a zero byte in it");
+    }
+    *end = '\0';
+    if (!is_utf8(*path)) return compose(why, "the resource location is not UTF-8");
+    return !is_read_otherwise(*path) ||
+           compose(why, "the resources folder has %%20 or file:// in its name: rename it");
+}
+
 /* Instances */
 
-static instance *new_instance(string name, const callbacks *functions, int logging) {
-    instance *it = calloc(1, sizeof *it);
-    if (it == NULL) return NULL;
+static void free_slave(void *slave) {
+    ((void (*)(void *))pythonfmu_function("fmi2FreeInstance"))(slave);
+}
+
+static void *new_slave(instance *it, string guid, string path, int visible, message *why) {
+    typedef void *(*instantiate)(string, int, string, string, const callbacks *, int, int);
+    instantiate forward = (instantiate)pythonfmu_function("fmi2Instantiate");
+    void *slave = forward(it->host.name, CO_SIMULATION, guid, path, &it->heard, visible, 1);
+    /* PythonFMU's watch over an interpreter that it has not started: it would free it twice when
+     * the process ends. */
+    ((void (*)(void))pythonfmu_function("finalizePythonInterpreter"))();
+    if (take_exception(why) && slave != NULL) {
+        free_slave(slave);
+        slave = NULL;
+    }
+    if (slave == NULL) forget(path);
+    return slave;
+}
+
+static void *make(instance *it, string guid, string path, int visible, message *why) {
+    void *handle = NULL;
+    if (!load(why)) return NULL;
+    int lock = py.PyGILState_Ensure();
+    begin_making();
+    if (preflight(path, guid, why)) it->slave = new_slave(it, guid, path, visible, why);
+    end_making();
+    if (it->slave != NULL) {
+        handle = new_handle(INSTANCE, it, NULL);
+        if (handle == NULL) free_slave(it->slave);
+    }
+    py.PyGILState_Release(lock);
+    return handle;
+}
+
+static void *new_component(instance *it, string guid, string location, int visible, message *why) {
+    char *path = NULL;
+    void *handle = NULL;
     it->heard = (callbacks){.logger = log_of_slave, .environment = it};
-    if (listen(&it->host, name, logger_of(functions), logging)) return it;
-    free(it);
-    return NULL;
+    compose(why, "the slave cannot be created");
+    if (location == NULL) {
+        compose(why, "there is no resource location");
+    } else if (plain_path(location, &path, why)) {
+        handle = make(it, guid, path, visible, why);
+    }
+    free(path);
+    if (it->has_logged_error) clear(why);
+    log_queue(it);
+    return handle;
 }
 
 static void release_instance(instance *it) {
+    log_queue(it);
     release_listener(&it->host);
     free(it);
 }
 
 /* Calls */
-
-/* Whether a call may be forwarded: only then are its arguments checked. */
-#define GOES_ON(call, wrong)                                                                     \
-    ((call).instance != NULL && (call).status == FMI_OK && check(&(call), wrong))
 
 /* A host that ends Python first lets its instances go after that: there is nothing left to end. */
 static int is_an_end(string function) {
@@ -102,7 +177,7 @@ static int is_an_end(string function) {
 }
 
 /* Begins a call with the interpreter lock, if Python runs: before that there is no instance. */
-static call enter(component handle, string function, int allowed) {
+static call begin(void *handle, string function, int allowed) {
     call this = {.function = function, .status = is_an_end(function) ? FMI_OK : FMI_ERROR};
     int lock = 0, has_lock = pythonfmu != NULL;
     if (has_lock && !py.Py_IsInitialized()) {
@@ -110,7 +185,7 @@ static call enter(component handle, string function, int allowed) {
         return this;
     }
     if (has_lock) lock = py.PyGILState_Ensure();
-    this = begin(handle, function, allowed);
+    this = lock_instance(handle, function, allowed);
     if (this.instance != NULL) {
         this.instance->lock = lock;
         this.instance->answer = FMI_OK;
@@ -122,10 +197,17 @@ static call enter(component handle, string function, int allowed) {
     return this;
 }
 
+/* The slave knows its mode. */
+static int check_mode(call *this) {
+    (void)this;
+    return 1;
+}
+
 /* Takes on the status that the slave has for a call, where PythonFMU has answered fmi2OK. */
-static void take_answer(call *this, int ends_in_error) {
-    if (this->instance->answer > this->status) this->status = this->instance->answer;
-    if (this->instance->answer >= FMI_ERROR && ends_in_error) this->instance->in_error = 1;
+static void take_answer(call *this) {
+    instance *it = this->instance;
+    if (it->answer > this->status) this->status = it->answer;
+    if (it->answer >= FMI_ERROR && !(this->allowed & WHEN(AFTER_ERROR))) it->in_error = 1;
 }
 
 /* Gives the interpreter lock back, and logs what there is to log. */
@@ -146,11 +228,16 @@ static void leave(call *this) {
     log_queue(it);
 }
 
-/* Lets the next call of the instance begin; the status of this one. */
 static int end(call *this) {
     if (this->instance != NULL) {
         leave(this);
         unlock_entry(this->entry);
     }
     return this->status;
+}
+
+static void free_component(call *this) {
+    if (!this->instance->is_lost) free_slave(this->instance->slave);
+    leave(this);
+    release_instance(this->instance);
 }

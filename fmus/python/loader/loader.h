@@ -1,10 +1,9 @@
 /* What the parts of the loader know of each other. fmi2.c is compiled, and includes all others.
  *
- * python.c     finds Python and starts it, once a process
- * preflight.c  has preflight.py find out whether PythonFMU can make an instance
- * location.c   the resource location
- * guard.c      the instance that the host holds, its messages, and the ends of every call
- * fmi2.c       the functions of FMI 2.0
+ * python.c  finds Python and starts it, once a process; has preflight.py find out whether PythonFMU
+ *           can make an instance
+ * guard.c   the instance that the host holds, its messages, and the ends of every call
+ * fmi2.c    the functions of FMI 2.0
  */
 #ifndef LOADER_H
 #define LOADER_H
@@ -12,11 +11,7 @@
 #include "../../native/runtime/platform.h"
 
 #include "../../native/runtime/fmi2.h"
-#include "../../native/runtime/modes.h"
 #include "../../native/runtime/text.c"
-
-typedef void *component;
-typedef unsigned int reference;
 
 /* Python */
 
@@ -72,7 +67,7 @@ struct instance {
     queued *queue;
     int has_logged_error;
     callbacks heard; /* what PythonFMU gets for callbacks */
-    component slave; /* PythonFMU's own instance */
+    void *slave;     /* PythonFMU's own instance */
     int lock;        /* what the call got with the global interpreter lock */
     int answer;      /* the status that the slave has for the call */
     double time_told; /* by the slave in the call, NaN: none */

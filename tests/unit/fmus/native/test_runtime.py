@@ -21,7 +21,7 @@ from fmus.discovery import components, source_of
 from fmus.native.packaging import MAIN, sources
 from fmus.native.translator import _directives
 from fmus.ports.behaviour import NUMBER_FORMAT
-from fmus.python.callbacks import LONGEST_MESSAGE
+from fmus.python.component import LONGEST_MESSAGE
 from support.language import HEAD, Twins, module_of
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]

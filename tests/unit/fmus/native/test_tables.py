@@ -62,7 +62,7 @@ def test_a_start_of_minus_zero_stays_one():
 def test_names_of_choices_are_texts_in_c():
     odd = {'a"b\\': 0, "??/": -(2**31)}
     of = replace(build.definition(), ports=(chosen("odd", odd),))
-    of = replace(of, parameters=ParameterSet(One, odd=of.ports[0]))
+    of = replace(of, parameters=ParameterSet(One, of.ports[:1]))
     of = replace(of, behaviour=of.behaviour._replace(parameters=One))
     assert r'{{"a\"b\\", 0}, {"\?\?/", -2147483648}};' in tables(of)
 

@@ -32,7 +32,7 @@ from fmus.native.tables import tables
 from fmus.native.translator import _drawn, deepest, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
-from fmus.python.callbacks import LONGEST_MESSAGE, Callbacks
+from fmus.python.component import LONGEST_MESSAGE, Component
 from support.equations import (
     FLAGS,
     ROOT,
@@ -279,7 +279,7 @@ def agree(both: Equations, hook: str, **given: Any) -> Any:
     try:
         result = both.python(hook, **given)
     except Exception as error:
-        why = Callbacks.describe(None, error)[:LONGEST_MESSAGE]  # type: ignore[arg-type]
+        why = Component.describe(None, error)[:LONGEST_MESSAGE]  # type: ignore[arg-type]
     assert both.c(hook, **given) == (why, [] if result is None else bits(flat(result)))
     return result
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enum import IntEnum
+from itertools import chain
 from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
@@ -18,7 +19,7 @@ from fmus.ports.definition import Definition, Origin
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_description
 from fmus.ports.fields import declared
-from fmus.ports.groups import ParameterSet, ports_in
+from fmus.ports.groups import ParameterSet
 from fmus.ports.port import Misdeclared, Port
 
 
@@ -44,7 +45,7 @@ def made(**fields: Any) -> Any:
 
 def ports(causality: str, **fields: Any) -> list[Port]:
     found = declared(made(**fields), causality)
-    return [port for field in found.values() for port in ports_in(field)]
+    return [*chain(*found.values())]
 
 
 def test_a_float_is_a_real_with_unit_bounds_and_start():
@@ -158,14 +159,13 @@ class Gains(NamedTuple):
 
 
 def test_a_class_in_a_class_is_a_group_with_its_own_start_values():
-    field = declared(made(gains=(Gains, Gains(k=5.0))), "parameter")["gains"]
-    assert isinstance(field, ParameterSet)
-    assert {port.name: port.start for port in field.ports} == {
+    found = declared(made(gains=(Gains, Gains(k=5.0))), "parameter")["gains"]
+    assert {port.name: port.start for port in found} == {
         "gains.k": 5.0, "gains.v[1]": 2.0, "gains.v[2]": 3.0,
     }  # fmt: skip
-    assert field.of({"gains.k": 7.0, "gains.v[1]": 8.0, "gains.v[2]": 9.0}) == Gains(
-        7.0, (8.0, 9.0)
-    )
+    assert ParameterSet(Gains, found).of(
+        {"gains.k": 7.0, "gains.v[1]": 8.0, "gains.v[2]": 9.0}
+    ) == Gains(7.0, (8.0, 9.0))
     assert [port.start for port in ports("parameter", gains=Gains)] == [1.0, 2.0, 3.0]
 
 
@@ -176,7 +176,7 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         c=Annotated[tuple[float, float], Variable(feedthrough=("u[{}]",), initially=())],
     )
     found = declared(fields, "output", ("u", "v"), ("w",))
-    ports = [port for field in found.values() for port in ports_in(field)]
+    ports = [*chain(*found.values())]
     assert [(port.feedthrough, port.initially) for port in ports] == [
         (("u", "v"), ("w",)), ((), ("w",)), (("u[1]",), ()), (("u[2]",), ()),
     ]  # fmt: skip

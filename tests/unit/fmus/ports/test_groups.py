@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from enum import IntEnum
+from itertools import chain
 from typing import Annotated, Any, NamedTuple
 
 import pytest
@@ -17,7 +18,6 @@ from fmus.ports.groups import (
     ParameterSet,
     hints_of,
     packed,
-    ports_in,
     slices,
     unpacking,
 )
@@ -29,7 +29,7 @@ PLAIN = Variable(description="One of several")
 
 
 def ports_of(made: type, causality: str = "input") -> list[Port]:
-    return [port for field in declared(made, causality).values() for port in ports_in(field)]
+    return [*chain(*declared(made, causality).values())]
 
 
 def packing(made: type) -> Callable[[Any], list[Any]]:
@@ -84,7 +84,7 @@ class Nested(NamedTuple):
 
 
 def test_parameters_become_the_set_of_the_equations_field_by_field():
-    whole = ParameterSet(Nested, **declared(Nested, "parameter"))
+    whole = ParameterSet(Nested, ports_of(Nested, "parameter"))
     assert [port.name for port in whole.ports] == ["ell", "K1[1]", "K1[2]", "K1[3]", "lambda"]
     values = {port.name: port.start for port in whole.ports}
     assert whole.of(values) == Nested(5.0, Gains((1.0, 2.0, 3.0), 4.0))
@@ -153,7 +153,7 @@ class Chosen(NamedTuple):
 
 
 def test_parameters_are_members_of_enumerations_matrices_and_sets():
-    whole = ParameterSet(Chosen, **declared(Chosen, "parameter"))
+    whole = ParameterSet(Chosen, ports_of(Chosen, "parameter"))
     made = whole.of({port.name: port.start for port in whole.ports})
     assert made == (Kind.B, ((1.0, 2.0),), 3, True, ((1.0, 2.0, 3.0), 4.0))
     assert (type(made.kind), type(made.K), type(made.K[0])) == (Kind, Matrix, Vector)

@@ -8,7 +8,7 @@ from random import Random
 import pytest
 from pythonfmu.enums import Fmi2Status
 
-from fmus.python import callbacks, component
+from fmus.python import component
 from fmus.python.slave import slave_of
 from support import integrator
 from support.instances import answers_of, messages_of
@@ -104,12 +104,12 @@ def test_what_equations_raise_is_named_and_logged_once_whatever_the_time(slave, 
     assert entry.msg == "step refused at t = 1 s: ZeroDivisionError: of nothing"
     assert entry.status == Fmi2Status.discard
     assert [(it.msg, it.status, it.category) for it in answers] == [
-        ("", Fmi2Status.discard, callbacks.ANSWER)
+        ("", Fmi2Status.discard, component.ANSWER)
     ] * 2
 
 
 def test_the_last_message_says_that_it_is_the_last(slave, monkeypatch):
-    monkeypatch.setattr(callbacks, "MOST_MESSAGES", 2)
+    monkeypatch.setattr(component, "MOST_MESSAGES", 2)
     for reference in (97, 98, 99):
         slave.get_real([reference])
     first, last = messages_of(slave)

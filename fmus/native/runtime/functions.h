@@ -1,0 +1,119 @@
+/* The functions of FMI 2.0 for both kinds of component. Those that are called with an instance:
+ *
+ *     FUNCTION(name, allowed, wrong, parameters, action)
+ *     FORWARDED(name, allowed, wrong, parameters, arguments, action)
+ *
+ * Components in C do the action of both. For those in Python the loader does that of the first, and
+ * forwards the second with these arguments to PythonFMU.
+ */
+
+EXPORT string NAMED(fmi2GetTypesPlatform)(void) { return "default"; }
+
+EXPORT string NAMED(fmi2GetVersion)(void) { return "2.0"; }
+
+EXPORT void *NAMED(fmi2Instantiate)(string name, int type, string guid, string location,
+                                    const callbacks *functions, int visible, int logging) {
+    string wrong = type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only";
+    return instantiate("fmi2Instantiate", wrong, name, "GUID", guid, location, visible,
+                       logger_of(functions), logging);
+}
+
+EXPORT void NAMED(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }
+
+FUNCTION(fmi2SetDebugLogging, MASK_SetDebugLogging, wrong_texts(n, categories),
+         (void *c, int on, size_t n, const string categories[]),
+         choose_messages(&this, on, n, categories))
+
+/* Modes */
+
+FORWARDED(fmi2EnterInitializationMode, MASK_EnterInitializationMode, NULL, (void *c), (c),
+          enter_initialisation(&this))
+FORWARDED(fmi2ExitInitializationMode, MASK_ExitInitializationMode, NULL, (void *c), (c),
+          exit_initialisation(&this))
+FORWARDED(fmi2Terminate, MASK_Terminate, NULL, (void *c), (c), terminate(&this))
+FORWARDED(fmi2CancelStep, MASK_NotSupported, NULL, (void *c), (c),
+          refuse_unsupported(&this, FMI_ERROR))
+
+/* Values */
+
+#define GET(name, type, ...)                                                                     \
+    FORWARDED(name, MASK_Get, wrong_values(n, r, v),                                             \
+              (void *c, const uint32_t r[], size_t n, type v[]), (c, r, n, v),                   \
+              prepare_to_get(&this, r, n); __VA_ARGS__)
+#define SET(name, type, wrong, ...)                                                              \
+    FORWARDED(name, MASK_Set, wrong, (void *c, const uint32_t r[], size_t n, const type v[]),    \
+              (c, r, n, v), __VA_ARGS__)
+
+GET(fmi2GetReal, double, if (!get_all_reals(&this, r, n, v)) GET_EACH(get_real))
+GET(fmi2GetInteger, int, GET_EACH(get_integer))
+GET(fmi2GetBoolean, int, GET_EACH(get_boolean))
+SET(fmi2SetReal, double, wrong_values(n, r, v),
+    if (!set_all_reals(&this, r, n, v)) { SET_EACH(REAL, v[k]); })
+SET(fmi2SetInteger, int, wrong_values(n, r, v), SET_EACH(INTEGER, v[k]))
+SET(fmi2SetBoolean, int, wrong_values(n, r, v), SET_EACH(BOOLEAN, v[k] != 0))
+
+/* No variable is a text. */
+FORWARDED(fmi2GetString, MASK_Get, wrong_values(n, r, v),
+          (void *c, const uint32_t r[], size_t n, string v[]), (c, r, n, v),
+          for (size_t i = 0; i < n; i++) v[i] = "";
+          get_unknown(&this, "String", r, n))
+SET(fmi2SetString, string, wrong_strings(n, r, v), set_unknown(&this, "String", r, n))
+
+/* States */
+
+FUNCTION(fmi2GetFMUstate, MASK_FMUstate, NULL, (void *c, void **state), get_state(&this, state))
+FUNCTION(fmi2SetFMUstate, MASK_FMUstate, NULL, (void *c, void *state), set_state(&this, state))
+FUNCTION(fmi2FreeFMUstate, MASK_FMUstate, NULL, (void *c, void **state), free_state(&this, state))
+FUNCTION(fmi2SerializedFMUstateSize, MASK_FMUstate, NULL, (void *c, void *state, size_t *size),
+         size_of_state(&this, state, size))
+FUNCTION(fmi2SerializeFMUstate, MASK_FMUstate, NULL,
+         (void *c, void *state, char bytes[], size_t size),
+         serialise_state(&this, state, bytes, size))
+FUNCTION(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
+         (void *c, const char bytes[], size_t size, void **state),
+         deserialise_state(&this, bytes, size, state))
+
+/* What is not supported, or hardly */
+
+FORWARDED(fmi2GetDirectionalDerivative, MASK_NotSupported, NULL,
+          (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,
+           const double dk[], double du[]),
+          (c, u, nu, k, nk, dk, du), refuse_unsupported(&this, FMI_ERROR))
+FORWARDED(fmi2SetRealInputDerivatives, MASK_NotSupported, NULL,
+          (void *c, const uint32_t r[], size_t n, const int order[], const double v[]),
+          (c, r, n, order, v), refuse_unsupported(&this, FMI_ERROR))
+FORWARDED(fmi2GetRealOutputDerivatives, MASK_NotSupported, NULL,
+          (void *c, const uint32_t r[], size_t n, const int order[], double v[]),
+          (c, r, n, order, v), refuse_unsupported(&this, FMI_ERROR))
+
+#define STATUS(name, type, status)                                                               \
+    FORWARDED(name, MASK_Get, wrong_place(v), (void *c, int kind, type *v), (c, kind, v),        \
+              refuse_unsupported(&this, status))
+
+STATUS(fmi2GetStatus, int, FMI_ERROR)
+STATUS(fmi2GetIntegerStatus, int, FMI_DISCARD)
+STATUS(fmi2GetStringStatus, string, FMI_DISCARD)
+
+/* No answer: with "true", which is PythonFMU's after each refused step, hosts would end the run as
+ * a success; with "false" FMPy would repeat the step without end. */
+FUNCTION(fmi2GetBooleanStatus, MASK_Get, wrong_place(v), (void *c, int kind, int *v), {
+    *v = 0;
+    this.status = FMI_DISCARD;
+})
+
+/* Only model exchange has these: some hosts look for them in every FMU. */
+
+#define OF_MODEL_EXCHANGE(name, ...)                                                             \
+    FUNCTION(name, MASK_NotSupported, NULL, (__VA_ARGS__), refuse_unsupported(&this, FMI_ERROR))
+
+OF_MODEL_EXCHANGE(fmi2EnterEventMode, void *c)
+OF_MODEL_EXCHANGE(fmi2NewDiscreteStates, void *c, void *events)
+OF_MODEL_EXCHANGE(fmi2EnterContinuousTimeMode, void *c)
+OF_MODEL_EXCHANGE(fmi2CompletedIntegratorStep, void *c, int no_set, int *enter_events,
+                  int *terminate)
+OF_MODEL_EXCHANGE(fmi2SetTime, void *c, double time)
+OF_MODEL_EXCHANGE(fmi2SetContinuousStates, void *c, const double x[], size_t nx)
+OF_MODEL_EXCHANGE(fmi2GetDerivatives, void *c, double derivatives[], size_t nx)
+OF_MODEL_EXCHANGE(fmi2GetEventIndicators, void *c, double indicators[], size_t ni)
+OF_MODEL_EXCHANGE(fmi2GetContinuousStates, void *c, double x[], size_t nx)
+OF_MODEL_EXCHANGE(fmi2GetNominalsOfContinuousStates, void *c, double x_nominal[], size_t nx)
