@@ -84,8 +84,8 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     #: Of which of `inputs`, `parameters`, `t` and `state` outputs are made, and what is derived.
     outputs_of: ClassVar[frozenset[str]]
     derived_of: ClassVar[frozenset[str]]
-    #: Gives the norm of a state.
-    norm: Callable[[Any], float]
+    #: Gives the square of the norm of a state.
+    square: Callable[[Any], float]
     #: The parameters as they are now.
     parameters: Any
 
@@ -341,7 +341,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
 
     def check_size(self, state: Any) -> None:
         """Raise Refusal for a state that is too large, or not finite."""
-        if not self.norm(state) <= LARGEST_STATE:
+        if not self.square(state) <= LARGEST_STATE * LARGEST_STATE:
             raise Refusal(f"the state is not finite, or exceeds {LARGEST_STATE:g}")
 
     def _meaning(self, values: dict[str, Value]) -> tuple[Any, float]:
@@ -509,7 +509,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             store.parameters = wanted["parameters"]
         else:
             meaning = self._meaning(wanted["parameters"])
-            if not self.norm(state) <= LARGEST_STATE:
+            if not self.square(state) <= LARGEST_STATE * LARGEST_STATE:
                 raise Refusal(f"it exceeds {LARGEST_STATE:g}")
             self.check_state(meaning[0], state)
             if said.draws:

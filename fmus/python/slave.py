@@ -58,7 +58,7 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
 
     """
     definition = define(name, module)
-    said, norm = definition.behaviour, measuring(definition.behaviour.state)
+    said, square = definition.behaviour, measuring(definition.behaviour.state)
     inputs = [port for port in definition.ports if port.causality == "input"]
     members: dict[str, Any] = {
         "__module__": module.__package__ or module.__name__,
@@ -71,13 +71,13 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
         "outputs_of": _made_of(said, "outputs"),
         "derived_of": _made_of(said, "derive", *_GUARD),
         "unpack": staticmethod(unpacking(said.inputs, inputs)),
-        "norm": staticmethod(norm),
+        "square": staticmethod(square),
     }
     scope: dict[str, Any] = {
         **SCOPE,
         **said.hooks,
         "isfinite": isfinite,
-        "norm": norm,
+        "square": square,
         "nothing": Nothing(),
         "RESTARTED": said.restarted,
         "warning": Fmi2Status.warning,
@@ -166,7 +166,7 @@ def _advance(said: Behaviour) -> Iterator[str]:
     if _made_of(said, "derive") & {"state", "t"}:
         yield f"{indent}{derived} = None"
     if said.hooks["update"]:
-        yield f"if not norm(state) <= {LARGEST_STATE}: self.check_size(state)"
+        yield f"if not square(state) <= {LARGEST_STATE * LARGEST_STATE}: self.check_size(state)"
     yield f"return state, {'None' if said.hooks['credible'] else 'derived'}"
 
 

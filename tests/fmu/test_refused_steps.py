@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import nan
+from math import hypot, nan
 from pathlib import Path
+from random import Random
 from typing import Any, NamedTuple
 
 import fmpy
@@ -218,6 +219,28 @@ def test_a_refused_step_takes_nothing_of_the_noise(fmu, kind: str):
                 with pytest.raises(FMICallException):
                     refusing.step(k, -0.02)
             assert refusing.step(k, 0.02) == expected, k
+
+
+def test_kinds_agree_on_the_largest_state_to_its_last_bit(fmu):
+    random, answers = Random(1), set()
+    with Driven(fmu(PYTHON, "AuvPlant")) as python, Driven(fmu(NATIVE, "AuvPlant")) as native:
+        for _ in range(200):
+            place = [random.uniform(0.5, 1.0) for _ in range(3)]
+            scale = 1e100 / hypot(*place) * (1.0 + random.randint(-2, 2) * 2.0**-53)
+            values = {f"eta0.{name}": x * scale for name, x in zip("xyz", place, strict=True)}
+            said = {_starts(one, values) for one in (python, native)}
+            assert len(said) == 1, values
+            answers |= said
+    assert answers == {True, False}
+
+
+def _starts(driven: Driven, values: Mapping[str, float]) -> bool:
+    driven.reset()
+    try:
+        driven.start(values)
+    except FMICallException:
+        return False
+    return True
 
 
 # Tools
