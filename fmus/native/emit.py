@@ -37,7 +37,6 @@ from fmus.language.types import (
     Record,
     Scalar,
     Type,
-    is_algebraic,
     is_whole,
 )
 from fmus.native.names import class_in_c, in_c, is_of_library, words_of_runtime
@@ -169,8 +168,8 @@ class Emitter:
         self._functions = [*functions]
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
-        self._types: dict[Type, str] = {}
-        self._constants: dict[tuple[Type, str], str] = {}
+        self._types: dict[Type | tuple[str, int], str] = {}
+        self._constants: dict[tuple[str, str, Type, str], str] = {}
         self._wrappers: dict[str, str] = {}
         #: Names of variables, which nothing else has.
         self._variables = {in_c(name) for one in self._functions for name in _variables(one)}
@@ -181,7 +180,8 @@ class Emitter:
             for type_ in (*function.arguments.values(), function.returns):
                 self.type(type_)
         for function in self._functions:
-            self._names[function] = self._unused(self._wanted(function))
+            name = self._in_module(function.module, function.name, *function.sizes)
+            self._names[function] = name
 
     def text(self) -> str:
         """All of it."""
@@ -197,18 +197,19 @@ class Emitter:
     # Names
 
     def _unused(self, name: str) -> str:
+        """A name that no other structure, function or constant has."""
         name += "_" if is_of_library(name) else ""
-        while name in self._taken | self._variables or name in words_of_runtime():
+        while name in self._taken or name in self._variables or name in words_of_runtime():
             name += "_"
         self._taken.add(name)
         return name
 
-    def _wanted(self, function: Function) -> str:
-        """The name of a function, which begins with that of its module, and ends with its sizes."""
-        module = function.module.rpartition(".")[2]
-        own = function.name.lstrip("_")
-        parts = [module, own, *map(self.type, function.sizes)]
-        return re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+    def _in_module(self, module: str, name: str, *sizes: Type) -> str:
+        """A name for what stands in a module."""
+        stems = (part.lstrip("_") for part in (module.rpartition(".")[2], name))
+        parts = [*stems, *map(self.type, sizes)]
+        found = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+        return self._unused(found if found.isidentifier() else f"of_{found}")
 
     # Types and constants
 
@@ -218,9 +219,11 @@ class Emitter:
             if is_whole(type_):
                 return "int"
             return {FLOAT: "double", TEXT: "const char *"}.get(type_, "void")
-        if type_ not in self._types:
-            self._types[type_] = self._structure(type_)
-        return self._types[type_]
+        # Arrays that are alike in C are one structure.
+        key = (self.type(type_.item), type_.n) if isinstance(type_, Array) else type_
+        if key not in self._types:
+            self._types[key] = self._structure(type_)
+        return self._types[key]
 
     def declared(self, type_: Type) -> str:
         """A type before a name."""
@@ -229,48 +232,39 @@ class Emitter:
 
     def _structure(self, type_: Array | Record) -> str:
         """The name of a structure, which is defined after those that it needs."""
+        doc = ""
         if isinstance(type_, Array):
-            item = self.type(type_.item)
+            item, n = self.type(type_.item), type_.n
+            rows = [f"    {item} v[{n}];"]
             if type_.item == FLOAT:
-                name = f"Vector{type_.n}"
-            elif is_algebraic(type_):
-                name = f"Matrix{type_.n}x{item.removeprefix('Vector')}"
+                name = f"Vector{n}"
+            elif isinstance(type_.item, Array) and type_.item.item == FLOAT:
+                name = f"Matrix{n}x{type_.item.n}"
             else:
-                name = f"{item}x{type_.n}"
-            self.structures[name] = f"typedef struct {{\n    {item} v[{type_.n}];\n}} {name};"
-            return name
-        about = _comments(type_.made)
-        rows = [
-            f"    {self.type(part)} {in_c(name)};{about.get(name, '')}"
-            for name, part in type_.fields
-        ]
-        rows = rows or ["    char nothing; /* C has no empty structure */"]
-        if type_.made:
-            name = class_in_c(type_.made.__name__)
-            doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
+                name = f"{item}x{n}"
         else:
-            name, doc = "_".join(map(self._part_name, dict(type_.fields).values())) or "Empty", ""
-        while name in self.structures or name in self._variables:
-            name += "_"
+            about = _comments(type_.made)
+            rows = [
+                f"    {self.type(part)} {in_c(name)};{about.get(name, '')}"
+                for name, part in type_.fields
+            ] or ["    char nothing; /* C has no empty structure */"]
+            name = "_".join(self.type(part) for _, part in type_.fields) or "Empty"
+            if type_.made:
+                name = class_in_c(type_.made.__name__)
+                doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
+        name = self._unused(name)
         head = [f"/* {strip_sphinx_marks(doc)} */"] if doc else []
-        text = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
-        self.structures[name] = text
+        self.structures[name] = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
         return name
-
-    def _part_name(self, type_: Type) -> str:
-        """The name of a part of a tuple: a tuple within it ends with a mark of its own."""
-        is_tuple = isinstance(type_, Record) and type_.made is None
-        return f"{self.type(type_)}_" if is_tuple else self.type(type_)
 
     def _constant(self, one: tree.Constant) -> str:
         text = self._literal(one.value, one.type)
-        if (one.type, text) not in self._constants:
-            module = one.module.rpartition(".")[2]
-            name = self._unused(f"{module}_{one.name.lstrip('_')}")
-            self._constants[one.type, text] = name
+        key = (one.module, one.name, one.type, text)
+        if key not in self._constants:
+            name = self._constants[key] = self._in_module(one.module, one.name)
             value = f"static const {self.declared(one.type)}{name} = {text};"
             self.constants[name] = "\n".join(lines_of(value, ""))
-        return self._constants[one.type, text]
+        return self._constants[key]
 
     def _literal(self, value: Any, type_: Type) -> str:
         """A value as an initializer."""

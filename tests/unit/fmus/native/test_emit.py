@@ -887,6 +887,34 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
     assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (7.5,)
 
 
+def test_constants_of_one_value_keep_their_names(tmp_path: Path):
+    text = HEAD + (
+        "KILO, GRAMS = 1000.0, 1000.0\n\n\ndef f(x: float) -> float:\n    return x * KILO / GRAMS\n"
+    )
+    both = Twins(module_of(text, tmp_path, "units"), tmp_path)
+    assert "units_KILO" in both.text
+    assert "units_GRAMS" in both.text
+    assert both.c("f", (3.0,)).numbers == (3.0,)
+
+
+def test_classes_functions_and_constants_share_no_name(tmp_path: Path):
+    """In a module whose own name begins as classes, or names of C, do."""
+    text = HEAD + (
+        "class Foo(NamedTuple):\n    x: float\n    n: int\n\n\n"
+        "class Foox2(NamedTuple):\n    y: float\n\n\nclass Foo_bar(NamedTuple):\n    z: float\n"
+        "\n\nx2 = 5.0\n\n\n"
+        "def bar(x: float, both: tuple[Foo, Foo], of: Foox2) -> Foo_bar:\n"
+        "    return Foo_bar(both[0].x + 10.0 * of.y + x2 * x)\n"
+    )
+    for module in ("Foo", "_Foo", "__"):
+        folder = tmp_path / module
+        folder.mkdir()
+        both = Twins(module_of(text, folder, module), folder)
+        numbers = (2.0, 1.0, 1, 3.0, 1, 4.0)
+        assert both.c("bar", numbers) == both.python("bar", numbers)
+        assert both.c("bar", numbers).numbers == (51.0,)
+
+
 def test_constants_of_one_name_keep_their_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """One is imported and defined anew, one imported by another name, one like a member."""
     monkeypatch.syspath_prepend(str(tmp_path))
