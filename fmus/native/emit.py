@@ -412,7 +412,7 @@ class _Body:
         """A block; variables are declared where the first statement of it needs them."""
         used: dict[str, list[int]] = {}
         for i, statement in enumerate(statements):
-            for name in _used(statement):
+            for name in dict.fromkeys(_used(statement)):
                 used.setdefault(name, []).append(i)
         here: dict[int, list[str]] = {}
         for name, places in used.items():
@@ -559,18 +559,17 @@ def _ends(body: Sequence[Statement]) -> bool:
     return isinstance(last, (tree.Return, tree.Raise))
 
 
-def _used(one: Statement, deep: bool = True) -> set[str]:
+def _used(one: Statement, deep: bool = True) -> Iterator[str]:
     """The variables that a statement uses or gives a value, with those of its blocks or without."""
-    found = {
-        part.name
-        for each in tree.expressions_of(one)
-        for part in tree.expressions_in(each)
-        if isinstance(part, Local)
-    } | {*tree.stored_in(one)}
+    counter = one.counter if isinstance(one, tree.For) else ""
+    for each in tree.expressions_of(one):
+        for part in tree.expressions_in(each):
+            if isinstance(part, Local) and part.name != counter:
+                yield part.name
+    yield from tree.stored_in(one)
     for block in tree.blocks_of(one) if deep else ():
         for statement in block:
-            found |= _used(statement)
-    return found - {one.counter} if isinstance(one, tree.For) else found
+            yield from (name for name in _used(statement) if name != counter)
 
 
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:

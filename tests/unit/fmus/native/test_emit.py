@@ -887,6 +887,18 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
     assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (7.5,)
 
 
+def test_variables_are_declared_in_the_order_of_their_first_use(tmp_path: Path):
+    """In each process: the GUID of an FMU follows from its text."""
+    names = "qwertyuiop"
+    stores = [f"{name} = {i}.0 * x" for i, name in enumerate(names)]
+    text = HEAD + (
+        f"def f(x: float) -> float:\n    if x > 0.0:\n        {'; '.join(stores)}\n"
+        f"    else:\n        {'; '.join(reversed(stores))}\n    return {' + '.join(names)}\n"
+    )
+    text = c_text({"f": module_of(text, tmp_path, "ordered").f})
+    assert re.findall(r"    double (\w) = 0", text) == [*names]
+
+
 def test_constants_of_one_value_keep_their_names(tmp_path: Path):
     text = HEAD + (
         "KILO, GRAMS = 1000.0, 1000.0\n\n\ndef f(x: float) -> float:\n    return x * KILO / GRAMS\n"
