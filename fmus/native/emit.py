@@ -466,11 +466,14 @@ class _Body:
             yield from lines_of(self._raised(one), indent)
             yield f"{indent}{self.left()}"
         elif isinstance(one, tree.If):
-            yield from lines_of(f"if ({self._text(one.test)}) {{", indent)
-            yield from self.block(one.body, known, inner)
-            if one.orelse:
+            head, (chain, orelse) = "if", _chain(one)
+            for each in chain:
+                yield from lines_of(f"{head} ({self._text(each.test)}) {{", indent)
+                yield from self.block(each.body, known, inner)
+                head = "} else if"
+            if orelse:
                 yield f"{indent}}} else {{"
-                yield from self.block(one.orelse, known, inner)
+                yield from self.block(orelse, known, inner)
             yield f"{indent}}}"
         else:
             assert isinstance(one, (tree.While, tree.For))
@@ -554,22 +557,32 @@ class _Body:
 def _ends(body: Sequence[Statement]) -> bool:
     """Whether each way through a block ends the function."""
     last = body[-1] if body else None
-    if isinstance(last, tree.If):
-        return _ends(last.body) and _ends(last.orelse)
+    while isinstance(last, tree.If) and _ends(last.body):
+        last = last.orelse[-1] if last.orelse else None
     return isinstance(last, (tree.Return, tree.Raise))
+
+
+def _chain(one: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
+    """A choice, and those that are all of what the one before does else; what the last one does."""
+    found, orelse = [one], one.orelse
+    while len(orelse) == 1 and isinstance(orelse[0], tree.If) and not orelse[0].comment:
+        found.append(orelse[0])
+        orelse = orelse[0].orelse
+    return found, orelse
 
 
 def _used(one: Statement, deep: bool = True) -> Iterator[str]:
     """The variables that a statement uses or gives a value, with those of its blocks or without."""
-    counter = one.counter if isinstance(one, tree.For) else ""
-    for each in tree.expressions_of(one):
-        for part in tree.expressions_in(each):
-            if isinstance(part, Local) and part.name != counter:
-                yield part.name
-    yield from tree.stored_in(one)
-    for block in tree.blocks_of(one) if deep else ():
-        for statement in block:
-            yield from (name for name in _used(statement) if name != counter)
+    rest = [(one, frozenset[str]())]
+    while rest:
+        one, counters = rest.pop()
+        if isinstance(one, tree.For):
+            counters |= {one.counter}
+        parts = (part for each in tree.expressions_of(one) for part in tree.expressions_in(each))
+        names = [part.name for part in parts if isinstance(part, Local)] + tree.stored_in(one)
+        yield from (name for name in names if name not in counters)
+        inner = [statement for block in tree.blocks_of(one) for statement in block if deep]
+        rest += [(statement, counters) for statement in reversed(inner)]
 
 
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
@@ -18,8 +19,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fmus.language import tree
 from fmus.language.build import Untranslatable
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
+from fmus.language.types import BOOL, FLOAT
+from fmus.native.emit import Emitter
 from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 
 ZIG = (sys.executable, "-m", "ziglang", "cc")
@@ -885,6 +889,20 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
     )
     both = Twins(module_of(text, tmp_path, "tank"), tmp_path)
     assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (7.5,)
+
+
+def test_a_choice_of_many_is_written_side_by_side():
+    """In a thread, whose stack is empty."""
+    x = tree.Local("x", FLOAT)
+    body: list[tree.Statement] = [tree.Return(x)]
+    for k in range(900):
+        test = tree.Operation(tree.LESS, (x, tree.Number(float(k), FLOAT)), BOOL)
+        body = [tree.If(test, [tree.Return(tree.Number(0.5, FLOAT))], body)]
+    function = tree.Function("own", "f", {"x": FLOAT}, FLOAT, body)
+    with ThreadPoolExecutor() as pool:
+        text = pool.submit(lambda: Emitter([function]).text()).result()
+    assert text.count("\n    } else if (x < ") == 899
+    assert text.endswith("\n    } else {\n        return x;\n    }\n}")
 
 
 def test_variables_are_declared_in_the_order_of_their_first_use(tmp_path: Path):
