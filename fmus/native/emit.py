@@ -332,8 +332,7 @@ class _Definition:
         if isinstance(one, Field):
             return f"{self.expression(one.owner, _POSTFIX)}.{in_c(one.name)}", _POSTFIX
         if isinstance(one, Item):
-            owner = self.expression(one.owner, _POSTFIX)
-            return f"{owner}.v[{self.expression(one.place)}]", _POSTFIX
+            return f"{self._owner(one.owner)}v[{self.expression(one.place)}]", _POSTFIX
         if isinstance(one, Make):
             return f"({self._emitter.type(one.type)}){self._made(one)}", _POSTFIX
         if isinstance(one, Choice):
@@ -347,6 +346,18 @@ class _Definition:
             return self._emitter.call(one.function, given), _POSTFIX
         assert isinstance(one, Operation)
         return self._operation(one)
+
+    def _owner(self, one: Expression) -> str:
+        """An array, with the sign before a member of it."""
+        if isinstance(one, Local) and one.name == self._function.by_address:
+            return f"{in_c(one.name)}->"
+        root = one
+        while isinstance(root, Field):
+            root = root.owner
+        if not isinstance(root, (Call, Choice)):
+            return f"{self.expression(one, _POSTFIX)}."
+        # In C99, what comes from a function or a choice may end before an element of it is read.
+        return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}->"
 
     def _made(self, one: Make) -> str:
         """The initializer of a structure."""

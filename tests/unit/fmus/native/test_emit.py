@@ -38,6 +38,9 @@ COMMANDS = {
     "zig -O2": (*ZIG, "-O2"),
 }
 
+#: One that is there.
+COMPILED = next((c for c in ("gcc -O2", "clang -O2") if shutil.which(COMMANDS[c][0])), "")
+
 #: Functions that zig has itself, and links without optimisation instead of the C library's. They
 #: are less exact: in the last bit, and logarithms of the smallest numbers in the tenth digit.
 OWN_OF_ZIG = ("cos", "exp", "log", "log10", "log2", "sin", "tan")
@@ -249,6 +252,12 @@ CONSTRUCTS = {
     "slice": (
         "def f(v: Annotated[Vector, 4]) -> tuple[float, float]:\n"
         "    w = v[1:3]\n    return w @ v[::2], Vector((*v[2:], 1.0, *w)).sum()\n"
+    ),
+    "elements of what has no name": (
+        "def f(v: Annotated[Vector, 3], k: int, r: Record) -> tuple[float, float, float]:\n"
+        "    def twice(by: float) -> Annotated[Matrix, 2, 3]:\n        return by * Matrix((v, v))\n"
+        "    def kept(by: float) -> Record:\n        return r._replace(x=by)\n"
+        "    return twice(2.0)[k, 1], kept(v[0]).v[k], (r.v if k > 0 else v)[k - 1]\n"
     ),
     "len": "def f(v: Annotated[Vector, 4]) -> int:\n    return len(v) * len(A)\n",
     "vector + -": (
@@ -730,12 +739,19 @@ def test_python_and_c_agree_bit_for_bit(
     agree()
 
 
+def test_no_element_is_read_of_what_may_have_ended(
+    twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory
+):
+    """C99, 6.5.2.2: the result of a function, after the next sequence point."""
+    text = twins_of(twins, COMPILED, tmp_path_factory).text
+    assert not re.search(r"\)(\.\w+)*\.v\[", text)
+
+
 @pytest.mark.parametrize("name", ["int +", "int *", "floor"])
 def test_an_integer_that_c_cannot_hold_is_refused(
     twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory, name: str
 ):
-    command = next(c for c in ("gcc -O2", "clang -O2") if shutil.which(COMMANDS[c][0]))
-    both = twins_of(twins, command, tmp_path_factory)
+    both = twins_of(twins, COMPILED, tmp_path_factory)
     function = f"f{[*CONSTRUCTS].index(name)}"
     given_ = (2.0**31,) if name == "floor" else (2**31 - 1, 2**31 - 1)
     assert both.c(function, given_).error == TOO_LARGE
