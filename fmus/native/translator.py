@@ -341,7 +341,7 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
 
     Structures are passed and returned by value, so a function that adds large vectors keeps each
     sum there. Nothing calls itself, and all sizes are fixed: what lies there at most can be added
-    up. Compilers keep no more than this, but for a tenth, and less if they optimise.
+    up. Compilers that optimise keep no more than this, but for a tenth.
 
     Args:
         functions: each after those that it calls.
