@@ -37,7 +37,6 @@ from fmus.language.types import (
     Record,
     Scalar,
     Type,
-    is_algebraic,
     is_whole,
 )
 from fmus.native.names import class_in_c, in_c, is_of_library, words_of_runtime
@@ -161,54 +160,54 @@ class Emitter:
 
     Attributes:
         structures, constants: their texts, by their names.
+        names: of the functions.
 
     """
 
     def __init__(self, functions: Iterable[Function]) -> None:
         """Begin with functions, each after those that it calls."""
-        self._functions = [*functions]
+        functions = [*functions]
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
-        self._types: dict[Type, str] = {}
-        self._constants: dict[tuple[Type, str], str] = {}
+        self._types: dict[Type | tuple[str, int], str] = {}
+        self._constants: dict[tuple[str, str, Type, str], str] = {}
         self._wrappers: dict[str, str] = {}
         #: Names of variables, which nothing else has.
-        self._variables = {in_c(name) for one in self._functions for name in _variables(one)}
+        self._variables = {in_c(name) for one in functions for name in _variables(one)}
         #: Names of structures, functions and constants, and of functions of `math` that raise.
         self._taken = {f"math_{name}" for name in FUNCTIONS}
-        self._names: dict[Function, str] = {}
-        for function in self._functions:
-            for type_ in (*function.arguments.values(), function.returns):
+        for one in functions:
+            for type_ in (*one.arguments.values(), one.returns):
                 self.type(type_)
-        for function in self._functions:
-            self._names[function] = self._unused(self._wanted(function))
+        self.names = {one: self._in_module(one.module, one.name, *one.sizes) for one in functions}
 
     def text(self) -> str:
         """All of it."""
-        functions = [self._function(function) for function in self._functions]
+        functions = [_Definition(self, function).text() for function in self.names]
         parts = [*self.structures.values(), *self.constants.values(), *self._wrappers.values()]
         return "\n\n".join([*parts, *functions])
 
     def call(self, function: Function, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
         given = [*arguments, *(["error"] if function.fails else [])]
-        return f"{self._names[function]}({_list(given)})"
+        return f"{self.names[function]}({_list(given)})"
 
     # Names
 
     def _unused(self, name: str) -> str:
+        """A name that no other structure, function or constant has."""
         name += "_" if is_of_library(name) else ""
-        while name in self._taken | self._variables or name in words_of_runtime():
+        while name in self._taken or name in self._variables or name in words_of_runtime():
             name += "_"
         self._taken.add(name)
         return name
 
-    def _wanted(self, function: Function) -> str:
-        """The name of a function, which begins with that of its module, and ends with its sizes."""
-        module = function.module.rpartition(".")[2]
-        own = function.name.lstrip("_")
-        parts = [module, own, *map(self.type, function.sizes)]
-        return re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+    def _in_module(self, module: str, name: str, *sizes: Type) -> str:
+        """A name for what stands in a module."""
+        stems = (part.lstrip("_") for part in (module.rpartition(".")[2], name))
+        parts = [*stems, *map(self.type, sizes)]
+        found = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+        return self._unused(found if found.isidentifier() else f"of_{found}")
 
     # Types and constants
 
@@ -218,9 +217,11 @@ class Emitter:
             if is_whole(type_):
                 return "int"
             return {FLOAT: "double", TEXT: "const char *"}.get(type_, "void")
-        if type_ not in self._types:
-            self._types[type_] = self._structure(type_)
-        return self._types[type_]
+        # Arrays that are alike in C are one structure.
+        key = (self.type(type_.item), type_.n) if isinstance(type_, Array) else type_
+        if key not in self._types:
+            self._types[key] = self._structure(type_)
+        return self._types[key]
 
     def declared(self, type_: Type) -> str:
         """A type before a name."""
@@ -229,48 +230,39 @@ class Emitter:
 
     def _structure(self, type_: Array | Record) -> str:
         """The name of a structure, which is defined after those that it needs."""
+        doc = ""
         if isinstance(type_, Array):
-            item = self.type(type_.item)
+            item, n = self.type(type_.item), type_.n
+            rows = [f"    {item} v[{n}];"]
             if type_.item == FLOAT:
-                name = f"Vector{type_.n}"
-            elif is_algebraic(type_):
-                name = f"Matrix{type_.n}x{item.removeprefix('Vector')}"
+                name = f"Vector{n}"
+            elif isinstance(type_.item, Array) and type_.item.item == FLOAT:
+                name = f"Matrix{n}x{type_.item.n}"
             else:
-                name = f"{item}x{type_.n}"
-            self.structures[name] = f"typedef struct {{\n    {item} v[{type_.n}];\n}} {name};"
-            return name
-        about = _comments(type_.made)
-        rows = [
-            f"    {self.type(part)} {in_c(name)};{about.get(name, '')}"
-            for name, part in type_.fields
-        ]
-        rows = rows or ["    char nothing; /* C has no empty structure */"]
-        if type_.made:
-            name = class_in_c(type_.made.__name__)
-            doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
+                name = f"{item}x{n}"
         else:
-            name, doc = "_".join(map(self._part_name, dict(type_.fields).values())) or "Empty", ""
-        while name in self.structures or name in self._variables:
-            name += "_"
+            about = _comments(type_.made)
+            rows = [
+                f"    {self.type(part)} {in_c(name)};{about.get(name, '')}"
+                for name, part in type_.fields
+            ] or ["    char nothing; /* C has no empty structure */"]
+            name = "_".join(self.type(part) for _, part in type_.fields) or "Empty"
+            if type_.made:
+                name = class_in_c(type_.made.__name__)
+                doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
+        name = self._unused(name)
         head = [f"/* {strip_sphinx_marks(doc)} */"] if doc else []
-        text = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
-        self.structures[name] = text
+        self.structures[name] = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
         return name
 
-    def _part_name(self, type_: Type) -> str:
-        """The name of a part of a tuple: a tuple within it ends with a mark of its own."""
-        is_tuple = isinstance(type_, Record) and type_.made is None
-        return f"{self.type(type_)}_" if is_tuple else self.type(type_)
-
-    def _constant(self, one: tree.Constant) -> str:
+    def constant(self, one: tree.Constant) -> str:
         text = self._literal(one.value, one.type)
-        if (one.type, text) not in self._constants:
-            module = one.module.rpartition(".")[2]
-            name = self._unused(f"{module}_{one.name.lstrip('_')}")
-            self._constants[one.type, text] = name
+        key = (one.module, one.name, one.type, text)
+        if key not in self._constants:
+            name = self._constants[key] = self._in_module(one.module, one.name)
             value = f"static const {self.declared(one.type)}{name} = {text};"
             self.constants[name] = "\n".join(lines_of(value, ""))
-        return self._constants[one.type, text]
+        return self._constants[key]
 
     def _literal(self, value: Any, type_: Type) -> str:
         """A value as an initializer."""
@@ -279,7 +271,7 @@ class Emitter:
         parts = _list(self._literal(one, part) for one, (_, part) in zip(value, members(type_)))
         return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
 
-    def _wrapper(self, name: str) -> None:
+    def wrap(self, name: str) -> None:
         """Define a function of `math` that raises as Python's does."""
         raises = FUNCTIONS[name].raises
         if raises == OWN:
@@ -292,18 +284,40 @@ class Emitter:
         head = f"static inline double math_{name}(double x, Error *error) {{"
         self._wrappers[name] = f"{head}\n{body}\n}}"
 
+
+class _Definition:
+    """A function on its way to C."""
+
+    def __init__(self, emitter: Emitter, function: Function) -> None:
+        self._emitter, self._function = emitter, function
+
+    def text(self) -> str:
+        """All of it."""
+        emitter, function = self._emitter, self._function
+        given = [
+            f"const {emitter.type(type_)} *{in_c(name)}"
+            if name == function.by_address
+            else f"{emitter.declared(type_)}{in_c(name)}"
+            for name, type_ in function.arguments.items()
+        ]
+        given += ["Error *error"] if function.fails else []
+        name = f"{emitter.declared(function.returns)}{emitter.names[function]}"
+        head = lines_of(f"static {name}({_list(given) or 'void'}) {{", "")
+        body = self._block(function.body, {*function.arguments}, INDENT)
+        if function.returns != NOTHING and not _ends(function.body):
+            body.append(f"{INDENT}{self._left()}")
+        return "\n".join([*_comment(function.doc), *head, *body, "}"])
+
     # Expressions
 
-    def expression(self, one: Expression, within: int = _TERNARY, by_address: str = "") -> str:
+    def expression(self, one: Expression, within: int = _TERNARY) -> str:
         """An expression as an operand of what binds so tightly."""
-        text, binding = self._bound(one, by_address)
+        text, binding = self._bound(one)
         if binding != _POSTFIX:
             text = text.replace(_BREAK, " ")
         return text if binding >= within else f"({text})"
 
-    def _bound(  # noqa: PLR0911, for each class
-        self, one: Expression, at: str
-    ) -> tuple[str, int]:
+    def _bound(self, one: Expression) -> tuple[str, int]:  # noqa: PLR0911, for each class
         """An expression, and how tightly its outermost operator binds."""
         if isinstance(one, Number):
             text = number_in_c(one.value)
@@ -311,33 +325,45 @@ class Emitter:
         if isinstance(one, tree.Text):
             return quoted(one.value).replace(" ", _KEPT), _POSTFIX
         if isinstance(one, Local):
-            return (f"(*{in_c(one.name)})" if one.name == at else in_c(one.name)), _POSTFIX
+            name = in_c(one.name)
+            return f"(*{name})" if one.name == self._function.by_address else name, _POSTFIX
         if isinstance(one, tree.Constant):
-            return self._constant(one), _POSTFIX
+            return self._emitter.constant(one), _POSTFIX
         if isinstance(one, Field):
-            return f"{self.expression(one.owner, _POSTFIX, at)}.{in_c(one.name)}", _POSTFIX
+            return f"{self.expression(one.owner, _POSTFIX)}.{in_c(one.name)}", _POSTFIX
         if isinstance(one, Item):
-            owner = self.expression(one.owner, _POSTFIX, at)
-            return f"{owner}.v[{self.expression(one.place, _TERNARY, at)}]", _POSTFIX
+            return f"{self._owner(one.owner)}v[{self.expression(one.place)}]", _POSTFIX
         if isinstance(one, Make):
-            return f"({self.type(one.type)}){self._made(one, at)}", _POSTFIX
+            return f"({self._emitter.type(one.type)}){self._made(one)}", _POSTFIX
         if isinstance(one, Choice):
-            test, this = (self.expression(part, _OR, at) for part in (one.test, one.one))
-            return f"{test} ? {this} : {self.expression(one.other, _TERNARY, at)}", _TERNARY
+            test, this = (self.expression(part, _OR) for part in (one.test, one.one))
+            return f"{test} ? {this} : {self.expression(one.other)}", _TERNARY
         if isinstance(one, Call):
-            given = [self.expression(part, _TERNARY, at) for part in one.parts]
+            given = [self.expression(part) for part in one.parts]
             if one.function.by_address:
                 place = [*one.function.arguments].index(one.function.by_address)
                 given[place] = f"&{given[place]}"
-            return self.call(one.function, given), _POSTFIX
+            return self._emitter.call(one.function, given), _POSTFIX
         assert isinstance(one, Operation)
-        return self._operation(one, at)
+        return self._operation(one)
 
-    def _made(self, one: Make, at: str) -> str:
+    def _owner(self, one: Expression) -> str:
+        """An array, with the sign before a member of it."""
+        if isinstance(one, Local) and one.name == self._function.by_address:
+            return f"{in_c(one.name)}->"
+        root = one
+        while isinstance(root, Field):
+            root = root.owner
+        if not isinstance(root, (Call, Choice)):
+            return f"{self.expression(one, _POSTFIX)}."
+        # In C99, what comes from a function or a choice may end before an element of it is read.
+        return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}->"
+
+    def _made(self, one: Make) -> str:
         """The initializer of a structure."""
-        self.type(one.type)
+        self._emitter.type(one.type)
         texts = [
-            self._made(part, at) if isinstance(part, Make) else self.expression(part, _TERNARY, at)
+            self._made(part) if isinstance(part, Make) else self.expression(part)
             for part in one.parts
         ]
         if isinstance(one.type, Array):
@@ -345,80 +371,53 @@ class Emitter:
         filled = [f"{name} = {text}" for (name, _), text in zip(members(one.type), texts)]
         return f"{{{_list(filled) or '0'}}}"
 
-    def _mathematics(self, one: Operation, op: Operator, at: str) -> tuple[str, int]:
-        texts = [self.expression(part, _TERNARY, at) for part in one.operands]
+    def _mathematics(self, one: Operation, op: Operator) -> tuple[str, int]:
+        texts = [self.expression(part) for part in one.operands]
         # A macro takes the commas of a structure for its own.
         if any(isinstance(part, Make) for each in one.parts for part in tree.expressions_in(each)):
             texts = [f"({text})" for text in texts]
         if op.fails:
-            self._wrapper(op.function)
+            self._emitter.wrap(op.function)
             return f"math_{op.function}({', '.join([*texts, 'error'])})", _POSTFIX
         text = f"{op.function}({', '.join(texts)})"
         return (f"{text} != 0", _EQUALITY) if one.type == BOOL else (text, _POSTFIX)
 
-    def _operation(  # noqa: PLR0911, for each operator
-        self, one: Operation, at: str
-    ) -> tuple[str, int]:
+    def _operation(self, one: Operation) -> tuple[str, int]:  # noqa: PLR0911, for each operator
         op = one.operator
         if op.function:
-            return self._mathematics(one, op, at)
+            return self._mathematics(one, op)
         if op in _INFIX:
             sign, binding = _INFIX[op]
             # Compilers want brackets around a comparison within another one.
             both = (_SUM, _SUM) if binding < _SUM else (binding, binding + 1)
-            left, right = (self.expression(*each, at) for each in zip(one.parts, both))
+            left, right = (self.expression(*each) for each in zip(one.parts, both))
             return f"{left} {sign} {right}", binding
         if op in _CALLED:
-            texts = [self.expression(part, _TERNARY, at) for part in one.parts]
+            texts = [self.expression(part) for part in one.parts]
             given = _list([*texts, *(["error"] if op.fails else [])])
             return f"{_CALLED[op]}({given})", _POSTFIX
         if op in (tree.AND, tree.OR):
             sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
             # Compilers want brackets around one kind of them within the other.
-            return sign.join(self.expression(p, _EQUALITY, at) for p in one.parts), binding
+            return sign.join(self.expression(p, _EQUALITY) for p in one.parts), binding
         [part] = one.parts
         if op == tree.AS_INT:
-            return self._bound(part, at)
+            return self._bound(part)
         if op == tree.TO_BOOL:
             zero = "0.0" if part.type == FLOAT else "0"
-            return f"{self.expression(part, _RELATION, at)} != {zero}", _EQUALITY
+            return f"{self.expression(part, _RELATION)} != {zero}", _EQUALITY
         if op == tree.NEGATIVE:
-            return f"-{self.expression(part, _POSTFIX, at)}", _UNARY
+            return f"-{self.expression(part, _POSTFIX)}", _UNARY
         sign = {tree.NOT: "!", tree.TO_FLOAT: "(double)", tree.NARROW: "(int)"}[op]
-        return f"{sign}{self.expression(part, _UNARY, at)}", _UNARY
+        return f"{sign}{self.expression(part, _UNARY)}", _UNARY
 
-    # Functions
+    # Statements
 
-    def _function(self, function: Function) -> str:
-        given = [
-            f"const {self.type(type_)} *{in_c(name)}"
-            if name == function.by_address
-            else f"{self.declared(type_)}{in_c(name)}"
-            for name, type_ in function.arguments.items()
-        ]
-        given += ["Error *error"] if function.fails else []
-        name = self._names[function]
-        head = f"static {self.declared(function.returns)}{name}({_list(given) or 'void'}) {{"
-        body = _Body(self, function).block(function.body, {*function.arguments}, INDENT)
-        if function.returns != NOTHING and not _ends(function.body):
-            body.append(f"{INDENT}{_Body(self, function).left()}")
-        return "\n".join([*_comment(function.doc), *lines_of(head, ""), *body, "}"])
-
-
-class _Body:
-    """The statements of a function on their way to C."""
-
-    def __init__(self, emitter: Emitter, function: Function) -> None:
-        self._emitter, self._function = emitter, function
-
-    def _text(self, one: Expression, within: int = _TERNARY) -> str:
-        return self._emitter.expression(one, within, self._function.by_address)
-
-    def block(self, statements: Sequence[Statement], known: set[str], indent: str) -> list[str]:
+    def _block(self, statements: Sequence[Statement], known: set[str], indent: str) -> list[str]:
         """A block; variables are declared where the first statement of it needs them."""
         used: dict[str, list[int]] = {}
         for i, statement in enumerate(statements):
-            for name in _used(statement):
+            for name in dict.fromkeys(_used(statement)):
                 used.setdefault(name, []).append(i)
         here: dict[int, list[str]] = {}
         for name, places in used.items():
@@ -458,10 +457,10 @@ class _Body:
         elif isinstance(one, tree.Reserve):
             yield f"{indent}{emitter.declared(one.type)}{in_c(one.name)};"
         elif isinstance(one, tree.StoreItem):
-            places = "".join(f".v[{self._text(place)}]" for place in one.places)
-            yield from lines_of(f"{in_c(one.name)}{places} = {self._text(one.value)};", indent)
+            places = "".join(f".v[{self.expression(place)}]" for place in one.places)
+            yield from lines_of(f"{in_c(one.name)}{places} = {self.expression(one.value)};", indent)
         elif isinstance(one, tree.Do):
-            text = self._text(one.call, _UNARY)
+            text = self.expression(one.call, _UNARY)
             is_plain = isinstance(one.call, Call) and one.call.type == NOTHING
             yield from lines_of(f"{text};" if is_plain else f"(void){text};", indent)
         elif isinstance(one, tree.Return):
@@ -470,31 +469,35 @@ class _Body:
             yield f"{indent}{type(one).__name__.lower()};"
         elif isinstance(one, tree.Raise):
             yield from lines_of(self._raised(one), indent)
-            yield f"{indent}{self.left()}"
+            yield f"{indent}{self._left()}"
         elif isinstance(one, tree.If):
-            yield from lines_of(f"if ({self._text(one.test)}) {{", indent)
-            yield from self.block(one.body, known, inner)
-            if one.orelse:
+            head, (chain, orelse) = "if", _chain(one)
+            for each in chain:
+                yield from lines_of(f"{head} ({self.expression(each.test)}) {{", indent)
+                yield from self._block(each.body, known, inner)
+                head = "} else if"
+            if orelse:
                 yield f"{indent}}} else {{"
-                yield from self.block(one.orelse, known, inner)
+                yield from self._block(orelse, known, inner)
             yield f"{indent}}}"
         else:
             assert isinstance(one, (tree.While, tree.For))
             yield from lines_of(f"{self._head(one)} {{", indent)
             counter = {one.counter} if isinstance(one, tree.For) else set()
-            yield from self.block(one.body, known | counter, inner)
+            yield from self._block(one.body, known | counter, inner)
             yield f"{indent}}}"
 
     def _head(self, one: tree.While | tree.For) -> str:
         """The first line of a loop, which ends after an error that it could not end by itself."""
         if isinstance(one, tree.While):
-            return f"while (!error->raised && {self._text(one.test, _AND)})"
+            return f"while (!error->raised && {self.expression(one.test, _AND)})"
         fails = one.turns is None or any(map(tree.may_fail, tree.statements_in(one.body)))
         name, sign = in_c(one.counter), "<" if one.step > 0 else ">"
-        test = f"{'!error->raised && ' if fails else ''}{name} {sign} {self._text(one.stop, _SUM)}"
+        test = f"{name} {sign} {self.expression(one.stop, _SUM)}"
+        test = f"!error->raised && {test}" if fails else test
         change = {1: f"{name}++", -1: f"{name}--"}.get(one.step, f"{name} += {one.step}")
         kind = "long long" if one.is_wide else "int"
-        return f"for ({kind} {name} = {self._text(one.start)}; {test}; {change})"
+        return f"for ({kind} {name} = {self.expression(one.start)}; {test}; {change})"
 
     def _stored(
         self, one: tree.Store, new: Sequence[str], stores: Counter[str], indent: str
@@ -508,7 +511,7 @@ class _Body:
             return is_new, is_new and stores[name] == 1, made.type, name if is_text else ""
 
         for (is_new, is_constant, type_, _), group in groupby(one.values, alike):
-            texts = [f"{in_c(name)} = {self._text(value)}" for name, value in group]
+            texts = [f"{in_c(name)} = {self.expression(value)}" for name, value in group]
             if is_new:
                 head = "const " if is_constant and type_ != TEXT else ""
                 text = f"{head}{self._emitter.declared(type_)}{', '.join(texts)};"
@@ -517,23 +520,19 @@ class _Body:
             yield from lines_of(text, indent)
 
     def _returned(self, one: tree.Return, indent: str) -> Iterator[str]:
-        text = f"return {self._text(one.value)};" if one.value is not None else "return;"
+        text = f"return {self.expression(one.value)};" if one.value is not None else "return;"
         is_long = len(indent) + len(text) > LINE_WIDTH
         if is_long and isinstance(one.value, Make) and isinstance(one.value.type, Record):
             # A line for each field.
             yield f"{indent}return ({self._emitter.type(one.value.type)}){{"
             for (name, _), part in zip(members(one.value.type), one.value.parts):
-                value = (
-                    self._emitter._made(part, self._function.by_address)
-                    if isinstance(part, Make)
-                    else self._text(part)
-                )
+                value = self._made(part) if isinstance(part, Make) else self.expression(part)
                 yield from lines_of(f"{name} = {value},", indent + INDENT)
             yield f"{indent}}};"
             return
         yield from lines_of(text, indent)
 
-    def left(self) -> str:
+    def _left(self) -> str:
         """The statement that ends the function after an error."""
         returns = self._function.returns
         if returns == NOTHING:
@@ -548,9 +547,9 @@ class _Body:
                 form += part.replace("%", "%%")
                 continue
             value, how = part
-            text = self._text(value)
+            text = self.expression(value)
             if value.type == BOOL:
-                text = f'{self._text(value, _OR)} ? "True" : "False"'
+                text = f'{self.expression(value, _OR)} ? "True" : "False"'
             form += f"%{how}" if how else "%s"
             arguments.append(text)
         told = quoted(form).replace(" ", _KEPT)
@@ -560,23 +559,32 @@ class _Body:
 def _ends(body: Sequence[Statement]) -> bool:
     """Whether each way through a block ends the function."""
     last = body[-1] if body else None
-    if isinstance(last, tree.If):
-        return _ends(last.body) and _ends(last.orelse)
+    while isinstance(last, tree.If) and _ends(last.body):
+        last = last.orelse[-1] if last.orelse else None
     return isinstance(last, (tree.Return, tree.Raise))
 
 
-def _used(one: Statement, deep: bool = True) -> set[str]:
+def _chain(one: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
+    """A choice, and those that are all of what the one before does else; what the last one does."""
+    found, orelse = [one], one.orelse
+    while len(orelse) == 1 and isinstance(orelse[0], tree.If) and not orelse[0].comment:
+        found.append(orelse[0])
+        orelse = orelse[0].orelse
+    return found, orelse
+
+
+def _used(one: Statement, deep: bool = True) -> Iterator[str]:
     """The variables that a statement uses or gives a value, with those of its blocks or without."""
-    found = {
-        part.name
-        for each in tree.expressions_of(one)
-        for part in tree.expressions_in(each)
-        if isinstance(part, Local)
-    } | {*tree.stored_in(one)}
-    for block in tree.blocks_of(one) if deep else ():
-        for statement in block:
-            found |= _used(statement)
-    return found - {one.counter} if isinstance(one, tree.For) else found
+    rest = [(one, frozenset[str]())]
+    while rest:
+        one, counters = rest.pop()
+        if isinstance(one, tree.For):
+            counters |= {one.counter}
+        parts = (part for each in tree.expressions_of(one) for part in tree.expressions_in(each))
+        names = [part.name for part in parts if isinstance(part, Local)] + tree.stored_in(one)
+        yield from (name for name in names if name not in counters)
+        inner = [statement for block in tree.blocks_of(one) for statement in block if deep]
+        rest += [(statement, counters) for statement in reversed(inner)]
 
 
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:

@@ -39,9 +39,9 @@ _MACROS = re.compile(r"[A-Z][A-Z0-9_]{3,}|MASK_\w+")
 
 #: Functions and types of the C libraries that could be those of a module and a function in it.
 _LIBRARY = re.compile(
-    r"(aligned|at|clock|cpu|fmi2|fmi3|function|getdate|int|is|max|mem|open|posix|pthread|quick|rlim|sched"
+    r"(aligned|at|clock|cpu|fmi2|fmi3|function|getdate|is|max|mem|open|posix|pthread|quick|rlim|sched"
     r"|sig|stack|str|sys|syscall|timer|timespec|u|uint|va)_\w+|[a-z]+_([a-z]|unlocked|explicit)"
-    r"|model_\w+|choices_of_\w+|members_\d+"
+    r"|int_(fast|least)\d+_\w+|model_\w+|choices_of_\w+|members_\d+"
 )
 
 #: Names of structures: of classes, and of tuples, which are joined from those of their parts.
@@ -50,9 +50,6 @@ _STRUCTURE = rf"{_CLASS}|class_\w+|(int|double)(x\d+|_\w+)"
 
 #: Variables that have one, or begin with _ as much in headers does.
 _PREFIXED = re.compile(rf"(v_)*({_STRUCTURE}|_\w+)")
-
-#: Classes that would have the name of a vector or a matrix.
-_ARRAYS = re.compile(r"(Vector|Matrix)\d\w*")
 
 
 @cache
@@ -69,8 +66,7 @@ def in_c(name: str) -> str:
 def class_in_c(name: str) -> str:
     """The name of the structure of a class."""
     name = _without_marks(name)
-    is_free = re.fullmatch(_CLASS, name) and not _ARRAYS.fullmatch(name)
-    return name if is_free and name not in words_of_runtime() else f"class_{name}"
+    return name if re.fullmatch(_CLASS, name) else f"class_{name}"
 
 
 def _without_marks(name: str) -> str:

@@ -24,7 +24,7 @@ from fmus.language.types import (
     Scalar,
     Type,
     count,
-    has_only_floats,
+    parts_of,
     scalars_in,
     type_of,
 )
@@ -232,7 +232,7 @@ def _drawn(type_: Type, draws: Iterator[str]) -> str:
     if isinstance(type_, Scalar):
         return next(draws)
     parts = ", ".join(_drawn(part, draws) for _, part in members(type_))
-    return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts}}}"
+    return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
 
 
 def _defined(name: str, arguments: str, body: list[str]) -> str:
@@ -277,7 +277,7 @@ class _Passage:
 def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
     """How inputs, outputs or a state pass; ports have their Reals first, a state has none first."""
     name = emitter.type(type_)
-    if has_only_floats(type_):
+    if _has_only_doubles(type_) or not count(type_):
         return _Passage(name, name)
     scalars = [*scalars_in(type_)]
     n = len(scalars)
@@ -294,6 +294,15 @@ def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
         f"static void {scatter}({name} it, double to[]) {{\n{scattered}\n}}",
     )
     return _Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
+
+
+@cache
+def _has_only_doubles(type_: Type) -> bool:
+    """Whether a structure is an array of doubles; C has no empty structure within it."""
+    if isinstance(type_, Array):
+        return _has_only_doubles(type_.item)
+    parts = parts_of(type_)
+    return all(map(_has_only_doubles, parts)) if parts else type_ == FLOAT
 
 
 def _moves(
@@ -332,7 +341,7 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
 
     Structures are passed and returned by value, so a function that adds large vectors keeps each
     sum there. Nothing calls itself, and all sizes are fixed: what lies there at most can be added
-    up. Compilers keep no more than this, but for a tenth, and less if they optimise.
+    up. Compilers that optimise keep no more than this, but for a tenth.
 
     Args:
         functions: each after those that it calls.

@@ -30,9 +30,9 @@ from fmus.python.packaging import PythonKind, best_loader
 from fmus.script import source_of_script
 from support.raw import Host, Library, Variable, instance
 
-FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR = (
+FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (
     "float", "int", "bool", "Mode", "Annotated[Vector, 3]", "Annotated[Matrix, 2, 2]",
-    "tuple[int, int]", "tuple[float, float]", "tuple[bool, bool]", "Pair",
+    "tuple[int, int]", "tuple[float, float]", "tuple[bool, bool]", "Pair", "Empty",
 )  # fmt: skip
 
 #: How a value of each type is made of values of the types of its parts, and how these are read.
@@ -45,6 +45,7 @@ PARTS: Mapping[str, tuple[str, Sequence[tuple[str, str]]]] = {
     II: ("({}, {})", [("[0]", INT), ("[1]", INT)]),
     FF: ("({}, {})", [("[0]", FLOAT), ("[1]", FLOAT)]),
     BB: ("({}, {})", [("[0]", BOOL), ("[1]", BOOL)]),
+    EMPTY: ("Empty()", ()),
     PAIR: ("Pair({}, {}, {})", [(".a", FLOAT), (".n", INT), (".on", BOOL)]),
 }
 TYPES = (FLOAT, INT, BOOL, MODE, *PARTS)
@@ -153,6 +154,10 @@ class Pair(NamedTuple):
     a: Annotated[float, Variable("m")] = 0.25
     n: Annotated[int, Variable()] = 4
     on: Annotated[bool, Variable()] = True
+
+
+class Empty(NamedTuple):
+    """Nothing."""
 
 
 class Draws(NamedTuple):
@@ -270,7 +275,7 @@ class Component:
             said += ['members=("x", "v", "double")']
         note = f"Variable({', '.join(said)})"
         inner = hint[len("Annotated[") : -1] if hint.startswith("Annotated") else hint
-        kind = PAIR if hint == PAIR else f"Annotated[{inner}, {note}]"
+        kind = hint if hint in (PAIR, EMPTY) else f"Annotated[{inner}, {note}]"
         return f"{field}: {kind}" + ("" if name == "Outputs" else f" = {self._value(hint, {})}")
 
     def _restart(self, fields: Names, state: Names, inputs: Names) -> Iterator[str]:

@@ -12,6 +12,7 @@ from typing import Any
 
 from fmus.discovery import source_of
 from fmus.native.translator import translated
+from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing, count_values, form, hints_of, is_record, is_whole, parts_of
 
 ROOT = Path(__file__).parents[2]
@@ -125,10 +126,10 @@ def flat(value: Any) -> list[float]:
 class Equations:
     """A component's hooks in both languages."""
 
-    def __init__(self, name: str) -> None:
-        self.said = source_of(name).definition.behaviour
+    def __init__(self, definition: Definition) -> None:
+        self.said = definition.behaviour
         folder = Path(mkdtemp(prefix="auv_fmu_equations_"))
-        (folder / "equations.c").write_text(translated(source_of(name).definition))
+        (folder / "equations.c").write_text(translated(definition))
         (folder / "shim.c").write_text(_SHIM)
         command = ["cc", *FLAGS, "-O2", "-ffp-contract=off", "-fPIC", "-shared", "-I", str(RUNTIME)]
         library = folder / "equations.so"
@@ -169,7 +170,7 @@ class Equations:
 @cache
 def equations(name: str) -> Equations:
     """Compiled once a run of the tests."""
-    return Equations(name)
+    return Equations(source_of(name).definition)
 
 
 def bits(numbers: Sequence[float]) -> list[str]:

@@ -6,7 +6,11 @@
 #ifndef ARITHMETIC_H
 #define ARITHMETIC_H
 
-/* Each operation is rounded separately, as in Python, whatever flags an importer compiles with. */
+#if defined(__FAST_MATH__) || defined(_M_FP_FAST)
+#error "Leave -ffast-math or /fp:fast out: the numbers would not be those of Python."
+#endif
+
+/* Each operation is rounded separately, as in Python, also where a compiler would contract some. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && defined(__FP_FAST_FMA)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from importlib.util import find_spec
 from math import isnan
 from pathlib import Path
@@ -18,8 +19,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fmus.language import tree
 from fmus.language.build import Untranslatable
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
+from fmus.language.types import BOOL, FLOAT
+from fmus.native.emit import Emitter
 from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 
 ZIG = (sys.executable, "-m", "ziglang", "cc")
@@ -33,6 +37,9 @@ COMMANDS = {
     "zig -O0": (*ZIG, "-O0"),
     "zig -O2": (*ZIG, "-O2"),
 }
+
+#: One that is there.
+COMPILED = next((c for c in ("gcc -O2", "clang -O2") if shutil.which(COMMANDS[c][0])), "")
 
 #: Functions that zig has itself, and links without optimisation instead of the C library's. They
 #: are less exact: in the last bit, and logarithms of the smallest numbers in the tenth digit.
@@ -245,6 +252,12 @@ CONSTRUCTS = {
     "slice": (
         "def f(v: Annotated[Vector, 4]) -> tuple[float, float]:\n"
         "    w = v[1:3]\n    return w @ v[::2], Vector((*v[2:], 1.0, *w)).sum()\n"
+    ),
+    "elements of what has no name": (
+        "def f(v: Annotated[Vector, 3], k: int, r: Record) -> tuple[float, float, float]:\n"
+        "    def twice(by: float) -> Annotated[Matrix, 2, 3]:\n        return by * Matrix((v, v))\n"
+        "    def kept(by: float) -> Record:\n        return r._replace(x=by)\n"
+        "    return twice(2.0)[k, 1], kept(v[0]).v[k], (r.v if k > 0 else v)[k - 1]\n"
     ),
     "len": "def f(v: Annotated[Vector, 4]) -> int:\n    return len(v) * len(A)\n",
     "vector + -": (
@@ -756,12 +769,19 @@ def test_python_and_c_agree_bit_for_bit(
     agree()
 
 
+def test_no_element_is_read_of_what_may_have_ended(
+    twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory
+):
+    """C99, 6.5.2.2: the result of a function, after the next sequence point."""
+    text = twins_of(twins, COMPILED, tmp_path_factory).text
+    assert not re.search(r"\)(\.\w+)*\.v\[", text)
+
+
 @pytest.mark.parametrize("name", ["int +", "int *", "floor"])
 def test_an_integer_that_c_cannot_hold_is_refused(
     twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory, name: str
 ):
-    command = next(c for c in ("gcc -O2", "clang -O2") if shutil.which(COMMANDS[c][0]))
-    both = twins_of(twins, command, tmp_path_factory)
+    both = twins_of(twins, COMPILED, tmp_path_factory)
     function = f"f{[*CONSTRUCTS].index(name)}"
     given_ = (2.0**31,) if name == "floor" else (2**31 - 1, 2**31 - 1)
     assert both.c(function, given_).error == TOO_LARGE
@@ -940,6 +960,60 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
     )
     both = Twins(module_of(text, tmp_path, "tank"), tmp_path)
     assert both.c("f", (3.0,)).numbers == both.python("f", (3.0,)).numbers == (7.5,)
+
+
+def test_a_choice_of_many_is_written_side_by_side():
+    """In a thread, whose stack is empty."""
+    x = tree.Local("x", FLOAT)
+    body: list[tree.Statement] = [tree.Return(x)]
+    for k in range(900):
+        test = tree.Operation(tree.LESS, (x, tree.Number(float(k), FLOAT)), BOOL)
+        body = [tree.If(test, [tree.Return(tree.Number(0.5, FLOAT))], body)]
+    function = tree.Function("own", "f", {"x": FLOAT}, FLOAT, body)
+    with ThreadPoolExecutor() as pool:
+        text = pool.submit(lambda: Emitter([function]).text()).result()
+    assert text.count("\n    } else if (x < ") == 899
+    assert text.endswith("\n    } else {\n        return x;\n    }\n}")
+
+
+def test_variables_are_declared_in_the_order_of_their_first_use(tmp_path: Path):
+    """In each process: the GUID of an FMU follows from its text."""
+    names = "qwertyuiop"
+    stores = [f"{name} = {i}.0 * x" for i, name in enumerate(names)]
+    text = HEAD + (
+        f"def f(x: float) -> float:\n    if x > 0.0:\n        {'; '.join(stores)}\n"
+        f"    else:\n        {'; '.join(reversed(stores))}\n    return {' + '.join(names)}\n"
+    )
+    text = c_text({"f": module_of(text, tmp_path, "ordered").f})
+    assert re.findall(r"    double (\w) = 0", text) == [*names]
+
+
+def test_constants_of_one_value_keep_their_names(tmp_path: Path):
+    text = HEAD + (
+        "KILO, GRAMS = 1000.0, 1000.0\n\n\ndef f(x: float) -> float:\n    return x * KILO / GRAMS\n"
+    )
+    both = Twins(module_of(text, tmp_path, "units"), tmp_path)
+    assert "units_KILO" in both.text
+    assert "units_GRAMS" in both.text
+    assert both.c("f", (3.0,)).numbers == (3.0,)
+
+
+def test_classes_functions_and_constants_share_no_name(tmp_path: Path):
+    """In a module whose own name begins as classes, or names of C, do."""
+    text = HEAD + (
+        "class Foo(NamedTuple):\n    x: float\n    n: int\n\n\n"
+        "class Foox2(NamedTuple):\n    y: float\n\n\nclass Foo_bar(NamedTuple):\n    z: float\n"
+        "\n\nx2 = 5.0\n\n\n"
+        "def bar(x: float, both: tuple[Foo, Foo], of: Foox2) -> Foo_bar:\n"
+        "    return Foo_bar(both[0].x + 10.0 * of.y + x2 * x)\n"
+    )
+    for module in ("Foo", "_Foo", "__"):
+        folder = tmp_path / module
+        folder.mkdir()
+        both = Twins(module_of(text, folder, module), folder)
+        numbers = (2.0, 1.0, 1, 3.0, 1, 4.0)
+        assert both.c("bar", numbers) == both.python("bar", numbers)
+        assert both.c("bar", numbers).numbers == (51.0,)
 
 
 def test_constants_of_one_name_keep_their_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

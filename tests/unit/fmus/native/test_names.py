@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from keyword import iskeyword
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given
@@ -16,6 +17,8 @@ from hypothesis import strategies as st
 
 from fmus.compilers import SAME_NUMBERS, machines_compiler
 from fmus.discovery import source_of
+from fmus.language.tree import Constant, Do, Function
+from fmus.language.types import FLOAT, INT, Array, Record, type_of
 from fmus.native.emit import Emitter
 from fmus.native.names import in_c
 from fmus.native.packaging import sources
@@ -90,3 +93,30 @@ parts = st.sampled_from(
 def test_no_two_names_are_one_in_c(one, other):
     names = {name for name in ("".join(one), "".join(other)) if name.isidentifier()}
     assert len({in_c(name) for name in names}) == len(names)
+
+
+#: Parts of names that look like what C has, and like each other.
+stems = st.lists(st.sampled_from(["Foo", "x3", "_", "bar", "int", "double", "Vector3", "2"]))
+identifiers = stems.map("".join).filter(str.isidentifier)
+places = st.tuples(identifiers, identifiers)
+
+
+@given(
+    classes=st.lists(identifiers.filter(lambda name: name[0] != "_"), unique=True),
+    functions=st.lists(places, unique=True),
+    constants=st.lists(st.tuples(places, st.sampled_from([0.5, 2.0, 3]))),
+)
+def test_all_that_stands_outside_of_functions_has_a_name_of_its_own(classes, functions, constants):
+    """Classes, arrays and tuples of them, functions and constants, in modules of any name."""
+    records = [type_of(NamedTuple(name, [("x", float)])) for name in classes]
+    types = [t for one in records for t in (one, Array(one, 3), Record((("m0", one), ("m1", INT))))]
+    found = [(*place, value, FLOAT if type(value) is float else INT) for place, value in constants]
+    body = [Do(Constant(*one)) for one in found]
+    arguments = {f"x{i}": type_ for i, type_ in enumerate((*types, Array(FLOAT, 3)))}
+    made = [Function(*place, arguments, body=body) for place in functions]
+    text = Emitter(made).text()
+    names = re.findall(r"^(?:} |static (?:const )?\w+ )(\w+)", text, re.MULTILINE)
+    count = len(types) + 1 + len({*found}) if made else 0
+    assert len(names) == len({*names}) == len(made) + count
+    assert not [name for name in names if name[0] in "_0123456789"]
+    assert not {*names} & {in_c(name) for name in arguments}

@@ -329,6 +329,15 @@ int main(void) {
 """
 
 
+@pytest.mark.parametrize("compiler", COMPILERS)
+def test_options_that_change_numbers_are_refused(tmp_path: Path, compiler: str):
+    command = [compiler, "-ffast-math", "-fsyntax-only", "fmi2.c"]
+    folder = written(tmp_path / "fast", "PdController")
+    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert process.returncode != 0
+    assert "-ffast-math" in process.stderr
+
+
 def test_several_components_can_be_linked_into_one_program(tmp_path: Path):
     objects = []
     for name in ("AuvPlant", "MotionPlanner"):

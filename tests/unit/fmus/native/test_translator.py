@@ -33,6 +33,7 @@ from fmus.native.translator import _drawn, deepest, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.component import LONGEST_MESSAGE, Component
+from fmus.script import source_of_script
 from support.equations import (
     FLAGS,
     ROOT,
@@ -472,6 +473,68 @@ def test_seed_is_the_number_that_the_slave_gives_its_generator(seed):
     parameters.noise.seed = seed
     both.library.seed.restype = c_ulong
     assert both.library.seed(byref(parameters), byref(Error())) == seed % 2**32
+
+
+#: Records without fields among numbers.
+HOLLOW = (
+    HEAD
+    + """
+from auv_fmu import Variable
+
+
+class Part(NamedTuple):
+    pass
+
+
+class Parts(NamedTuple):
+    a: Part
+    b: tuple[Part, Part]
+
+
+class Parameters(NamedTuple):
+    k: Annotated[float, Variable()] = 3.0
+
+
+class Inputs(NamedTuple):
+    e: Part
+    u: Annotated[float, Variable()] = 2.0
+
+
+class State(NamedTuple):
+    a: float
+    e: Parts
+    b: float
+
+
+class Outputs(NamedTuple):
+    y: Annotated[float, Variable()]
+    e: Part
+    z: Annotated[float, Variable()]
+
+
+def start(parameters: Parameters, inputs: Inputs) -> State:
+    return State(parameters.k, Parts(Part(), (Part(), Part())), inputs.u)
+
+
+def update(state: State, inputs: Inputs, h: float) -> State:
+    return State(state.a + h, state.e, state.b + inputs.u)
+
+
+def outputs(state: State) -> Outputs:
+    return Outputs(state.a, state.e.b[1], state.b)
+"""
+)
+
+
+def test_records_without_fields_take_no_numbers(tmp_path):
+    path = tmp_path / "hollow.py"
+    path.write_text(HOLLOW)
+    both = Equations(source_of_script(path).definition)
+    inputs = both.said.inputs((), 0.25)
+    given: dict[str, Any] = {"parameters": both.said.parameters(3.0), "inputs": inputs, "h": 0.5}
+    given["state"] = agree(both, "start", t=0.0, **given)
+    given["state"] = agree(both, "update", **given)
+    assert flat(agree(both, "outputs", **given)) == [3.5, 0.5]
 
 
 #: Functions within each other.
