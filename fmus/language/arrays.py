@@ -146,22 +146,6 @@ def _is_stored(expression: Expression) -> bool:
     return isinstance(expression, (Local, tree.Constant, tree.Make))
 
 
-def element(functions: Functions, owner: Expression, place: Expression) -> Expression:
-    """The element at a computed place; what has no address is passed to a function."""
-    type_ = owner.type
-    assert isinstance(type_, Array)
-    at = tree.Operation(tree.PLACE, (place, int_of(type_.n)), INT)
-    if _is_stored(owner):
-        return Item(owner, at)
-    given: dict[str, Type] = {"a": type_, "place": INT}
-
-    def body() -> Sequence[Statement]:
-        at = tree.Operation(tree.PLACE, (Local("place", INT), int_of(type_.n)), INT)
-        return [tree.Return(Item(Local("a", type_), at))]
-
-    return Call(functions.helper("element", (type_,), given, type_.item, body), (owner, place))
-
-
 def transpose(functions: Functions, operand: Expression) -> Expression:
     """A matrix with columns for rows."""
     rows, columns = sizes(operand.type)

@@ -1394,7 +1394,7 @@ class _Builder:
                 what = "a tuple of ints and floats: write all of them as floats"
             raise _Outside(node, f"a computed subscript of {what}")
         where = self._integer(place, "a subscript")
-        return arrays.element(self.program.functions, value, where)
+        return Item(value, Operation(tree.PLACE, (where, int_of(n)), INT))
 
     def _slice(self, node: ast.Subscript, places: ast.Slice, value: Expression) -> Expression:
         if getattr(value.type, "made", None) is Matrix:

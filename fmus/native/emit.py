@@ -170,7 +170,7 @@ class Emitter:
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
         self._types: dict[Type | tuple[str, int], str] = {}
-        self._constants: dict[tuple[str, str, Type, str], str] = {}
+        self._constants: dict[tree.Constant, str] = {}
         self._wrappers: dict[str, str] = {}
         #: Names of variables, which nothing else has.
         self._variables = {in_c(name) for one in functions for name in _variables(one)}
@@ -256,13 +256,12 @@ class Emitter:
         return name
 
     def constant(self, one: tree.Constant) -> str:
-        text = self._literal(one.value, one.type)
-        key = (one.module, one.name, one.type, text)
-        if key not in self._constants:
-            name = self._constants[key] = self._in_module(one.module, one.name)
-            value = f"static const {self.declared(one.type)}{name} = {text};"
-            self.constants[name] = "\n".join(lines_of(value, ""))
-        return self._constants[key]
+        """The name of a constant, which is defined."""
+        if one not in self._constants:
+            name = self._constants[one] = self._in_module(one.module, one.name)
+            value = f"{self.declared(one.type)}{name} = {self._literal(one.value, one.type)}"
+            self.constants[name] = "\n".join(lines_of(f"static const {value};", ""))
+        return self._constants[one]
 
     def _literal(self, value: Any, type_: Type) -> str:
         """A value as an initializer."""
