@@ -57,16 +57,14 @@ def mistakes(path: Path, folder: Path) -> list[str]:
 
 
 def _mistakes(script: Path, folder: Path) -> Iterator[str]:
-    source, program = source_of_script(script), Program()
+    source = source_of_script(script)
     try:
         module = import_module(source.module)
     except Exception as error:
         yield told(error, script)
         return
-    for name in HOOKS:
-        hook = getattr(module, name, None)
-        if isinstance(hook, FunctionType):
-            program.add(hook)
+    hooks = (getattr(module, name, None) for name in HOOKS)
+    program = Program(*(hook for hook in hooks if isinstance(hook, FunctionType)))
     for mistake in program.mistakes:
         yield told(Untranslatable(mistake), script)
     try:

@@ -138,35 +138,26 @@ class _Follows(Exception):
     """Something follows from what has been refused already."""
 
 
-def program_of(*functions: FunctionType) -> Program:
-    """The program of some functions and all that they call.
-
-    Raises:
-        Untranslatable: some of it is outside the language.
-
-    """
-    program = Program()
-    for function in functions:
-        program.add(function)
-    program.check()
-    return program
-
-
 class Program:
-    """Functions as trees.
+    """Functions as trees, with all that they call.
 
     Attributes:
         functions: by what they were made from, each after those that it calls.
 
     """
 
-    def __init__(self) -> None:
-        """Begin with nothing."""
+    def __init__(self, *functions: FunctionType) -> None:
+        """Take functions."""
         self.functions = tree.Functions()
         #: Of modules, by their name and value: the first that uses one gives it its own name.
         self.constants: dict[Hashable, tree.Constant] = {}
         self._begun: set[Hashable] = set()
         self._mistakes: dict[str, str] = {}
+        for function in functions:
+            try:
+                self.function(function)
+            except TypeError as error:
+                self.refuse("", str(error))
 
     @property
     def mistakes(self) -> list[str]:
@@ -189,13 +180,6 @@ class Program:
         if found:
             place, what = found[0], what[found.end() :]
         self._mistakes.setdefault(place, what)
-
-    def add(self, function: FunctionType) -> None:
-        """Take a function, and all that it calls."""
-        try:
-            self.function(function)
-        except TypeError as error:
-            self.refuse("", str(error))
 
     def function(self, function: FunctionType, types: Sequence[Type] = ()) -> Function:
         """A function as a tree.
@@ -227,6 +211,8 @@ class Program:
 
 def _told(error: Exception) -> str:
     """What an error says, and of what class it is if it is none of ours."""
+    if isinstance(error, RecursionError):
+        raise error  # where less is on the stack it is told
     return str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
 
 
@@ -1174,7 +1160,7 @@ class _Builder:
             raise _Outside(node, f"an expression of {_DEEPEST} levels: take it apart")
         try:
             found: Expression = getattr(self, name)(node, wanted)
-        except (_Outside, _Follows, RecursionError) as error:
+        except (_Outside, _Follows) as error:
             if isinstance(error, _Outside) and not hasattr(error.node, "lineno"):
                 error.node = node
             raise

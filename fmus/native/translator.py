@@ -81,9 +81,7 @@ def translated(definition: Definition) -> str:
 
     """
     said = definition.behaviour
-    program = Program()
-    for hook in filter(None, said.hooks.values()):
-        program.add(hook)
+    program = Program(*filter(None, said.hooks.values()))
     groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
     for group in groups:
         try:

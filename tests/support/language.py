@@ -16,7 +16,7 @@ from typing import Any
 
 from auv_fmu.language.arrays import Matrix, Vector
 from fmus.compilers import SAME_NUMBERS
-from fmus.language.build import program_of
+from fmus.language.build import Program
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from fmus.language.tree import Function
 from fmus.language.types import FLOAT, Array, Record, Scalar, Type, parts_of, type_of
@@ -139,7 +139,8 @@ class Twins:
 
 def c_text(functions: dict[str, FunctionType]) -> str:
     """Functions in C, with a function `call_...` for each that takes and gives plain numbers."""
-    program = program_of(*functions.values())
+    program = Program(*functions.values())
+    program.check()
     emitter = Emitter(program.functions.values())
     made = {name: program.function(function) for name, function in functions.items()}
     shims = [_shim(emitter, name, function) for name, function in made.items()]

@@ -243,6 +243,6 @@ def test_what_a_class_changes_of_a_tuple_is_refused(tmp_path):
 def test_calls_too_deep_for_python_are_refused_with_a_line(tmp_path):
     links = [f"def f{i}(x: float) -> float:\n    return f{i + 1}(x) + 1.0\n" for i in range(300)]
     text = "\n\n".join([*reversed(links), "def f300(x: float) -> float:\n    return x\n"])
-    [said] = said_of_module(text.replace("f0(", "f("), tmp_path)
-    assert re.fullmatch(r"own\.py:\d+: too many calls within each other: join some functions", said)
-    assert said.split(":")[1] != "0"
+    said = said_of_module(text.replace("f0(", "f("), tmp_path)
+    why = r"own\.py:[1-9]\d*: too many calls within each other: join some functions"
+    assert said and all(re.fullmatch(why, one) for one in said)

@@ -25,7 +25,7 @@ from auv_fmu.water.sea import Sea
 from auv_fmu.water.waves import MOST as MOST_WAVES
 from auv_fmu.water.waves import Spectrum, Waves
 from fmus.discovery import source_of
-from fmus.language.build import program_of
+from fmus.language.build import Program
 from fmus.language.types import type_of
 from fmus.native.emit import Emitter, strip_sphinx_marks
 from fmus.native.tables import tables
@@ -137,9 +137,9 @@ def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
     head += "class A(NamedTuple):\n    x: float\n\n"
     (package / "behaviour.py").write_text(head + text)
     code = (
-        "from fmus.language.build import program_of\n"
+        "from fmus.language.build import Program\n"
         "from own.behaviour import begin\n"
-        "program_of(begin)"
+        "Program(begin).check()"
     )
     process = subprocess.run(
         [sys.executable, "-c", code],
@@ -161,10 +161,10 @@ def test_names_are_given_other_values_one_by_one(tmp_path: Path):
         "    x, y = atan2(z, 1.0), atan2(z, 2.0)\n    return x + y\n"
     )
     code = (
-        "from fmus.language.build import program_of\n"
+        "from fmus.language.build import Program\n"
         "from fmus.native.emit import Emitter\n"
         "from own.behaviour import turned\n"
-        "print(Emitter(program_of(turned).functions.values()).text())\n"
+        "print(Emitter(Program(turned).functions.values()).text())\n"
     )
     process = subprocess.run(
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
@@ -559,6 +559,6 @@ def test_depth_is_that_of_the_calls_within_each_other(tmp_path):
     The matrix is not copied.
     """
     module = module_of(HEAD + DEEP, tmp_path, "deep")
-    size, function = deepest(program_of(module.start).functions.values())
+    size, function = deepest(Program(module.start).functions.values())
     assert function is not None and function.name == "start"
     assert size == 8 * (100 + 100 + 10 + 2 * 100 + 10 + 2 * 100 + 2 * 100)
