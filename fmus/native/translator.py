@@ -82,7 +82,8 @@ def translated(definition: Definition) -> str:
     """
     said = definition.behaviour
     program = Program()
-    for hook in filter(None, said.hooks.values()):
+    hooks = [hook for hook in said.hooks.values() if hook]
+    for hook in hooks:
         program.add(hook)
     groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
     for group in groups:
@@ -91,14 +92,15 @@ def translated(definition: Definition) -> str:
         except TypeError as error:
             program.refuse("", str(error))
     program.check()
-    bytes_on_stack, deep = deepest(program.functions.values())
+    functions = _reached(program.functions.values(), map(program.function, hooks))
+    bytes_on_stack, deep = deepest(functions)
     if deep and bytes_on_stack > _MOST_ON_STACK:
         raise Untranslatable(
             f"{deep.name} and the functions that it calls hold "
             f"{bytes_on_stack // _NUMBER} numbers at once; C takes at most "
             f"{_MOST_ON_STACK // _NUMBER}, which lie on a thread's stack"
         )
-    emitter = Emitter(program.functions.values())
+    emitter = Emitter(functions)
     glue = _glue(emitter, program, said)
     citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
@@ -336,6 +338,23 @@ def _is_even(type_: Type) -> bool:
     return isinstance(type_, Scalar) or (isinstance(type_, Array) and _is_even(type_.item))
 
 
+def _called(function: Function) -> Iterator[Function]:
+    """The functions that a function calls."""
+    for one in tree.statements_in(function.body):
+        for each in tree.expressions_of(one):
+            for part in tree.expressions_in(each):
+                if isinstance(part, Call):
+                    yield part.function
+
+
+def _reached(functions: Iterable[Function], hooks: Iterable[Function]) -> list[Function]:
+    """The hooks and all that they call, among functions each after those that it calls."""
+    found, needed = [*functions], {*hooks}
+    for function in reversed(found):
+        needed |= {*_called(function)} if function in needed else set()
+    return [function for function in found if function in needed]
+
+
 def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """The most bytes that lie on a thread's stack in a call from outside, and the call of what.
 
@@ -349,13 +368,10 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """
     depths: dict[Function, int] = {}
     for function in functions:
-        own, deeper = 0, 0
-        for one in tree.statements_in(function.body):
-            for each in tree.expressions_of(one):
-                own += _held(each)
-                calls = (part for part in tree.expressions_in(each) if isinstance(part, Call))
-                deeper = max([deeper, *(depths[call.function] for call in calls)])
+        expressions = map(tree.expressions_of, tree.statements_in(function.body))
+        own = sum(_held(one) for found in expressions for one in found)
         own += sum(map(_result, tree.variables_in(function.body).values()))
+        deeper = max((depths[called] for called in _called(function)), default=0)
         depths[function] = _passed(function) + own + deeper
     found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
     return max(found, key=itemgetter(0), default=(0, None))
