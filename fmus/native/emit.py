@@ -118,6 +118,11 @@ def _list(items: Iterable[str]) -> str:
     return f",{_BREAK}".join(item.replace(_BREAK, " ") for item in items)
 
 
+def _call(name: str, arguments: Iterable[str], fails: bool) -> str:
+    """A call, which notes a failure in `error`."""
+    return f"{name}({_list([*arguments, *(['error'] if fails else [])])})"
+
+
 def number_in_c(value: float) -> str:
     """A number in C."""
     if isinstance(value, float):
@@ -189,8 +194,7 @@ class Emitter:
 
     def call(self, function: Function, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
-        given = [*arguments, *(["error"] if function.fails else [])]
-        return f"{self.names[function]}({_list(given)})"
+        return _call(self.names[function], arguments, function.fails)
 
     # Names
 
@@ -375,8 +379,8 @@ class _Definition:
         texts = [f"({text})" if "{" in text else text for text in texts]
         if op.fails:
             self._emitter.wrap(op.function)
-            return f"math_{op.function}({', '.join([*texts, 'error'])})", _POSTFIX
-        text = f"{op.function}({', '.join(texts)})"
+            return _call(f"math_{op.function}", texts, True), _POSTFIX
+        text = _call(op.function, texts, False)
         return (f"{text} != 0", _EQUALITY) if one.type == BOOL else (text, _POSTFIX)
 
     def _operation(self, one: Operation) -> tuple[str, int]:  # noqa: PLR0911, for each operator
@@ -390,9 +394,7 @@ class _Definition:
             left, right = (self.expression(*each) for each in zip(one.parts, both))
             return f"{left} {sign} {right}", binding
         if op in _CALLED:
-            texts = [self.expression(part) for part in one.parts]
-            given = _list([*texts, *(["error"] if op.fails else [])])
-            return f"{_CALLED[op]}({given})", _POSTFIX
+            return _call(_CALLED[op], map(self.expression, one.parts), op.fails), _POSTFIX
         if op in (tree.AND, tree.OR):
             sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
             # Compilers want brackets around one kind of them within the other.

@@ -127,6 +127,8 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
         for name, function in functions.items()
     }
 
+    alone = {name: [f"{call};"] for name, call in calls.items()}
+
     def put(what: str, hook: str) -> list[str]:
         """What hands the result of a hook over."""
         return [passages[what].put(what, calls[hook])] if hook in calls else []
@@ -140,8 +142,8 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     )
     parts = [
         _constants(said),
-        _defined("void check", f"{_P}, {_E}", _statement(calls, "check")),
-        _defined("void check_state", f"{_P}, {_S}, {_E}", _statement(calls, "check_state")),
+        _defined("void check", f"{_P}, {_E}", alone.get("check", [])),
+        _defined("void check_state", f"{_P}, {_S}, {_E}", alone.get("check_state", [])),
         _defined("unsigned long seed", f"{_P}, {_E}", seed),
         _defined("void start", f"{_P}, {_I}, double t, {_NEXT}, {_E}", put("state", "start")),
         _defined("int credible", f"{_P}, {_S}, {_I}, {_E}", credible),
@@ -169,11 +171,6 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     ]
     head = ["/* What the component calls. */", _types(emitter, said, passages), *moving]
     return "\n\n".join([*head, text])
-
-
-def _statement(calls: dict[str, str], hook: str) -> list[str]:
-    """The call of a hook that returns nothing."""
-    return [f"{calls[hook]};"] if hook in calls else []
 
 
 def _constants(said: Behaviour) -> str:
