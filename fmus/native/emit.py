@@ -118,6 +118,11 @@ def _list(items: Iterable[str]) -> str:
     return f",{_BREAK}".join(item.replace(_BREAK, " ") for item in items)
 
 
+def _call(name: str, arguments: Iterable[str], fails: bool) -> str:
+    """A call, which notes a failure in `error`."""
+    return f"{name}({_list([*arguments, *(['error'] if fails else [])])})"
+
+
 def number_in_c(value: float) -> str:
     """A number in C."""
     if isinstance(value, float):
@@ -189,8 +194,7 @@ class Emitter:
 
     def call(self, function: Function, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
-        given = [*arguments, *(["error"] if function.fails else [])]
-        return f"{self.names[function]}({_list(given)})"
+        return _call(self.names[function], arguments, function.fails)
 
     # Names
 
@@ -333,7 +337,7 @@ class _Definition:
         if isinstance(one, Item):
             return f"{self._owner(one.owner)}v[{self.expression(one.place)}]", _POSTFIX
         if isinstance(one, Make):
-            return f"({self._emitter.type(one.type)}){self._made(one)}", _POSTFIX
+            return f"({self._emitter.type(one.type)}){self._initial(one)}", _POSTFIX
         if isinstance(one, Choice):
             test, this = (self.expression(part, _OR) for part in (one.test, one.one))
             return f"{test} ? {this} : {self.expression(one.other)}", _TERNARY
@@ -358,13 +362,11 @@ class _Definition:
         # In C99, what comes from a function or a choice may end before an element of it is read.
         return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}->"
 
-    def _made(self, one: Make) -> str:
-        """The initializer of a structure."""
-        self._emitter.type(one.type)
-        texts = [
-            self._made(part) if isinstance(part, Make) else self.expression(part)
-            for part in one.parts
-        ]
+    def _initial(self, one: Expression) -> str:
+        """A value where what is around it tells its type."""
+        if not isinstance(one, Make):
+            return self.expression(one)
+        texts = [self._initial(part) for part in one.parts]
         if isinstance(one.type, Array):
             return f"{{{{{_list(texts)}}}}}"
         filled = [f"{name} = {text}" for (name, _), text in zip(members(one.type), texts)]
@@ -377,8 +379,8 @@ class _Definition:
             texts = [f"({text})" for text in texts]
         if op.fails:
             self._emitter.wrap(op.function)
-            return f"math_{op.function}({', '.join([*texts, 'error'])})", _POSTFIX
-        text = f"{op.function}({', '.join(texts)})"
+            return _call(f"math_{op.function}", texts, True), _POSTFIX
+        text = _call(op.function, texts, False)
         return (f"{text} != 0", _EQUALITY) if one.type == BOOL else (text, _POSTFIX)
 
     def _operation(self, one: Operation) -> tuple[str, int]:  # noqa: PLR0911, for each operator
@@ -392,9 +394,7 @@ class _Definition:
             left, right = (self.expression(*each) for each in zip(one.parts, both))
             return f"{left} {sign} {right}", binding
         if op in _CALLED:
-            texts = [self.expression(part) for part in one.parts]
-            given = _list([*texts, *(["error"] if op.fails else [])])
-            return f"{_CALLED[op]}({given})", _POSTFIX
+            return _call(_CALLED[op], map(self.expression, one.parts), op.fails), _POSTFIX
         if op in (tree.AND, tree.OR):
             sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
             # Compilers want brackets around one kind of them within the other.
@@ -439,7 +439,7 @@ class _Definition:
     def _zero(self, name: str, statements: Sequence[Statement]) -> str:
         """The declaration of a variable that gets its value in a block below."""
         type_ = tree.variables_in(statements)[name]
-        value = "0" if isinstance(type_, Scalar) else "{0}"
+        value = "0.0" if type_ == FLOAT else "0" if isinstance(type_, Scalar) else "{0}"
         return f"{self._emitter.declared(type_)}{in_c(name)} = {value};"
 
     def _statement(
@@ -510,13 +510,12 @@ class _Definition:
             return is_new, is_new and stores[name] == 1, made.type, name if is_text else ""
 
         for (is_new, is_constant, type_, _), group in groupby(one.values, alike):
-            texts = [f"{in_c(name)} = {self.expression(value)}" for name, value in group]
-            if is_new:
-                head = "const " if is_constant and type_ != TEXT else ""
-                text = f"{head}{self._emitter.declared(type_)}{', '.join(texts)};"
-            else:
-                text = "; ".join(texts) + ";"
-            yield from lines_of(text, indent)
+            write = self._initial if is_new else self.expression
+            texts = [f"{in_c(name)} = {write(value)}" for name, value in group]
+            head = "const " if is_constant and type_ != TEXT else ""
+            head += self._emitter.declared(type_) if is_new else ""
+            text = _list(texts) if is_new and len(texts) > 1 else "; ".join(texts)
+            yield from lines_of(f"{head}{text};", indent)
 
     def _returned(self, one: tree.Return, indent: str) -> Iterator[str]:
         text = f"return {self.expression(one.value)};" if one.value is not None else "return;"
@@ -525,8 +524,7 @@ class _Definition:
             # A line for each field.
             yield f"{indent}return ({self._emitter.type(one.value.type)}){{"
             for (name, _), part in zip(members(one.value.type), one.value.parts):
-                value = self._made(part) if isinstance(part, Make) else self.expression(part)
-                yield from lines_of(f"{name} = {value},", indent + INDENT)
+                yield from lines_of(f"{name} = {self._initial(part)},", indent + INDENT)
             yield f"{indent}}};"
             return
         yield from lines_of(text, indent)

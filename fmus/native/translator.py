@@ -81,7 +81,8 @@ def translated(definition: Definition) -> str:
 
     """
     said = definition.behaviour
-    program = Program(*filter(None, said.hooks.values()))
+    hooks = [hook for hook in said.hooks.values() if hook]
+    program = Program(*hooks)
     groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
     for group in groups:
         try:
@@ -89,14 +90,15 @@ def translated(definition: Definition) -> str:
         except TypeError as error:
             program.refuse("", str(error))
     program.check()
-    bytes_on_stack, deep = deepest(program.functions.values())
+    functions = _reached(program.functions.values(), map(program.function, hooks))
+    bytes_on_stack, deep = deepest(functions)
     if deep and bytes_on_stack > _MOST_ON_STACK:
         raise Untranslatable(
             f"{deep.name} and the functions that it calls hold "
             f"{bytes_on_stack // _NUMBER} numbers at once; C takes at most "
             f"{_MOST_ON_STACK // _NUMBER}, which lie on a thread's stack"
         )
-    emitter = Emitter(program.functions.values())
+    emitter = Emitter(functions)
     glue = _glue(emitter, program, said)
     citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
@@ -123,6 +125,8 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
         for name, function in functions.items()
     }
 
+    alone = {name: [f"{call};"] for name, call in calls.items()}
+
     def put(what: str, hook: str) -> list[str]:
         """What hands the result of a hook over."""
         return [passages[what].put(what, calls[hook])] if hook in calls else []
@@ -136,8 +140,8 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     )
     parts = [
         _constants(said),
-        _defined("void check", f"{_P}, {_E}", _statement(calls, "check")),
-        _defined("void check_state", f"{_P}, {_S}, {_E}", _statement(calls, "check_state")),
+        _defined("void check", f"{_P}, {_E}", alone.get("check", [])),
+        _defined("void check_state", f"{_P}, {_S}, {_E}", alone.get("check_state", [])),
         _defined("unsigned long seed", f"{_P}, {_E}", seed),
         _defined("void start", f"{_P}, {_I}, double t, {_NEXT}, {_E}", put("state", "start")),
         _defined("int credible", f"{_P}, {_S}, {_I}, {_E}", credible),
@@ -165,11 +169,6 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     ]
     head = ["/* What the component calls. */", _types(emitter, said, passages), *moving]
     return "\n\n".join([*head, text])
-
-
-def _statement(calls: dict[str, str], hook: str) -> list[str]:
-    """The call of a hook that returns nothing."""
-    return [f"{calls[hook]};"] if hook in calls else []
 
 
 def _constants(said: Behaviour) -> str:
@@ -334,6 +333,23 @@ def _is_even(type_: Type) -> bool:
     return isinstance(type_, Scalar) or (isinstance(type_, Array) and _is_even(type_.item))
 
 
+def _called(function: Function) -> Iterator[Function]:
+    """The functions that a function calls."""
+    for one in tree.statements_in(function.body):
+        for each in tree.expressions_of(one):
+            for part in tree.expressions_in(each):
+                if isinstance(part, Call):
+                    yield part.function
+
+
+def _reached(functions: Iterable[Function], hooks: Iterable[Function]) -> list[Function]:
+    """The hooks and all that they call, among functions each after those that it calls."""
+    found, needed = [*functions], {*hooks}
+    for function in reversed(found):
+        needed |= {*_called(function)} if function in needed else set()
+    return [function for function in found if function in needed]
+
+
 def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """The most bytes that lie on a thread's stack in a call from outside, and the call of what.
 
@@ -347,13 +363,10 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """
     depths: dict[Function, int] = {}
     for function in functions:
-        own, deeper = 0, 0
-        for one in tree.statements_in(function.body):
-            for each in tree.expressions_of(one):
-                own += _held(each)
-                calls = (part for part in tree.expressions_in(each) if isinstance(part, Call))
-                deeper = max([deeper, *(depths[call.function] for call in calls)])
+        expressions = map(tree.expressions_of, tree.statements_in(function.body))
+        own = sum(_held(one) for found in expressions for one in found)
         own += sum(map(_result, tree.variables_in(function.body).values()))
+        deeper = max((depths[called] for called in _called(function)), default=0)
         depths[function] = _passed(function) + own + deeper
     found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
     return max(found, key=itemgetter(0), default=(0, None))

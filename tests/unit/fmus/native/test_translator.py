@@ -517,6 +517,9 @@ def start(parameters: Parameters, inputs: Inputs) -> State:
 
 
 def update(state: State, inputs: Inputs, h: float) -> State:
+    def spare(x: float) -> float:
+        return x
+
     return State(state.a + h, state.e, state.b + inputs.u)
 
 
@@ -526,10 +529,12 @@ def outputs(state: State) -> Outputs:
 )
 
 
-def test_records_without_fields_take_no_numbers(tmp_path):
+def test_records_without_fields_take_no_numbers_and_spare_functions_no_room(tmp_path):
     path = tmp_path / "hollow.py"
     path.write_text(HOLLOW)
-    both = Equations(source_of_script(path).definition)
+    definition = source_of_script(path).definition
+    both = Equations(definition)
+    assert "spare" not in translated(definition), "nothing calls it"
     inputs = both.said.inputs((), 0.25)
     given: dict[str, Any] = {"parameters": both.said.parameters(3.0), "inputs": inputs, "h": 0.5}
     given["state"] = agree(both, "start", t=0.0, **given)
