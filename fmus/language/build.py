@@ -768,7 +768,6 @@ class _Builder:
         takes = _Signature("", node.name, types, len(given.posonlyargs), n, values)
         called = _Callable(inner.made, takes, captured)
         self.functions = {**self.functions, node.name: called}
-        self.program.functions["inner", inner.made] = inner.made
         self._know(node.name, NOTHING)
 
     def _captured(self, node: ast.AST, names: Sequence[str], own: Set[str]) -> list[str]:
@@ -1941,6 +1940,7 @@ class _Builder:
             raise _Outside(node, f"{self._local(node, name).type.word} is called")
         self._check_functions([name])
         called = self.functions[name]
+        self.program.functions["inner", called.function] = called.function
         captured = [self._local(node, name) for name in called.captured]
         given = self._given(node, called.signature)
         return Call(called.function, [*given.values(), *captured])

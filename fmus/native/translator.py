@@ -81,8 +81,7 @@ def translated(definition: Definition) -> str:
 
     """
     said = definition.behaviour
-    hooks = [hook for hook in said.hooks.values() if hook]
-    program = Program(*hooks)
+    program = Program(*filter(None, said.hooks.values()))
     groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
     for group in groups:
         try:
@@ -90,15 +89,14 @@ def translated(definition: Definition) -> str:
         except TypeError as error:
             program.refuse("", str(error))
     program.check()
-    functions = _reached(program.functions.values(), map(program.function, hooks))
-    bytes_on_stack, deep = deepest(functions)
+    bytes_on_stack, deep = deepest(program.functions.values())
     if deep and bytes_on_stack > _MOST_ON_STACK:
         raise Untranslatable(
             f"{deep.name} and the functions that it calls hold "
             f"{bytes_on_stack // _NUMBER} numbers at once; C takes at most "
             f"{_MOST_ON_STACK // _NUMBER}, which lie on a thread's stack"
         )
-    emitter = Emitter(functions)
+    emitter = Emitter(program.functions.values())
     glue = _glue(emitter, program, said)
     citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
@@ -333,23 +331,6 @@ def _is_even(type_: Type) -> bool:
     return isinstance(type_, Scalar) or (isinstance(type_, Array) and _is_even(type_.item))
 
 
-def _called(function: Function) -> Iterator[Function]:
-    """The functions that a function calls."""
-    for one in tree.statements_in(function.body):
-        for each in tree.expressions_of(one):
-            for part in tree.expressions_in(each):
-                if isinstance(part, Call):
-                    yield part.function
-
-
-def _reached(functions: Iterable[Function], hooks: Iterable[Function]) -> list[Function]:
-    """The hooks and all that they call, among functions each after those that it calls."""
-    found, needed = [*functions], {*hooks}
-    for function in reversed(found):
-        needed |= {*_called(function)} if function in needed else set()
-    return [function for function in found if function in needed]
-
-
 def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """The most bytes that lie on a thread's stack in a call from outside, and the call of what.
 
@@ -363,13 +344,14 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
     """
     depths: dict[Function, int] = {}
     for function in functions:
-        expressions = map(tree.expressions_of, tree.statements_in(function.body))
-        own = sum(_held(one) for found in expressions for one in found)
+        found = [x for one in tree.statements_in(function.body) for x in tree.expressions_of(one)]
+        calls = [x for one in found for x in tree.expressions_in(one) if isinstance(x, Call)]
+        own = sum(map(_held, found))
         own += sum(map(_result, tree.variables_in(function.body).values()))
-        deeper = max((depths[called] for called in _called(function)), default=0)
+        deeper = max((depths[one.function] for one in calls), default=0)
         depths[function] = _passed(function) + own + deeper
-    found = [(depth + _result(one.returns), one) for one, depth in depths.items()]
-    return max(found, key=itemgetter(0), default=(0, None))
+    ends = ((depth + _result(one.returns), one) for one, depth in depths.items())
+    return max(ends, key=itemgetter(0), default=(0, None))
 
 
 def _result(type_: Type) -> int:
