@@ -1117,35 +1117,27 @@ class _Builder:
         hold: _Hold,
     ) -> tuple[list[tuple[str, Expression]], int]:
         """The items of `zip` and `enumerate`."""
-        first = 0
-        if called is enumerate:
-            words = [one for one in call.keywords if one.arg == "start"]
-            begin = [*call.args[1:], *(one.value for one in words)]
-            if len(begin) > 1:
-                raise _Outside(call, "enumerate with more than a start")
-            if begin:
-                number = self._size(begin[0])
-                if number is None:
-                    raise _Outside(call, "enumerate with a start that is no constant")
-                first = number
-            call = ast.copy_location(
-                ast.Call(call.func, call.args[:1], [k for k in call.keywords if k not in words]),
-                call,
-            )
-        self._check_plain(call, called.__name__)
+        starts = [one for one in call.keywords if called is enumerate and one.arg == "start"]
+        given = [*call.args, *(one.value for one in starts)]
+        others = [one for one in call.keywords if one not in starts]
+        self._check_plain(ast.copy_location(ast.Call(call.func, given, others), call),
+                          called.__name__)  # fmt: skip
         if not isinstance(target, ast.Tuple):
             raise _Outside(target, f"{called.__name__} without a name for each part")
+        names = target.elts
         if called is zip:
-            if len(target.elts) != len(call.args) or not call.args:
+            if len(names) != len(given) or not given:
                 raise _Outside(target, "another number of names than zip has parts")
-            pairs = [self._items(t, i, place, hold) for t, i in zip(target.elts, call.args)]
+            pairs = [self._items(t, i, place, hold) for t, i in zip(names, given)]
             return [one for bound, _ in pairs for one in bound], min(n for _, n in pairs)
-        if len(target.elts) != 2 or len(call.args) != 1:
-            raise _Outside(target, "enumerate without two names")
-        bound, n = self._items(target.elts[1], call.args[0], place, hold)
+        if len(names) != 2 or not 1 <= len(given) <= 2:
+            raise _Outside(target, "enumerate of other than two names, and a start")
+        first = self._size(given[1]) if given[1:] else 0
+        if first is None:
+            raise _Outside(call, "enumerate with a start that is no constant")
+        bound, n = self._items(names[1], given[0], place, hold)
         check_int(first + n)
-        counted = _count(first, place, 1)
-        return [*self._taken_apart(target.elts[0], counted), *bound], n
+        return [*self._taken_apart(names[0], _count(first, place, 1)), *bound], n
 
     # Expressions
 
