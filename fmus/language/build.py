@@ -63,6 +63,7 @@ from fmus.language.types import (
     is_whole,
     matrix,
     parts_of,
+    series,
     sizes,
     tuple_of,
     type_of,
@@ -78,6 +79,9 @@ _DEEPEST = 200
 
 #: Blocks within each other, of which each `elif` is one, and cases of a `match`.
 _MOST_BLOCKS = 100
+
+#: Said where Python's own stack ends.
+_TOO_DEEP = "too deep for Python: take expressions apart, or join functions that call each other"
 
 #: Packages whose functions all equations share.
 _SHARED = frozenset(("auv_fmu", "fmus"))
@@ -102,9 +106,10 @@ _COMPARISONS: Mapping[type, tree.Operator] = {
 
 def _power_of(base: Any, exponent: Any) -> Any:
     """A power of an int that is no larger than sizes can be."""
-    if not (isinstance(base, int) and exponent in range(32)) or abs(base) > 2**31:
+    are_ints = isinstance(base, int) and isinstance(exponent, int)
+    if not are_ints or exponent not in range(32) or abs(base) > 2**31:
         raise OverflowError
-    return base ** int(exponent)
+    return base**exponent
 
 
 #: Operators between constants.
@@ -204,7 +209,10 @@ class Program:
         made = Function(function.__module__, function.__name__, {}, sizes=types)
         self._begun.add(key)
         given = dict(zip((argument.arg for argument in _arguments(node)), types))
-        _Builder(self, path, function.__globals__, made, node).build(given)
+        try:
+            _Builder(self, path, function.__globals__, made, node).build(given)
+        except RecursionError:
+            raise TypeError(f"{path}:{line}: {_TOO_DEEP}") from None
         self.functions[key] = made
         return made
 
@@ -499,7 +507,6 @@ class _Builder:
         """Know the arguments, and the local functions of the function around this one."""
         self.known = {**arguments, **dict.fromkeys(self.functions, NOTHING)}
         self._variables |= {(name, type_): name for name, type_ in arguments.items()}
-        self._taken |= arguments.keys()
 
     def _check_head(self, node: ast.FunctionDef) -> None:
         given = node.args
@@ -562,7 +569,7 @@ class _Builder:
     def _statement(self, node: ast.stmt, found: list[Statement]) -> None:
         name = f"_{type(node).__name__.lower()}_statement"
         is_branched = isinstance(node, (ast.If, ast.Match))
-        if is_branched and max(self._blocks, len(getattr(node, "cases", ()))) > _MOST_BLOCKS:
+        if is_branched and self._blocks + len(getattr(node, "cases", ())) > _MOST_BLOCKS:
             what = f"more than {_MOST_BLOCKS} branches: use a tuple of values, or functions"
             raise _Outside(node, what)
         if not hasattr(self, name):
@@ -634,7 +641,8 @@ class _Builder:
         tests: list[tuple[Expression | None, Sequence[Statement]]] = []
         for case in node.cases:
             self.known = before
-            test: Expression | None = None
+            self._blocks += 1
+            test: Expression | None = Number(True, BOOL)
             with _Noting(self):
                 values = self._cases(case.pattern)
                 if rest - {None} and case.guard is None:
@@ -647,6 +655,7 @@ class _Builder:
             after = _both(after, self.known)
             if test is None:
                 break
+        self._blocks -= len(tests)
         self.known = _both(after, before) if tests[-1][0] is not None else after
         orelse: Sequence[Statement] = ()
         for test, body in reversed(tests):
@@ -673,7 +682,7 @@ class _Builder:
     def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
         if node.orelse:
             raise _Outside(node.orelse[0], self._foreign("else of a while"))
-        is_endless = isinstance(node.test, ast.Constant) and node.test.value in (True, 1)
+        is_endless = isinstance(node.test, ast.Constant) and node.test.value == 1
         inside = [n for statement in node.body for n in ast.walk(statement)]
         if is_endless:
             if not any(isinstance(n, (ast.Break, ast.Return, ast.Raise)) for n in inside):
@@ -709,17 +718,20 @@ class _Builder:
         except (_Outside, _Follows):
             before = self.known
             self._forget(node.target)
+            self._ends.append(None)
             self._block(node.body)
+            self._ends.pop()
             self.known = before
             raise
         before = self.known
         used = {*_free(*node.body), *_stored(*node.body), *self._beyond_loops}
         stores = self._turn(node, loop, used)
+        inside = self.known
         self._ends.append(None)
         body = self._block(node.body)
         self._ends.pop()
-        if before is not None:
-            after = {n: v.type for n, v in loop.bound if n in self._beyond_loops}
+        if before is not None and inside is not None:
+            after = {name: inside[name] for name, _ in loop.bound if name in self._beyond_loops}
             self.known = {**before, **after}
             self.known = self.known if loop.turns else _both(before, self.known)
         found.append(loop.made([*stores, *body]))
@@ -742,7 +754,7 @@ class _Builder:
     # Functions within this one
 
     def _functiondef_statement(self, node: ast.FunctionDef, found: list[Statement]) -> None:
-        if self._counts[node.name] > 1:
+        if self._counts[node.name] > (node.name not in self.made.arguments):
             raise _Outside(node, f"{node.name} is given a value twice: use two names")
         own = {*(argument.arg for argument in _arguments(node)), *_stored(*node.body)}
         free = _free(node)
@@ -783,7 +795,8 @@ class _Builder:
     def _check_functions(self, names: Sequence[str]) -> None:
         """Refuse local functions that may not have been defined."""
         for name in names:
-            if name in self.functions and name not in (self.known or self.functions):
+            known = self.functions if self.known is None else self.known
+            if name in self.functions and name not in known:
                 raise _Outside(ast.Pass(), f"{name} may have no value here")
 
     def _captured_by(self, name: str) -> Sequence[str]:
@@ -851,12 +864,11 @@ class _Builder:
         elif isinstance(target, ast.Name):
             wanted = (self.known or {}).get(target.id)
             found.append(self._store(target, [(target.id, self.expression(value, wanted))]))
-        elif isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
-            has_star = any(isinstance(one, ast.Starred) for one in value.elts)
-            if has_star or len(target.elts) != len(value.elts):
-                held = self._kept(self.expression(value), "all")
-                found += self._take_apart(target, held)
-                return
+        elif (
+            isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            and len(target.elts) == len(value.elts)
+            and not any(isinstance(one, ast.Starred) for one in value.elts)
+        ):  # fmt: skip
             pairs = [*zip(target.elts, value.elts)]
             if _names(target) & _names(value):
                 # All are computed before the first is stored.
@@ -907,7 +919,7 @@ class _Builder:
             return [Item(value, int_of(i)) for i in range(value.type.n)]
         if isinstance(value.type, Record):
             return [Field(value, name, part) for name, part in value.type.fields]
-        raise _Outside(node, "a number is taken apart")
+        raise _Outside(node, f"{value.type.word} is taken apart")
 
     def _store(self, node: ast.AST, values: Sequence[tuple[str, Expression]]) -> tree.Store:
         """The statement that gives names their values, one after the other."""
@@ -1004,9 +1016,7 @@ class _Builder:
             if isinstance(part, ast.FormattedValue):
                 found.append(self._formatted(part))
             else:
-                found.append(str(ast.literal_eval(part)))
-                if "\0" in found[-1]:
-                    raise _Outside(text, "a text with a NUL, which ends a text in C")
+                found.append(_text(ast.literal_eval(part)).value)
         return found
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
@@ -1024,7 +1034,8 @@ class _Builder:
         if is_number(value.type) and NUMBER_FORMAT.fullmatch(how):
             return self._float(value), how
         name = ast.unparse(part.value)
-        raise _Outside(part.value, f"{{{name}}} in a text: write {{{name}:g}}")
+        better = f": write {{{name}:g}}" if is_number(value.type) else ""
+        raise _Outside(part.value, f"{{{name}}} in a text{better}")
 
     # Loops
 
@@ -1136,7 +1147,8 @@ class _Builder:
         if first is None:
             raise _Outside(call, "enumerate with a start that is no constant")
         bound, n = self._items(names[1], given[0], place, hold)
-        check_int(first + n)
+        check_int(first)
+        check_int(first + max(n - 1, 0))
         return [*self._taken_apart(names[0], _count(first, place, 1)), *bound], n
 
     # Expressions
@@ -1250,7 +1262,10 @@ class _Builder:
             with suppress(ArithmeticError):
                 return _FOLDED[type(node.op)](one, other)
             return None
-        if isinstance(node, ast.Call) and self._meant(node.func) is len:
+        if (
+            isinstance(node, ast.Call) and self._meant(node.func) is len
+            and not any(isinstance(one, ast.Call) for x in node.args for one in ast.walk(x))
+        ):  # fmt: skip
             found = self.expression(node)
             return int(found.value) if isinstance(found, Number) else None
         value = node.value if isinstance(node, ast.Constant) else self._meant(node)
@@ -1264,7 +1279,7 @@ class _Builder:
     def _constant(self, node: ast.Constant, wanted: Type | None) -> Expression:
         value: Any = node.value
         if isinstance(value, str):
-            return tree.Text(value)
+            return _text(value)
         if type(value) not in (bool, int, float):
             raise self._cannot(node, f"the constant {value!r}")
         if type(value) is int:
@@ -1314,7 +1329,7 @@ class _Builder:
     def _constant_of(
         self, module: str, name: str, value: Any, wanted: Type | None = None
     ) -> Expression:
-        constants, key = self.program.constants, (name, id(value))
+        constants, key = self.program.constants, (name, id(value), wanted)
         if key not in constants:
             type_ = wanted or type_of_value(value, name)
             check_value(value, type_, name)
@@ -1627,7 +1642,7 @@ class _Builder:
         self._check_plain(node, "len", 1)
         value = self.expression(node.args[0])
         if not isinstance(value.type, (Array, Record)):
-            raise _Outside(node, "len of a number")
+            raise _Outside(node, f"len of {value.type.word}")
         if value.fails:
             self._held(value, "all")
         return int_of(len(parts_of(value.type)))
@@ -1679,7 +1694,7 @@ class _Builder:
         parts = self._listed(given, self._row if made is Matrix else self.fitting)
         if parts is None:
             value = self.expression(given)
-            if getattr(value.type, "made", None) is made and made is not tuple:
+            if getattr(value.type, "made", None) is made:
                 return value
             parts = self._parts_of(given, self._held(value, "all"))
         if made is not Matrix:
@@ -1700,7 +1715,8 @@ class _Builder:
             return None
         if times is None or times < 1:
             raise _Outside(node, "a tuple a number of times that is not a constant above 0")
-        check_size(f"a tuple of {len(node.elts)} times {times}", times * len(node.elts))
+        if times > 1:
+            check_size(f"a tuple of {len(node.elts)} times {times}", times * len(node.elts))
         return self._elements(node.elts, (), make) * times
 
     def _collected(self, node: ast.AST, made: Any, values: Sequence[Expression]) -> Expression:
@@ -1748,17 +1764,15 @@ class _Builder:
         else:
             element = inner.expression(node.elt)
             check_size(f"a tuple of {turns}", turns)
-            type_ = Array(element.type, turns)
+            type_ = series(element.type, turns)
         elements = Local(inner._unused("elements"), type_)
         before: list[Statement] = [tree.Reserve(elements.name, type_)]
-        place = each.loop.counter
-        if _value(each.loop.start) == 0 and each.loop.step == 1:
-            each.block.append(tree.StoreItem(elements.name, [place], element))
-        else:
-            place = Local(inner._unused("place"), INT)
+        counts = _value(each.loop.start) == 0 and each.loop.step == 1
+        place = each.loop.counter if counts else Local(inner._unused("place"), INT)
+        each.block.append(tree.StoreItem(elements.name, [place], element))
+        if not counts:
             before.append(tree.Store([(place.name, int_of(0))]))
             following = Operation(tree.COUNT_ADD, (place, int_of(1)), INT)
-            each.block.append(tree.StoreItem(elements.name, [place], element))
             each.block.append(tree.Store([(place.name, following)]))
         return each.call(before, elements)
 
@@ -1947,7 +1961,7 @@ class _Builder:
         missing = {*names} - {*places} - {*words} - {*takes.defaults}
         if (
             len(values) > takes.positional or missing or {*words} & {*places}
-            or {*words} - {*names[takes.unnamed :]} or len(words) < len(node.keywords)
+            or {*words} - {*names[takes.unnamed :]}
         ):  # fmt: skip
             raise _Outside(node, f"{takes.name} takes {', '.join(names) or 'no arguments'}")
         found = dict(zip(places, values))
@@ -1964,9 +1978,9 @@ class _Builder:
         if isinstance(value, Expression):
             return value
         wanted = takes.types[name] or type_of_value(value, what)
-        if wanted == TEXT and isinstance(value, str):
-            return tree.Text(value)
         check_value(value, wanted, what)
+        if wanted == TEXT:
+            return _text(value)
         if isinstance(wanted, Scalar):
             return Number(value, wanted)
         return self._constant_of(takes.module, f"{takes.name}_{name}", value, wanted)
@@ -1987,7 +2001,7 @@ class _Noting:
             return False
         builder = self._builder
         if isinstance(error, RecursionError):
-            error = _Outside(ast.Pass(), "too many calls within each other: join some functions")
+            error = _Outside(ast.Pass(), _TOO_DEEP)
         if isinstance(error, (_Outside, TypeError)):
             node = error.node if isinstance(error, _Outside) else self._node
             places = (getattr(one, "lineno", 0) for one in (node, self._node, builder.node))
@@ -2011,6 +2025,13 @@ def _both(one: _Known | None, other: _Known | None) -> _Known | None:
         for name, both in types.items()
         if len(both) == 1 or UNKNOWN in both
     }
+
+
+def _text(value: str) -> tree.Text:
+    """A text that is written out, and that C can have."""
+    if "\0" in value or any("\ud800" <= letter < "\ue000" for letter in value):
+        raise TypeError("a text with a NUL, which ends one in C, or with half a letter")
+    return tree.Text(value)
 
 
 def _first_name(target: ast.expr) -> str:

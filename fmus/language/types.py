@@ -22,7 +22,7 @@ _MOST_NUMBERS = 65_536
 
 def _one(made: type) -> str:
     """A word for a value of a class."""
-    return f"{'an' if made.__name__[0] in 'AEIOU' else 'a'} {made.__name__}"
+    return f"{'an' if made.__name__[0] in 'AEIOUaeiou' else 'a'} {made.__name__}"
 
 
 @dataclass(frozen=True)
@@ -168,12 +168,19 @@ def check_size(what: str, n: int) -> None:
         raise TypeError(f"{what} is too large for C, which takes at most {_MOST_NUMBERS} numbers")
 
 
+def series(item: Type, n: int) -> Array:
+    """The type of a tuple whose elements are alike."""
+    if item == TEXT:
+        raise TypeError("a tuple of texts; choose between texts by if")
+    return Array(item, n)
+
+
 def tuple_of(items: list[Type]) -> Array | Record:
     """The type of a plain tuple."""
-    if TEXT in items:
-        raise TypeError("a tuple of texts; choose between texts by if")
     if items and all(item == items[0] for item in items):
-        return Array(items[0], len(items))
+        return series(items[0], len(items))
+    if TEXT in items:
+        return series(TEXT, 1)
     return Record(tuple((f"m{i}", item) for i, item in enumerate(items)))
 
 
@@ -307,10 +314,9 @@ def check_value(value: Any, type_: Type, name: str) -> None:
         return
     if type_ == FLOAT and isinstance(value, int):
         raise TypeError(f"{name} is an int where a float is wanted: write {value}.0")
-    kind = type_.made or (float if type_ == FLOAT else int)
-    if type(value) is not float if type_ == FLOAT else not isinstance(value, kind):
+    if not isinstance(value, type_.made) if type_.made else _SCALARS.get(type(value)) != type_:
         raise TypeError(f"{name} is {_one(type(value))} where {type_.word} is wanted")
-    if not isinstance(value, float):
+    if not isinstance(value, (float, str)):
         check_int(value)
 
 

@@ -424,21 +424,21 @@ class _Definition:
             if is_here and name not in known:
                 here.setdefault(places[0], []).append(name)
         known = known | {name for names in here.values() for name in names}
+        types = tree.variables_in(statements)
         stores = Counter(_stores(statements))
         lines: list[str] = []
         for i, statement in enumerate(statements):
             new = here.get(i, [])
             if not isinstance(statement, (tree.Store, tree.Reserve)):
-                lines += [f"{indent}{self._zero(name, statements)}" for name in new]
+                lines += [f"{indent}{self._zero(name, types[name])}" for name in new]
             found = [*self._statement(statement, new, stores, known, indent)]
             if statement.comment and found:
                 found = _annotated(found, f"/* {closed(statement.comment)} */", indent)
             lines += found
         return lines
 
-    def _zero(self, name: str, statements: Sequence[Statement]) -> str:
+    def _zero(self, name: str, type_: Type) -> str:
         """The declaration of a variable that gets its value in a block below."""
-        type_ = tree.variables_in(statements)[name]
         value = "0.0" if type_ == FLOAT else "0" if isinstance(type_, Scalar) else "{0}"
         return f"{self._emitter.declared(type_)}{in_c(name)} = {value};"
 

@@ -240,9 +240,15 @@ def test_what_a_class_changes_of_a_tuple_is_refused(tmp_path):
     assert said == "own.py:4: __getitem__ in the class A: leave it out"
 
 
+def test_an_expression_too_deep_for_python_is_refused_with_a_line(tmp_path):
+    text = "def f(x: float) -> float:\n    return " + "x + " * 995 + "x\n"
+    [said] = said_of_module(text, tmp_path)
+    assert re.match(r"own\.py:[12]: (too deep for Python|an expression of 200 levels)", said)
+
+
 def test_calls_too_deep_for_python_are_refused_with_a_line(tmp_path):
     links = [f"def f{i}(x: float) -> float:\n    return f{i + 1}(x) + 1.0\n" for i in range(300)]
     text = "\n\n".join([*reversed(links), "def f300(x: float) -> float:\n    return x\n"])
     said = said_of_module(text.replace("f0(", "f("), tmp_path)
-    why = r"own\.py:[1-9]\d*: too many calls within each other: join some functions"
+    why = r"own\.py:[1-9]\d*: too deep for Python: .* join functions that call each other"
     assert said and all(re.fullmatch(why, one) for one in said)

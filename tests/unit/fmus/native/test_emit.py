@@ -568,6 +568,17 @@ CONSTRUCTS = {
         "        for i in range(2, 4):\n            x += i\n"
         "        k += i % 7\n        for k in range(2):\n            pass\n    return x, k\n"
     ),
+    "a loop over members of an enumeration for an int": (
+        "def f(x: float, k: int) -> tuple[float, int]:\n"
+        "    n = 3\n    for n in (Mode.OFF, Mode.HEAT):\n        x += n\n"
+        "    for i, k in enumerate((Mode.HEAT, Mode.OFF), 2147483646):\n        x += k * i\n"
+        "    return x + n, k\n"
+    ),
+    "one value under two types": (
+        "_TWO = (True, 2)\ndef _g(a: float, t: tuple[bool, int] = _TWO) -> float:\n"
+        "    return a * t[0] + _TWO[1]\n"
+        "def f(x: float) -> float:\n    return _g(x) + _TWO[1]\n"
+    ),
     "names of loops that are over": (
         "def f(x: float, v: Annotated[Vector, 3]) -> tuple[float, int, int]:\n"
         "    for k in range(3):\n        pass\n    while k > -3:\n        k -= 2\n"
@@ -686,6 +697,16 @@ def _listed(x: list[float]) -> float:
 
 def _listing(x: float) -> tuple[float, ...]:
     return (x,)
+
+
+def _why(x: float, why: str = 5) -> float:
+    if x > 1.0:
+        raise Refusal(f"{why}")
+    return x
+
+
+def _on(x: float, on: bool = 5) -> float:
+    return x if on else 0.0
 
 
 LARGE, ZERO, WRONG = 3000000000, Inner(0), Inner(0.5, 2.5)
@@ -840,6 +861,19 @@ def test_an_integer_that_c_cannot_hold_is_refused(
             "y has two meanings here: rename one",
         ),
         ("for a in POWERS: y += a\n    for a in v: y += a\n    y += a", "a is an int and gets a f"),
+        ("for k in foo(y):\n        break", "foo is not a function of equations"),
+        ("y += 1.0\n    def y(a: float) -> float:\n        return a", "y is given a value twice"),
+        ("if N > 5:\n        def g() -> float:\n            return 1.0\n    y = g()", "g may have"),
+        ("for k in range(2 ** 3.0): y += k", "a bound of a range that is a float, not an int"),
+        ("for k, a in enumerate(v, -(2**31) - 2): y += a", "-2147483650 is an int of more than 32"),
+        ("t = tuple('a' for _ in range(3))", "a tuple of texts; choose between texts by if"),
+        ("y = _why(y)", "the default value of why is an int where a text is wanted"),
+        ("y = _on(y)", "the default value of on is an int where a bool is wanted"),
+        ("why = 'a\\0b'\n    raise Refusal(f'{why}!')", "a text with a NUL"),
+        ("raise Refusal('\\ud800')", "or with half a letter"),
+        ("raise Refusal(f'{v}')", "{v} in a text"),
+        ("k = int(y)\n    match k:\n        case 1.5: y = 1.0\n        case 2: y = 2.0",
+         "a case other than an int"),
         ("k = 1\n    k = v", "k is an int and gets a Vector of 3: use another name"),
         ("k = Inner(y, Inner(y))", "an Inner where an int is wanted"),
         ("y = math.foo(y)", "the name math.foo is not known here"),
@@ -867,7 +901,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
         ("y = PLAIN.v[2]", "PLAIN.v is not a Vector of 3"),
         ("y = Default(y).n * y", "the default value of n is a float where an int is wanted"),
         ("_ = y\n    y = _", "a value of _ is not in the language"),
-        ("y = 1.0 * len(y)", "len of a number"),
+        ("y = 1.0 * len(y)", "len of a float"),
         ("y = 1.0 if y > 0.0 and len(A[int(y)]) > 2 else 2.0", "this is computed only in some cas"),
         ("y = 1.0 * _nothing(y)", "what returns nothing is used as a value"),
         ("k = _nothing(y)", "what returns nothing is used as a value"),
