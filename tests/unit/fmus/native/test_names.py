@@ -116,7 +116,7 @@ def test_all_that_stands_outside_of_functions_has_a_name_of_its_own(classes, fun
     made = [Function(*place, arguments, body=body) for place in functions]
     text = Emitter(made).text()
     names = re.findall(r"^(?:} |static (?:const )?\w+ )(\w+)", text, re.MULTILINE)
-    count = len(types) + 1 + len({*found}) if made else 0
+    count = len(types) + 1 + len(found) if made else 0
     assert len(names) == len({*names}) == len(made) + count
     assert not [name for name in names if name[0] in "_0123456789"]
     assert not {*names} & {in_c(name) for name in arguments}
