@@ -14,6 +14,7 @@ import tokenize
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence, Set
 from contextlib import suppress
+from dataclasses import replace
 from enum import IntEnum
 from functools import cache, partial
 from inspect import Parameter
@@ -63,7 +64,6 @@ from fmus.language.types import (
     is_whole,
     matrix,
     parts_of,
-    series,
     sizes,
     tuple_of,
     type_of,
@@ -290,7 +290,7 @@ def _free(*nodes: ast.AST) -> list[str]:
         if isinstance(node, ast.Name):
             found += [node.id] if isinstance(node.ctx, ast.Load) else []
         elif isinstance(node, ast.FunctionDef):
-            own = {argument.arg for argument in _arguments(node)} | {*_stored(*node.body)}
+            own = _own(node)
             found += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
             found += [name for name in _free(*node.body) if name not in own]
         elif isinstance(node, ast.GeneratorExp):
@@ -306,6 +306,11 @@ def _free(*nodes: ast.AST) -> list[str]:
 
 def _arguments(node: ast.FunctionDef) -> list[ast.arg]:
     return [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+
+
+def _own(node: ast.FunctionDef) -> set[str]:
+    """The names of a function: of its arguments, and those that it gives a value."""
+    return {*(argument.arg for argument in _arguments(node)), *_stored(*node.body)}
 
 
 def _is_none(node: ast.expr | None) -> bool:
@@ -472,7 +477,7 @@ class _Builder:
         assert node is not None
         self.made.doc = ast.get_docstring(node) or ""
         arguments = _arguments(node)
-        self.names = {*(argument.arg for argument in arguments), *_stored(*node.body)}
+        self.names = _own(node)
         self._taken |= {*self.names, *_names(node)}
         self._counts = Counter(_stored(*node.body))
         self._beyond_loops = _beyond_loops(*node.body)
@@ -756,7 +761,7 @@ class _Builder:
     def _functiondef_statement(self, node: ast.FunctionDef, found: list[Statement]) -> None:
         if self._counts[node.name] > (node.name not in self.made.arguments):
             raise _Outside(node, f"{node.name} is given a value twice: use two names")
-        own = {*(argument.arg for argument in _arguments(node)), *_stored(*node.body)}
+        own = _own(node)
         free = _free(node)
         if node.name in free:
             raise _Outside(node, f"{node.name} calls itself")
@@ -795,9 +800,11 @@ class _Builder:
     def _check_functions(self, names: Sequence[str]) -> None:
         """Refuse local functions that may not have been defined."""
         for name in names:
-            known = self.functions if self.known is None else self.known
-            if name in self.functions and name not in known:
+            if name in self.functions and not self._is_known(name):
                 raise _Outside(ast.Pass(), f"{name} may have no value here")
+
+    def _is_known(self, name: str) -> bool:
+        return self.known is None or name in self.known
 
     def _captured_by(self, name: str) -> Sequence[str]:
         return self.functions[name].captured if name in self.functions else ()
@@ -806,11 +813,10 @@ class _Builder:
         """What builds a function within this one, which has names of its own."""
         made = Function(self.made.module, f"{self.made.name}_{word}", {}, sizes=self.made.sizes)
         inner = _Builder(self.program, self.path, self.scope, made, node)
-        known = self.functions if self.known is None else self.known
         inner.functions = {
             name: called
             for name, called in self.functions.items()
-            if name in known and name not in own
+            if self._is_known(name) and name not in own
         }
         inner._taken = {*self._taken, *own}
         return inner
@@ -926,8 +932,7 @@ class _Builder:
         stores = []
         for name, value in values:
             known = (self.known or {}).get(name)
-            if known == INT and is_whole(value.type) and value.type != BOOL:
-                value = _as_int(value)
+            value = _as_wanted(value, known)
             if known and known != value.type:
                 raise _Outside(node, self._other(name, known, value))
             stores.append((self._variable(name, value.type), value))
@@ -1183,12 +1188,11 @@ class _Builder:
 
     def _fit(self, node: ast.AST, value: Expression, wanted: Type | None) -> Expression:
         """The tree of an expression, if it is of exactly this type."""
+        value = _as_wanted(value, wanted)
         if wanted is None or value.type == wanted:
             return value
         if wanted == UNKNOWN:
             raise _Follows
-        if wanted == INT and is_whole(value.type) and value.type != BOOL:
-            return _as_int(value)
         if wanted == FLOAT and is_whole(value.type):
             text = ast.unparse(node)
             better = f"{text}.0" if text.removeprefix("-").isdecimal() else f"float({text})"
@@ -1764,7 +1768,9 @@ class _Builder:
         else:
             element = inner.expression(node.elt)
             check_size(f"a tuple of {turns}", turns)
-            type_ = series(element.type, turns)
+            one = tuple_of([element.type])
+            assert isinstance(one, Array)
+            type_ = replace(one, n=turns)
         elements = Local(inner._unused("elements"), type_)
         before: list[Statement] = [tree.Reserve(elements.name, type_)]
         counts = _value(each.loop.start) == 0 and each.loop.step == 1
@@ -2066,6 +2072,12 @@ def _is_fixed(value: Expression) -> bool:
     if isinstance(value, Item):
         return _is_fixed(value.owner) and isinstance(value.place, Number)
     return isinstance(value, (Number, Local, tree.Constant))
+
+
+def _as_wanted(value: Expression, wanted: Type | None) -> Expression:
+    """A member of an enumeration as an int, where one is wanted."""
+    is_member = is_whole(value.type) and value.type != BOOL
+    return _as_int(value) if wanted == INT and is_member else value
 
 
 def _as_int(value: Expression) -> Expression:

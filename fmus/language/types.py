@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import IntEnum
 from functools import cache
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Any, Union, get_args, get_origin
 
 from auv_fmu.language.arrays import Matrix, Vector
-from fmus.ports.groups import hints_of, is_class, is_record
+from fmus.ports.groups import hints_of, is_class, is_record, sizes_in, split
 
 #: How a text begins that says where it is about.
 PLACED = re.compile(r".+?:\d+: ")
@@ -168,19 +168,12 @@ def check_size(what: str, n: int) -> None:
         raise TypeError(f"{what} is too large for C, which takes at most {_MOST_NUMBERS} numbers")
 
 
-def series(item: Type, n: int) -> Array:
-    """The type of a tuple whose elements are alike."""
-    if item == TEXT:
-        raise TypeError("a tuple of texts; choose between texts by if")
-    return Array(item, n)
-
-
 def tuple_of(items: list[Type]) -> Array | Record:
     """The type of a plain tuple."""
-    if items and all(item == items[0] for item in items):
-        return series(items[0], len(items))
     if TEXT in items:
-        return series(TEXT, 1)
+        raise TypeError("a tuple of texts; choose between texts by if")
+    if items and all(item == items[0] for item in items):
+        return Array(items[0], len(items))
     return Record(tuple((f"m{i}", item) for i, item in enumerate(items)))
 
 
@@ -191,13 +184,12 @@ def type_of(hint: Any) -> Type:
         TypeError: it is none of the language.
 
     """
-    if get_origin(hint) is Annotated:
-        hint, *notes = get_args(hint)
-        given = [note for note in notes if type(note) is int]
-        if hint is Vector and len(given) == 1:
-            return vector(*given)
-        if hint is Matrix and len(given) == 2:
-            return matrix(*given)
+    hint, notes = split(hint)
+    given = sizes_in(notes)
+    if hint is Vector and len(given) == 1:
+        return vector(*given)
+    if hint is Matrix and len(given) == 2:
+        return matrix(*given)
     if hint in (Vector, Matrix):
         example = "Vector, 3" if hint is Vector else "Matrix, 2, 3"
         raise TypeError(f"{hint.__name__} has no size here: write Annotated[{example}]")
