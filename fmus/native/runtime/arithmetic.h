@@ -21,26 +21,10 @@
 
 #include <limits.h>
 #include <math.h>
-#include <stdarg.h>
 #include <stdlib.h>
 #include <string.h>
 
-#include "text.c"
-
-typedef struct {
-    int raised;
-    message why; /* the exception's class and text, or only the text of a refusal */
-} Error;
-
-/* Notes an error; the format is one of `compose`. */
-static void raise_error(Error *error, string format, ...) {
-    va_list arguments;
-    if (error->raised) return;
-    error->raised = 1;
-    va_start(arguments, format);
-    compose_from(&error->why, format, arguments);
-    va_end(arguments);
-}
+#include "error.h"
 
 static void raise_domain_error(Error *error) { raise_error(error, "ValueError: math domain error"); }
 

@@ -86,17 +86,9 @@ typedef union {
     double values[AT_LEAST_ONE(MODEL_STATE)];
 } state_values;
 
+#include "noise.c"
+
 /* A run */
-
-enum { GENERATOR_WORDS = 624 };
-
-/* Python's random.Random. */
-typedef struct {
-    uint32_t place; /* of the next word; GENERATOR_WORDS: all are used up */
-    int has_next;
-    double next; /* normal numbers come in pairs */
-    uint32_t words[GENERATOR_WORDS];
-} generator;
 
 /* Of outputs. Those that are outdated are computed when they are read. A sampled component holds
  * those of the beginning of a step after it; the next step computes its own. */
@@ -148,7 +140,6 @@ struct instance {
 #include "handles.c"
 #include "calls.c"
 #include "guard.c"
-#include "noise.c"
 #include "store.c"
 #include "run.c"
 #include "state.c"

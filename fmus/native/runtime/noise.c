@@ -4,9 +4,17 @@
  * seeded as Python seeds it with an integer of one word.
  */
 #include <math.h>
+#include <stdint.h>
 #include <string.h>
 
-enum { SHIFT = 397 };
+enum { GENERATOR_WORDS = 624, SHIFT = 397 };
+
+typedef struct {
+    uint32_t place; /* of the next word; GENERATOR_WORDS: all are used up */
+    int has_next;
+    double next; /* normal numbers come in pairs */
+    uint32_t words[GENERATOR_WORDS];
+} generator;
 
 static void seed_generator(generator *it, uint32_t seed) {
     uint32_t *x = it->words, i;

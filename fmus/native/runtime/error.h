@@ -1,0 +1,24 @@
+/* The first error of a call, and why there is one. */
+#ifndef ERROR_H
+#define ERROR_H
+
+#include <stdarg.h>
+
+#include "text.c"
+
+typedef struct {
+    int raised;
+    message why; /* the exception's class and text, or only the text of a refusal */
+} Error;
+
+/* Notes an error; the format is one of `compose`. */
+static void raise_error(Error *error, string format, ...) {
+    va_list arguments;
+    if (error->raised) return;
+    error->raised = 1;
+    va_start(arguments, format);
+    compose_from(&error->why, format, arguments);
+    va_end(arguments);
+}
+
+#endif
