@@ -198,7 +198,7 @@ class Emitter:
 
     # Names
 
-    def _unused(self, name: str) -> str:
+    def unused(self, name: str) -> str:
         """A name that no other structure, function or constant has."""
         name += "_" if is_of_library(name) else ""
         while name in self._taken or name in self._variables or name in words_of_runtime():
@@ -211,7 +211,7 @@ class Emitter:
         stems = (part.lstrip("_") for part in (module.rpartition(".")[2], name))
         parts = [*stems, *map(self.type, sizes)]
         found = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
-        return self._unused(found if found.isidentifier() else f"of_{found}")
+        return self.unused(found if found.isidentifier() else f"of_{found}")
 
     # Types and constants
 
@@ -254,7 +254,7 @@ class Emitter:
             if type_.made:
                 name = class_in_c(type_.made.__name__)
                 doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
-        name = self._unused(name)
+        name = self.unused(name)
         head = [f"/* {strip_sphinx_marks(doc)} */"] if doc else []
         self.structures[name] = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
         return name

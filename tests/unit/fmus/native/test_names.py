@@ -73,7 +73,7 @@ def test_every_name_that_a_compiler_knows_can_be_a_variable_and_a_function(tmp_p
     assert {"size_t", "strlen", "math_errhandling", "EOF"} <= {*words}
     emitter, own = Emitter([]), re.findall(r"\w+", files["equations.c"])
     composed = [word for word in words if re.match("[A-Za-z]+_.", word)]
-    functions = [emitter._unused(word) for word in composed if word not in own]
+    functions = [emitter.unused(word) for word in composed if word not in own]
     code = [f"static double {name}(double x) {{ return x; }}" for name in functions]
     names = [in_c(word) for word in words if not iskeyword(word)]
     code += [_USE.format(i=i, name=name) for i, name in enumerate(names)]
