@@ -98,12 +98,12 @@ static inline void draw(generator *noise, double draws[], int n) {
 """
 
 _TIMES = """\
-static inline double time_after(const simulation *it, int64_t k) {
+static inline double time_after(const simulation *it, int k) {
     return k <= it->full_steps ? it->start_time + (double)k * it->step : it->stop_time;
 }
 
 /* How long n steps after the k-th last, or as many of them as are left. */
-static inline double length_of(const simulation *it, int64_t k, int64_t n) {
+static inline double length_of(const simulation *it, int k, int n) {
     if (k + n <= it->full_steps) return (double)n * it->step;
     if (it->steps > it->full_steps) return it->stop_time - time_after(it, k);
     return (double)(it->full_steps - k) * it->step;
@@ -513,8 +513,8 @@ class Text:
             "/* All that a run depends on. */\n"
             "typedef struct {\n"
             "    double start_time, step, stop_time;\n"
-            "    int64_t full_steps, steps; /* if there is one more of all steps, it is shorter */\n"
-            "    int64_t made;\n"
+            "    int full_steps, steps; /* if there is one more of all steps, it is shorter */\n"
+            "    int made;\n"
             "    int component, call, port; /* that has refused */\n"
             f"{body}\n}} simulation;\n\n"
             f"enum {{ {calls} }};"
@@ -570,17 +570,17 @@ class Text:
                 "static int settle(simulation *it, int everything) {",
                 "    const double t = it->start_time;",
                 "    int changed = 0, is_other;",
-                "    Error failure = {0}, *error = &failure;",
+                "    Error noted = {0}, *error = &noted;",
                 *[line.replace("return 1;", "return -1;") for line in settled],
                 "    return changed;",
                 "}",
                 "",
                 "/* Sets parameters, and lets values come to rest at the start; whether a component refuses. */",
                 "EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,",
-                "                   double stop_time, int64_t full_steps, int64_t steps) {",
+                "                   double stop_time, int full_steps, int steps) {",
                 "    const double t = start_time;",
                 "    int changed, rounds = 0;",
-                "    Error failure = {0}, *error = &failure;",
+                "    Error noted = {0}, *error = &noted;",
                 "    memset(it, 0, sizeof *it);",
                 "    it->start_time = start_time;",
                 "    it->step = step;",
@@ -607,7 +607,7 @@ class Text:
         i, kind = self.components.index(name), self.kind(name)
         return [
             f"{kind.name}_start(&it->{self.members[name]}, t, error);",
-            f"if (failure.raised) return refused(it, {i}, START, 0);",
+            f"if (noted.raised) return refused(it, {i}, START, 0);",
         ]
 
     def _port(self, name: PortName) -> Port:
@@ -689,7 +689,7 @@ class Text:
         last = (
             [
                 "if (it->made == it->steps) {",
-                "    const int64_t k = it->made;",
+                "    const int k = it->made;",
                 "    const double t = time_after(it, k);",
                 *[f"    {line}" for line in passing],
                 "}",
@@ -705,7 +705,7 @@ class Text:
         body = [
             *first,
             "while (it->made < until) {",
-            "    const int64_t k = it->made;",
+            "    const int k = it->made;",
             "    const double t = time_after(it, k);",
             *[f"    {line}" for line in before],
             "    if (make_step(it, k, t)) return 1;",
@@ -720,8 +720,12 @@ class Text:
             f"enum {{ WIDTH = {1 + len(self.columns)} }};\n\n"
             "/* Makes steps until so many are made, and a row after each if there are rows; whether a\n"
             " * component refuses. */\n"
-            f"EXPORTED int run(simulation *it, int64_t until, double rows[]) {{\n{text}\n}}\n\n"
-            "EXPORTED size_t size_of_simulation(void) { return sizeof(simulation); }"
+            f"EXPORTED int run(simulation *it, int until, double rows[]) {{\n{text}\n}}\n\n"
+            "EXPORTED size_t size_of_simulation(void) { return sizeof(simulation); }\n\n"
+            "/* What has refused: the component, by its number, what was called, and which input. */\n"
+            "EXPORTED void failure(const simulation *it, int found[]) {\n"
+            "    found[0] = it->component;\n    found[1] = it->call;\n    found[2] = it->port;\n"
+            "    found[3] = it->made;\n}"
         )
         return parts
 
@@ -739,8 +743,8 @@ class Text:
         text = "\n".join(part for line in lines for part in lines_of(line.lstrip(), "    " + " " * (len(line) - len(line.lstrip()))))
         return (
             f"/* {doc}; whether a component refuses. */\n"
-            f"static int {name}(simulation *it, int64_t k, double t) {{\n"
-            "    Error failure = {0}, *error = &failure;\n"
+            f"static int {name}(simulation *it, int k, double t) {{\n"
+            "    Error noted = {0}, *error = &noted;\n"
             f"    (void)k;\n    (void)t;\n    (void)error;\n{text}\n    return 0;\n}}"
         )
 
@@ -786,12 +790,12 @@ class Text:
         yield (
             f"{kind.name}_advance(&{member}, it->start_time, t, length_of(it, k, {every}), error);"
         )
-        yield f"if (failure.raised) return refused(it, {i}, STEP, 0);"
+        yield f"if (noted.raised) return refused(it, {i}, STEP, 0);"
 
     def _evaluated(self, name: str) -> Iterator[str]:
         kind, i = self.kind(name), self.components.index(name)
         yield f"{kind.name}_evaluate(&it->{self.members[name]}, error);"
-        yield f"if (failure.raised) return refused(it, {i}, OUTPUTS, 0);"
+        yield f"if (noted.raised) return refused(it, {i}, OUTPUTS, 0);"
 
     def _reads(self, visit: Visit) -> bool:
         """Whether one of the outputs is read that the component computes."""
