@@ -1,17 +1,4 @@
-"""The stages of a communication step, as the loops make them.
-
-In `feedthrough` order values pass first, then all components are stepped. Rings of feedthroughs
-that are solved are closed where values come to them.
-
-In other orders such rings have stages of their own. Each is closed before its components are
-stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds it,
-and again when all have been stepped: every row shows its solution.
-
-A component may span n communication steps in one step. It is stepped at every n-th t_k, with
-the inputs of that time, which it holds. What it computes waits in hidden columns of the row until
-the time has come that it belongs to. Outputs with direct feedthrough hold from t_k on: they are
-shown when they pass, or as soon as the component was stepped, unless the order is `jacobi`.
-"""
+"""The stages of a communication step, as the loops make them."""
 
 from __future__ import annotations
 
@@ -23,18 +10,37 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
-from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
+from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
 from orchestrator.master.fmi.surroundings import PRODUCT, A, B, C, restore_mode
 from orchestrator.master.fmi.transfer import CMember, CMove, DoStepCallback, address_of
-from orchestrator.master.plan import Plan, gathered_connections
+from orchestrator.master.plan import Plan
 from orchestrator.master.ring import Ring
 from orchestrator.master.row import Gathering, Row
+from orchestrator.master.stages import (
+    ALL,
+    CHECK,
+    DIRECT,
+    ONLY_STATES,
+    RENEW,
+    RENEW_ALWAYS,
+    Close,
+    Closing,
+    Decimation,
+    Reads,
+    Visit,
+    stages_of,
+)
+from orchestrator.master.stages import Stage as StageByNames
 from orchestrator.system.component import Component
-from orchestrator.system.connection import Connection
-from orchestrator.system.graph import delayed_connections
-from orchestrator.system.names import PortName
 from orchestrator.system.values import TYPES
+
+#: What closes a ring.
+_CLOSES: Mapping[Closing, Callable[[Ring], object]] = {
+    CHECK: Ring.check,
+    RENEW: Ring.renew,
+    RENEW_ALWAYS: partial(Ring.renew, always=True),
+}
 
 
 class Member(NamedTuple):
@@ -92,24 +98,6 @@ class StageCall:
         return int(fmi2OK)
 
 
-class Decimation(NamedTuple):
-    """When a slow component is stepped, or its outputs are shown.
-
-    Attributes:
-        every: how many communication steps one of its steps spans.
-        at_end: whether in the last of them, not in the first.
-
-    """
-
-    every: int
-    at_end: bool = False
-
-    def is_due(self, k: int, steps: int) -> bool:
-        """Whether in the communication step after the k-th of so many, or at the end of all."""
-        k += self.at_end
-        return k % self.every == 0 or k == steps
-
-
 class Stage(NamedTuple):
     """Inputs to gather, and the components to step then.
 
@@ -123,11 +111,6 @@ class Stage(NamedTuple):
     gather: Gathering
     members: list[Member]
     decimation: Decimation | None = None
-
-    @property
-    def acts(self) -> bool:
-        """Whether there is anything to do."""
-        return bool(self.members) or self.gather.acts
 
 
 class Schedule(NamedTuple):
@@ -169,137 +152,30 @@ def schedule(
         latest: whether stages take all that those before them have computed.
 
     """
-    system, order, decimation = plan.system, plan.experiment.order, plan.decimations
-    assert order is not None
-    gathers = gathered_connections(
-        system, sequence, [ring.names for ring in rings], order, latest=latest
-    )
     ring_of = {ring.names[0]: ring for ring in rings}
-    if order == FEEDTHROUGH:
-        return _passing_first(plan, sequence, gathers, instances, row, ring_of)
-    renewed = [Stage(Gathering.along(row, ()), [_action(ring.renew)]) for ring in rings]
-    found: list[Stage] = []
-    shown: list[Stage] = []
-    nothing = Gathering.along(row, ())
-    for names, connections in zip(sequence, gathers, strict=True):
-        slow, gathering = _gatherings(connections, decimation, row)
-        found += slow
-        fast = Stage(
-            gathering, [member(instances[name]) for name in names if decimation[name] == 1]
-        )
-        here = [ring_of[name] for name in names if name in ring_of]
-        if here:
-            # All are stepped before one takes what another has come to.
-            checked = Stage(fast.gather, [_action(ring.check) for ring in here])
-            found += [checked, Stage(nothing, fast.members)]
-            if order != JACOBI:
-                found.append(Stage(nothing, [_action(partial(ring.renew, True)) for ring in here]))
-        else:
-            found.append(fast)
-        for name in names:
-            if (n := decimation[name]) > 1:
-                early, later = (
-                    Gathering(*row.hidden(ports))
-                    for ports in _shown(system.components[name], order)
-                )
-                found += [
-                    Stage(nothing, [member(instances[name])], Decimation(n)),
-                    Stage(early, [], Decimation(n)),
-                ]
-                shown.append(Stage(later, [], Decimation(n, at_end=True)))
-    found += shown + renewed
-    return Schedule([stage for stage in found if stage.acts])
 
+    def linked(visit: Visit | Close) -> Member:
+        if isinstance(visit, Close):
+            close, ring = _CLOSES[visit.how], ring_of[visit.ring[0]]
+            return StageCall(lambda _t, _h: close(ring)).member
+        return _visiting(visit, instances[visit.component], plan.system.components[visit.component])
 
-def _passing_first(
-    plan: Plan,
-    sequence: Sequence[Sequence[str]],
-    gathers: Sequence[Sequence[Connection]],
-    instances: Mapping[str, Instance],
-    row: Row,
-    ring_of: Mapping[str, Ring],
-) -> Schedule:
-    """The stages in feedthrough order, with each ring by its first component."""
-    components, decimation = plan.system.components, plan.decimations
-    nothing = Gathering.along(row, ())
-    outputs = {
-        name: [PortName(name, output.name) for output in component.having("output")]
-        for name, component in components.items()
-    }
-    direct = {
-        name: [port for port in ports if components[name].has_feedthrough(port.port)]
-        for name, ports in outputs.items()
-    }
-    reads = {name: _reads(instances[name], component) for name, component in components.items()}
-    rings = [ring.names for ring in ring_of.values()]
-    ringed = {name for names in rings for name in names}
-    passing: list[Stage] = []
-    for names, connections in zip(sequence, gathers, strict=True):
-        slow, gathering = _gatherings(
-            [one for one in connections if one.target.component not in ringed], decimation, row
-        )
-        through = [name for name in names if direct[name] and name not in ringed]
-        fast = [_passed(instances[name], reads[name]) for name in through if decimation[name] == 1]
-        passing += [*slow, Stage(gathering, fast)]
-        for name in through:
-            if (n := decimation[name]) > 1:
-                passing += [
-                    Stage(nothing, [_passed(instances[name], reads[name])], Decimation(n)),
-                    Stage(Gathering(*row.hidden(direct[name])), [], Decimation(n)),
-                ]
-        passing += [
-            Stage(nothing, [_action(partial(ring_of[name].renew, True))])
-            for name in names
-            if name in ring_of
+    def all_linked(found: Sequence[StageByNames]) -> list[Stage]:
+        return [
+            Stage(
+                Gathering(*row.hidden(stage.shows))
+                if stage.shows
+                else Gathering.along(row, stage.connections),
+                list(map(linked, stage.visits)),
+                stage.decimation,
+            )
+            for stage in found
         ]
-    place = {name: i for i, names in enumerate(sequence) for name in names}
-    early = {
-        one.source.component
-        for one in plan.system.connections
-        if place[one.source.component] >= place[one.target.component]
-    }
-    late = {one.source.component for one in delayed_connections(plan.system, [*place], rings)}
-    stepping: list[Stage] = []
-    later: list[Stage] = []
-    for n in sorted(set(decimation.values())):
-        here = [name for name in place if decimation[name] == n]
-        members = [
-            _stepped(instances[name], reads[name], name in early or n > 1, name in late)
-            if direct[name]
-            else member(instances[name])
-            for name in here
-        ]
-        stepping.append(Stage(nothing, members, Decimation(n) if n > 1 else None))
-        if n > 1:
-            ports = [port for name in here for port in outputs[name]]
-            later.append(Stage(Gathering(*row.hidden(ports)), [], Decimation(n, at_end=True)))
-    return Schedule(*([one for one in all_ if one.acts] for all_ in (stepping + later, passing)))
 
-
-def _gatherings(
-    connections: Sequence[Connection], decimation: Mapping[str, int], row: Row
-) -> tuple[list[Stage], Gathering]:
-    """What components that take longer steps gather, and the others, before any is stepped."""
-    taken: dict[int, list[Connection]] = {1: []}
-    for connection in connections:
-        taken.setdefault(decimation[connection.target.component], []).append(connection)
-    fast = Gathering.along(row, taken.pop(1))
-    return [Stage(Gathering.along(row, some), [], Decimation(n)) for n, some in taken.items()], fast
-
-
-def _action(act: Callable[[], object]) -> Member:
-    """A member that does something that needs no time."""
-    return StageCall(lambda _t, _h: act()).member
-
-
-def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:
-    """The outputs of a slow component: those shown when it was stepped, and the others."""
-    early: list[PortName] = []
-    later: list[PortName] = []
-    for output in component.having("output"):
-        at_once = order != JACOBI and component.has_feedthrough(output.name)
-        (early if at_once else later).append(PortName(component.name, output.name))
-    return early, later
+    found = stages_of(plan, sequence, [ring.names for ring in rings], latest=latest)
+    return Schedule(
+        all_linked(found.stepping), None if found.passing is None else all_linked(found.passing)
+    )
 
 
 def member(instance: Instance) -> Member:
@@ -307,61 +183,29 @@ def member(instance: Instance) -> Member:
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
-class Reads(NamedTuple):
-    """The calls that read the outputs of a component, each all of a type.
-
-    Attributes:
-        direct: of a type that has outputs with direct feedthrough.
-        states: of one that has others.
-
-    """
-
-    direct: list[Callable[[], int]]
-    states: list[Callable[[], int]]
-
-
-def _reads(instance: Instance, component: Component) -> Reads:
-    """How the outputs of a component are read."""
-    calls = instance.get_outputs
-    if not instance.is_here:
-        # The answer of another process has to be taken.
-        return Reads(calls, calls)
-    outputs = component.having("output")
-    types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
-    kinds = {(one.type, component.has_feedthrough(one.name)) for one in outputs}
-    return Reads(
-        *(
-            [call for call, of in zip(calls, types, strict=True) if (of, is_direct) in kinds]
-            for is_direct in (True, False)
-        )
+def _visiting(visit: Visit, instance: Instance, component: Component) -> Member:
+    """The calls that do what a component does in a stage."""
+    return Member(
+        instance.set_inputs if visit.takes else [],
+        instance.do_step if visit.steps else instance.do_exchange,
+        _reading(visit.reads, instance, component),
+        instance,
     )
 
 
-def _passed(instance: Instance, reads: Reads) -> Member:
-    """The calls that let values pass through an instance."""
-    return Member(instance.set_inputs, instance.do_exchange, reads.direct, instance)
-
-
-def _stepped(instance: Instance, reads: Reads, is_early: bool, is_late: bool) -> Member:
-    """The calls that step an instance which has its inputs already.
-
-    What is read when values pass is read here too if something takes it before. Whatever takes an
-    output with direct feedthrough then, takes what follows from the inputs of this step.
-
-    Args:
-        instance: to step.
-        reads: how its outputs are read.
-        is_early: whether something takes outputs before they pass.
-        is_late: whether outputs with direct feedthrough are among these.
-
-    """
-    if is_late:
-        outputs = instance.get_outputs
-    elif is_early or not instance.is_here:
-        outputs = reads.states
-    else:
-        outputs = [call for call in reads.states if call not in reads.direct]
-    return Member([], instance.do_step, outputs, instance)
+def _reading(reads: Reads, instance: Instance, component: Component) -> list[Callable[[], int]]:
+    """The calls that read some outputs of a component, each all of a type."""
+    # The answer of another process has to be taken.
+    if reads == ALL or not instance.is_here:
+        return instance.get_outputs
+    outputs = component.having("output")
+    types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
+    kinds = {(one.type, component.has_feedthrough(one.name)) for one in outputs}
+    return [
+        call
+        for call, of in zip(instance.get_outputs, types, strict=True)
+        if (of, reads == DIRECT) in kinds and not (reads == ONLY_STATES and (of, True) in kinds)
+    ]
 
 
 def make_stages(

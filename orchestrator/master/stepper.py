@@ -20,7 +20,8 @@ from orchestrator.master.fmi.instance import CALLS
 from orchestrator.master.fmi.transfer import CMember, CMove
 from orchestrator.master.hooks.hook import Run
 from orchestrator.master.observers.observer import CBlock
-from orchestrator.master.schedule import Decimation, Member, Stage
+from orchestrator.master.schedule import Member, Stage
+from orchestrator.master.stages import Decimation
 
 SOURCE = Path(__file__).with_name("stepper.c")
 

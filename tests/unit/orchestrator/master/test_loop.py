@@ -13,7 +13,8 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.fmi.isolated import Isolation
 from orchestrator.master.loop import PYTHON_LOOP, choose_loop, step_interpreted
 from orchestrator.master.row import Gathering
-from orchestrator.master.schedule import Decimation, Stage, StageCall
+from orchestrator.master.schedule import Stage, StageCall
+from orchestrator.master.stages import Decimation
 
 SHORT, LONG = Experiment(10.0, 1.0), Experiment(1e6, 1.0)
 

@@ -1,4 +1,4 @@
-"""The calls of a stage, and when slow components are stepped and shown."""
+"""The calls of a stage, and what of a component is read."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from orchestrator.master.experiment import Experiment
 from orchestrator.master.plan import make_plan, stages
 from orchestrator.master.row import Row
 from orchestrator.master.schedule import (
-    Decimation,
     Member,
     Stage,
     StageCall,
@@ -20,13 +19,6 @@ from orchestrator.master.schedule import (
     step_members,
 )
 from support.relay import relay, system_of
-
-
-def test_a_slow_component_is_stepped_at_the_beginning_and_shown_at_the_end():
-    begins, ends = Decimation(3), Decimation(3, at_end=True)
-    assert [k for k in range(8) if begins.is_due(k, 8)] == [0, 3, 6]
-    # Also where the run ends within its step.
-    assert [k for k in range(8) if ends.is_due(k, 8)] == [2, 5, 7]
 
 
 def test_in_feedthrough_order_each_value_is_moved_as_often_as_it_is_needed(tmp_path):
