@@ -1,0 +1,149 @@
+"""The components of a system as their authors wrote them, found by their FMUs.
+
+An FMU of the bundle is known by its text. One of a user's own says which script it was built from:
+that must be there, and unchanged.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from fmus.discovery import ORIGIN, Origin, components, digest_at, name_of, origin_of, source_of
+from fmus.kinds import NATIVE, PYTHON
+from fmus.language.build import Untranslatable
+from fmus.native.translator import translated
+from fmus.ports.definition import Definition, define
+from fmus.ports.port import Misdeclared
+from fmus.script import is_component
+from orchestrator.machine.errors import InputError, reason, shortened
+from orchestrator.machine.ledger import sha256_of
+from orchestrator.runs.bundle import current_fmus
+from orchestrator.system.component import Component
+from orchestrator.system.structure import System
+
+#: Where a native FMU has its equations.
+_EQUATIONS = Path("sources", "equations.c")
+
+#: The files of users' modules and their digests, by the names of the modules.
+_loaded: dict[str, tuple[Path, str | None]] = {}
+
+
+def definitions_of(system: System) -> dict[str, Definition]:
+    """The definitions of all components, by their names.
+
+    Raises:
+        InputError: one is not in the language of equations, or what its FMU was built from is not
+            there; the text says which, and why.
+
+    """
+    found: dict[str, Definition] = {}
+    known: dict[str, Definition] = {}
+    for name, component in system.components.items():
+        if component.digest not in known:
+            try:
+                known[component.digest] = _definition(component)
+            except Untranslatable as error:
+                first = str(error).splitlines()[0]
+                raise InputError(f"{name}: is not in the language of equations: {first}") from None
+            except (Misdeclared, InputError) as error:
+                raise InputError(f"{name}: {error}") from None
+        found[name] = known[component.digest]
+    return found
+
+
+def _definition(component: Component) -> Definition:
+    """The definition that an FMU was made from.
+
+    Raises:
+        InputError: there is none, or it has changed.
+        Misdeclared, Untranslatable: it is none any more.
+
+    """
+    model = str(component.description.modelName)
+    if component.is_ours:
+        record = component.folder / ORIGIN
+        if record.is_file() and (origin := origin_of(record.read_bytes())):
+            return _own(component, origin)
+        if model in components():
+            definition = source_of(model).definition
+            if _is_made_from(component, definition):
+                return definition
+            raise InputError(
+                f"{component.fmu.name} was built by another version of auv-fmu: build it again"
+            )
+    raise InputError(f"{component.fmu.name} is no component in the language of equations")
+
+
+def _is_made_from(component: Component, definition: Definition) -> bool:
+    """Whether an FMU of the bundle has the equations of a definition."""
+    equations = component.folder / _EQUATIONS
+    kind = NATIVE if equations.is_file() else PYTHON
+    if component.digest == sha256_of(current_fmus(kind) / f"{definition.name}.fmu"):
+        return True
+    # One for other platforms, or another version of FMI.
+    return kind == NATIVE and equations.read_text(encoding="utf-8") == translated(definition)
+
+
+def _own(component: Component, origin: Origin) -> Definition:
+    """The definition of a component of the user's own.
+
+    Raises:
+        InputError: its script is not there, has changed, or is no component.
+
+    """
+    fmu = component.fmu
+    script = origin.place(fmu) / origin.script
+    if not script.is_file():
+        raise InputError(
+            f"{fmu.name} was built from {origin.script}, which is not there: a program is made "
+            "from the script of a component"
+        )
+    if changed := origin.changed(fmu):
+        names = shortened(", ".join(path.name for path in changed))
+        raise InputError(f"{names} has changed since {fmu.name} was built: build it again")
+    if not is_component(script):
+        raise InputError(
+            f"{script.name} is a slave of PythonFMU, and not in the language of equations"
+        )
+    return define(name_of(script.stem), load(script))
+
+
+def load(script: Path) -> ModuleType:
+    """Load a user's module, from its text, with those beside it that it imports.
+
+    Raises:
+        InputError: it fails, or its name is that of a module of Python.
+
+    """
+    folder, name = script.resolve().parent, script.stem
+    _forget_others(folder)
+    if name in sys.modules and name not in _loaded:
+        raise InputError(f"{name} is already a module of Python; choose another name")
+    importlib.invalidate_caches()
+    writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
+    sys.path.insert(0, str(folder))
+    try:
+        module = importlib.import_module(name)
+    except Exception as error:
+        raise InputError(f"{script.name} cannot be loaded: {reason(error)}") from error
+    finally:
+        sys.path.remove(str(folder))
+        sys.dont_write_bytecode = writes
+        for other, found in [*sys.modules.items()]:
+            file = getattr(found, "__file__", None)
+            if file is not None and other not in _loaded and folder in Path(file).parents:
+                _loaded[other] = Path(file), digest_at(Path(file))
+    return module
+
+
+def _forget_others(folder: Path) -> None:
+    """Forget modules that have changed, and those of other folders with names that one has."""
+    for name, (path, digest) in [*_loaded.items()]:
+        top = folder / name.partition(".")[0]
+        is_other = folder not in path.parents and (top.is_dir() or top.with_suffix(".py").is_file())
+        if is_other or digest_at(path) != digest:
+            del _loaded[name]
+            sys.modules.pop(name, None)
