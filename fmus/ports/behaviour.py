@@ -8,7 +8,7 @@ that it needs, under their names and in any order. All of it is in the language 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from difflib import get_close_matches
 from inspect import signature
 from math import isfinite
@@ -129,7 +129,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     """
     where, said = module.__name__, vars(module)
     hooks = _hooks(module)
-    hints = {name: _types(f"{where}.{name}", hook) for name, hook in hooks.items()}
+    hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     outputs = hints["outputs"]["return"]
     if not is_record(outputs):
         raise Misdeclared(
@@ -143,10 +143,10 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     for name, found in hints.items():
         if name not in ("outputs", "measured"):
             wanted = _RETURNS[name] if name in _RETURNS else types[_SAME[name]]
-            _check_same(where, name, "return", found["return"], wanted)
+            check_same(where, name, "return", found["return"], wanted)
         for argument, hint in found.items():
             if argument not in ("return", *noisy) and (name, argument) != ("measured", "n"):
-                _check_same(where, name, argument, hint, types[argument])
+                check_same(where, name, argument, hint, types[argument])
     for argument, hint in {**types, "outputs": outputs}.items():
         takes = [name for name, found in hints.items() if argument in (name, *found)]
         if argument in _CLASSES.values() and not is_record(hint):
@@ -167,9 +167,9 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
         _message(where, said.get("RESTARTED", "")),
         said.get("SAMPLED", False),
-        _seconds(said, "H_MAX", None),
-        _seconds(said, "STEP_SIZE", 0.02),
-        _seconds(said, "STOP_TIME", 100.0),
+        seconds_in(said, "H_MAX", None),
+        seconds_in(said, "STEP_SIZE", 0.02),
+        seconds_in(said, "STOP_TIME", 100.0),
     )
     _check_constants(where, behaviour)
     return behaviour
@@ -185,7 +185,7 @@ def _check_constants(where: str, behaviour: Behaviour) -> None:
         raise Misdeclared(f"{where} has H_MAX, but no update", "outputs")
 
 
-def _seconds(said: Mapping[str, Any], name: str, default: Any) -> Any:
+def seconds_in(said: Mapping[str, Any], name: str, default: Any) -> Any:
     """A time that a component states."""
     found = said.get(name, default)
     is_number = isinstance(found, (float, int)) and not isinstance(found, bool)
@@ -207,8 +207,7 @@ def _hooks(module: ModuleType) -> dict[str, FunctionType]:
     for name, value in said.items():
         if name in HOOKS and not isinstance(value, FunctionType):
             raise Misdeclared(f"{where}.{name} is no function, but has the name of a hook", name)
-    for name, hook in _misspelt(module):
-        raise Misdeclared(f"{where}.{name} is called by no function here; is it {hook}?", name)
+    check_spelling(module, HOOKS)
     return {name: said[name] for name in HOOKS if name in said}
 
 
@@ -230,7 +229,7 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
         raise Misdeclared(f"{where}.measured {why}", "measured")
     found = hints["measured"]
     for name in (*noisy, "return"):
-        _check_same(where, "measured", name, found[name], groups[noisy[0]])
+        check_same(where, "measured", name, found[name], groups[noisy[0]])
     check_type(found.get("n", float), "measured", "n")
     if "n" not in found or {*scalars_of(found["n"])} != {float}:
         drawn = word(form(found["n"])) if "n" in found else "nothing"
@@ -250,7 +249,7 @@ def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     return {**types, **_ARGUMENTS}
 
 
-def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:
+def check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:
     """Refuse an argument, or a result, of another type than it has everywhere else."""
     if form(hint) != form(wanted):
         takes = "returns" if argument == "return" else f"takes {argument} as"
@@ -258,16 +257,18 @@ def _check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) ->
         raise Misdeclared(f"{where}.{name} {why}", name, argument)
 
 
-def _misspelt(module: ModuleType) -> Iterator[tuple[str, str]]:
-    """Functions that nothing calls and that have nearly the name of a hook, with that name."""
+def check_spelling(module: ModuleType, hooks: Collection[str]) -> None:
+    """Refuse a function that nothing calls and that has nearly the name of a hook."""
     own = {
         name: value
         for name, value in vars(module).items()
         if isinstance(value, FunctionType) and value.__module__ == module.__name__
     }
     used = {name for function in own.values() for name in _names_in(function.__code__)}
-    for name in own.keys() - HOOKS.keys() - used:
-        yield from ((name, hook) for hook in get_close_matches(name, HOOKS, 1, 0.75))
+    for name in own.keys() - {*hooks} - used:
+        for hook in get_close_matches(name, hooks, 1, 0.75):
+            why = f"is called by no function here; is it {hook}?"
+            raise Misdeclared(f"{module.__name__}.{name} {why}", name)
 
 
 def _names_in(code: CodeType) -> Iterator[str]:
@@ -294,7 +295,7 @@ def _message(where: str, text: Any) -> str:
     return str(text)
 
 
-def _types(where: str, hook: FunctionType) -> dict[str, Any]:
+def types_of_hook(where: str, hook: FunctionType) -> dict[str, Any]:
     """The types of a hook's arguments and of what it returns."""
     try:
         hints = hints_of(hook)

@@ -7,7 +7,8 @@ needs some of them; `Table.missing` tells which a run does not have.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import inf
 
 import numpy as np
 
@@ -90,6 +91,17 @@ class Loop:
         """The parameter ell [m]: how far the control point lies ahead of the centre of mass."""
         return f"{self.vehicle}.ell"
 
+    def port(self, name: str) -> str:
+        """The name here of a signal or parameter, from its name in the standard loop."""
+        component, _, port = name.partition(".")
+        role = _ROLES.get(component)
+        return f"{getattr(self, role)}.{port}" if role else name
+
+    @property
+    def implied(self) -> Mapping[str, float]:
+        """Parameters whose values follow from what the loop is, by their names in the standard."""
+        return {}
+
     def drawn(self) -> tuple[str, ...]:
         """All signals that stand in figures."""
         return (
@@ -134,9 +146,23 @@ class AllocatedLoop(Loop):
 
     commanded = _Group("allocation", "tau", ACTUATORS)
 
+    def port(self, name: str) -> str:
+        """The name here of a signal or parameter, from its name in the standard loop."""
+        if name in STANDARD.commanded:
+            return f"{self.allocation}.{name.partition('.')[2]}"
+        return super().port(name)
+
+    @property
+    def implied(self) -> Mapping[str, float]:
+        """What gives the applied signal has a state, as an actuator with a lag has."""
+        return {f"plant.actuator.T.{actuator}": inf for actuator in ACTUATORS}
+
 
 #: The loop of closed_loop.toml, the paper's Fig. 2.
 STANDARD = Loop()
+
+#: What components are in a loop, by their names in the standard one.
+_ROLES = {getattr(STANDARD, one.name): one.name for one in fields(STANDARD)}
 
 
 def loop_of(names: Mapping[str, str]) -> Loop:

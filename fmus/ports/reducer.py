@@ -1,0 +1,123 @@
+"""What an index may say: how a run is reduced to some numbers, row by row.
+
+An index looks on: it takes what components give, and gives nothing to them. It has the form of
+a component, and all of it is in the language of equations. A row of a run is an instance of its
+`Inputs`, whose ports have the names of signals and parameters of the run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from inspect import signature
+from itertools import chain
+from types import FunctionType, ModuleType
+from typing import Any, NamedTuple
+
+from fmus.ports.behaviour import check_same, check_spelling, seconds_in, types_of_hook
+from fmus.ports.fields import declared
+from fmus.ports.groups import Nothing, check_type, form, is_record, word
+from fmus.ports.port import Misdeclared, Port, Value
+
+#: The functions of an index, and the arguments that each may take: `inputs` is the row that a step
+#: ends with, or that of the start; `before` the one that it begins with; `acting` the one of the
+#: two in which what acts in the step stands; `t` the time of `inputs`, `h` the length of the step,
+#: `begin` and `end` the start of the run and its planned end [s].
+HOOKS: Mapping[str, tuple[str, ...]] = {
+    "start": ("inputs", "t", "begin", "end"),
+    "update": ("state", "inputs", "before", "acting", "t", "h", "begin", "end"),
+    "outputs": ("state", "t", "begin", "end"),
+}
+
+#: Arguments that are rows.
+ROWS = ("inputs", "before", "acting")
+
+
+class Reducer(NamedTuple):
+    """An index, or several that are made of the same.
+
+    Attributes:
+        name: of its module.
+        hooks: by name.
+        inputs, state, outputs: types that they take and return.
+        ports: of the inputs; their names are those of signals or parameters.
+        defaults: of those that a run may lack, by name.
+        results: the outputs, as ports; a value that is not a number is not there.
+        last: only the rows of so many seconds before the end of the run count [s]; None: all.
+
+    """
+
+    name: str
+    hooks: Mapping[str, FunctionType]
+    inputs: Any
+    state: Any
+    outputs: Any
+    ports: tuple[Port, ...]
+    defaults: Mapping[str, Value]
+    results: Mapping[str, tuple[Port, ...]]
+    last: float | None
+
+    def arguments(self, name: str) -> tuple[str, ...]:
+        """The arguments of a hook, in its own order."""
+        return tuple(signature(self.hooks[name]).parameters)
+
+
+def read_reducer(module: ModuleType) -> Reducer:
+    """What the hooks of an index say.
+
+    Raises:
+        Misdeclared: it is none.
+
+    """
+    where, said = module.__name__, vars(module)
+    check_spelling(module, HOOKS)
+    for name in HOOKS:
+        if not isinstance(said.get(name), FunctionType):
+            raise Misdeclared(f"{where} has no function {name}; an index has {', '.join(HOOKS)}")
+    hooks: dict[str, FunctionType] = {name: said[name] for name in HOOKS}
+    hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
+    types = _types(where, hints)
+    inputs = declared(types["inputs"], "input")
+    results = declared(types["outputs"], "output")
+    ports = tuple(chain(*inputs.values()))
+    for port in chain(*results.values()):
+        if port.type != "Real":
+            place = (types["outputs"].__name__, port.name)
+            raise Misdeclared(f"{'.'.join(place)} is no float, as every index is", *place)
+    optional = chain(*(inputs[field] for field in types["inputs"]._field_defaults))
+    return Reducer(
+        where.rpartition(".")[2],
+        hooks,
+        types["inputs"],
+        types["state"],
+        types["outputs"],
+        ports,
+        {port.name: port.start for port in optional if port.start is not None},
+        results,
+        seconds_in(said, "LAST", None),
+    )
+
+
+def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """The types of inputs, state and outputs, if all hooks agree on them."""
+    rows = (hint for found in hints.values() for name, hint in found.items() if name in ROWS)
+    types = {
+        "inputs": next(rows, Nothing),
+        "state": hints["start"]["return"],
+        "outputs": hints["outputs"]["return"],
+    }
+    for name, found in hints.items():
+        for argument, hint in found.items():
+            if argument == "return":
+                wanted = types["outputs" if name == "outputs" else "state"]
+            elif argument not in HOOKS[name]:
+                why = f"{argument}, which is not one of {', '.join(HOOKS[name])}"
+                raise Misdeclared(f"{where}.{name} takes {why}", name, argument)
+            else:
+                wanted = types.get("inputs" if argument in ROWS else argument, float)
+            check_same(where, name, argument, hint, wanted)
+    for name, hint in types.items():
+        if not is_record(hint):
+            why = f"has {name} of the type {word(form(hint))}; write a NamedTuple"
+            raise Misdeclared(f"{where} {why}", name)
+        check_type(hint, name)
+    return types

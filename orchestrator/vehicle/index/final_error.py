@@ -1,0 +1,47 @@
+"""How far from its reference the control point is at the end: e_f of section 4.2."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+from auv_fmu.language.quantities import POSITION
+from auv_fmu.language.vectors import Vector3
+from orchestrator.vehicle.index.tracking import Inputs, error
+
+#: T_L [s].
+LAST = 5.0
+
+
+class State(NamedTuple):
+    """Of the rows of these seconds."""
+
+    largest: Vector3
+
+
+class Outputs(NamedTuple):
+    """e_f."""
+
+    final_error: Annotated[
+        Vector3,
+        Variable(POSITION, f"e_f: largest absolute value of e in the last {LAST:g} s"),
+    ]
+
+
+def start(inputs: Inputs) -> State:
+    """The first of these rows."""
+    x, y, z = error(inputs)
+    return State((abs(x), abs(y), abs(z)))
+
+
+def update(state: State, inputs: Inputs) -> State:
+    """One more row."""
+    l_x, l_y, l_z = state.largest
+    x, y, z = error(inputs)
+    return State((max(l_x, abs(x)), max(l_y, abs(y)), max(l_z, abs(z))))
+
+
+def outputs(state: State, t: float, begin: float) -> Outputs:
+    """The largest errors; before the first step nothing has been followed."""
+    return Outputs(state.largest if t > begin else (nan, nan, nan))

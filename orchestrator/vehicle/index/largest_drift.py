@@ -1,0 +1,52 @@
+"""How fast the vehicle moves where nothing is commanded."""
+
+from __future__ import annotations
+
+from math import sqrt
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+from auv_fmu.language.quantities import NU
+
+
+class Inputs(NamedTuple):
+    """Sway and heave."""
+
+    drift: Annotated[
+        tuple[float, float], Variable({"v": NU["v"], "w": NU["w"]}, "Velocity", name="plant.nu")
+    ]
+
+
+class State(NamedTuple):
+    """Of all rows so far."""
+
+    largest: float
+
+
+class Outputs(NamedTuple):
+    """The speed."""
+
+    largest_drift: Annotated[
+        float, Variable("m/s", "largest speed of sway and heave, |(v, w)| (Assumption 1)")
+    ]
+
+
+def speed(inputs: Inputs) -> float:
+    """|(v, w)| [m/s]."""
+    v, w = inputs.drift
+    return sqrt(v * v + w * w)
+
+
+def start(inputs: Inputs) -> State:
+    """The row of the start."""
+    return State(speed(inputs))
+
+
+def update(state: State, inputs: Inputs) -> State:
+    """One more row."""
+    return State(max(state.largest, speed(inputs)))
+
+
+def outputs(state: State) -> Outputs:
+    """The speed."""
+    return Outputs(state.largest)

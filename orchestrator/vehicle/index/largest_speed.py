@@ -1,0 +1,42 @@
+"""How fast the control point moves."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+from auv_fmu.language.quantities import VELOCITY
+from auv_fmu.language.vectors import Vector3, norm
+
+
+class Inputs(NamedTuple):
+    """The velocity of the control point."""
+
+    dy: Annotated[Vector3, Variable(VELOCITY, "Velocity", name="plant.dy")]
+
+
+class State(NamedTuple):
+    """Of all rows so far."""
+
+    largest: float
+
+
+class Outputs(NamedTuple):
+    """The speed."""
+
+    largest_speed: Annotated[float, Variable("m/s", "largest speed of the control point, |dy|")]
+
+
+def start(inputs: Inputs) -> State:
+    """The row of the start."""
+    return State(norm(inputs.dy))
+
+
+def update(state: State, inputs: Inputs) -> State:
+    """One more row."""
+    return State(max(state.largest, norm(inputs.dy)))
+
+
+def outputs(state: State) -> Outputs:
+    """The speed."""
+    return Outputs(state.largest)

@@ -1,0 +1,48 @@
+"""How much the controller asks for."""
+
+from __future__ import annotations
+
+from math import nan
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+from auv_fmu.language.quantities import TAU
+from auv_fmu.language.vectors import Vector3
+
+
+class Inputs(NamedTuple):
+    """The commanded signal."""
+
+    command: Annotated[Vector3, Variable(TAU, "Commanded signal", name="plant.tau")]
+
+
+class State(NamedTuple):
+    """Of all steps so far."""
+
+    peak: Vector3
+    steps: int
+
+
+class Outputs(NamedTuple):
+    """The peak."""
+
+    peak_command: Annotated[
+        Vector3, Variable(TAU, "largest absolute value of the commanded signal")
+    ]
+
+
+def start() -> State:
+    """No step yet."""
+    return State((0.0, 0.0, 0.0), 0)
+
+
+def update(state: State, acting: Inputs) -> State:
+    """One more step."""
+    p_u, p_q, p_r = state.peak
+    u, q, r = acting.command
+    return State((max(p_u, abs(u)), max(p_q, abs(q)), max(p_r, abs(r))), state.steps + 1)
+
+
+def outputs(state: State) -> Outputs:
+    """The peak, if there was a step."""
+    return Outputs(state.peak if state.steps > 0 else (nan, nan, nan))
