@@ -27,6 +27,7 @@ from fmus.ports.port import H_MAX, Port
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL
 from orchestrator.master.plan import Plan, stages
+from orchestrator.program.reducing import Looking, ReducerText
 from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Visit, stages_of
 from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
@@ -377,11 +378,13 @@ class Text:
     Attributes:
         plan: of the run that it makes.
         definitions: of its components, by their names.
+        indices: that look on.
 
     """
 
     plan: Plan
     definitions: Mapping[str, Definition]
+    indices: Sequence[Looking] = ()
     mappings: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -398,6 +401,7 @@ class Text:
         program = Program(
             *(hook for one in kinds for hook in hooks[one].values() if hook),
             *_EULER,
+            *(hook for one in self.indices for hook in one.reducer.hooks.values()),
         )
         program.check()
         self.emitter = Emitter(program.functions.values())
@@ -410,6 +414,12 @@ class Text:
                 {one.__name__: program.function(one) for one in _EULER},
             )
             for one in kinds
+        }
+        self.reducers = {
+            key: ReducerText(
+                one, program, self.emitter, self.emitter.unused(f"{_lower(one.name)}_index")
+            )
+            for key, one in {id(one.reducer): one.reducer for one in self.indices}.items()
         }
         self.members = dict(zip(self.components, _distinct(self.components)))
         self.slow = {name for name, n in self.plan.decimations.items() if n > 1}
@@ -489,11 +499,13 @@ class Text:
             _CHECKS.strip(),
             *([_DRAWING.strip()] if is_noisy else []),
             *kinds,
+            *(part for one in self.reducers.values() for part in one.text()),
             self._simulation(),
             _TIMES.strip(),
             *self.mappings,
             self._begin(),
             self._show(),
+            *self._look(),
             *steps,
         ]
         return "\n\n".join(parts) + "\n"
@@ -507,6 +519,11 @@ class Text:
             for name in self.components
             if name in self.slow
         ]
+        rows += [
+            f"{self.reducers[id(one.reducer)].name} index_{i};" for i, one in enumerate(self.indices)
+        ]
+        if self.indices:
+            rows.append("double looked; /* when the last row was looked at [s] */")
         body = "\n".join(f"    {row}" for row in rows)
         calls = ", ".join(CALLS)
         return (
@@ -666,6 +683,47 @@ class Text:
         head = "static void show(const simulation *it, double t, double row[]) {\n    row[0] = t;"
         return "\n".join(["/* A row: the time, and all inputs and outputs. */", head, *lines, "}"])
 
+    def _look(self) -> list[str]:
+        """What looks at a row, and what gives the indices at the end."""
+        if not self.indices:
+            return []
+        acts_at_end = int(self.plan.experiment.acting_row)
+        lines, gives, n = [], [], 0
+        for i, (reducer, sources) in enumerate(self.indices):
+            text = self.reducers[id(reducer)]
+            of = dict(zip((port.name for port in reducer.ports), sources, strict=True))
+            row = text.row(lambda port: self._source(of[port.name]))
+            look = (
+                f"{text.name}_look(&it->index_{i}, {row}, {acts_at_end}, t, h, it->start_time, "
+                "it->stop_time);"
+            )
+            if reducer.last is not None:
+                last = number_in_c(reducer.last)
+                look = f"if (t >= time_after(it, it->steps) - {last}) {look}"
+            lines.append(look)
+            gives.append(
+                f"{text.name}_give(&it->index_{i}, it->looked, it->start_time, it->stop_time, "
+                f"found + {n});"
+            )
+            n += sum(map(len, reducer.results.values()))
+        return [
+            "/* Lets indices look at a row. */\n"
+            "static void look(simulation *it, double t) {\n"
+            "    const double h = t - it->looked;\n"
+            + "".join(f"    {line}\n" for line in lines)
+            + "    it->looked = t;\n}",
+            f"enum {{ INDICES = {n} }};\n\n"
+            "/* The indices of the rows so far; what is not there is not a number. */\n"
+            "EXPORTED void indices(const simulation *it, double found[]) {\n"
+            + "".join(f"    {line}\n" for line in gives)
+            + "}",
+        ]
+
+    def _source(self, source: PortName | float) -> str:
+        if isinstance(source, PortName):
+            return (self.columns.get(source) or self.parameters[source]).text
+        return number_in_c(float(source))
+
     def _steps(self) -> list[str]:
         sequence = stages(self.plan.system, self.plan.experiment.order or FEEDTHROUGH)
         found = stages_of(self.plan, sequence)
@@ -676,13 +734,18 @@ class Text:
         shown = (
             "if (rows != NULL) show(it, t, rows + k * WIDTH);"
         )
+        looks = ["look(it, {});"] * bool(self.indices)
         passing = [
             "if (pass(it, k, t)) return 1;",
-            shown.replace("t, rows", "t, rows"),
+            shown,
+            *(line.format("t") for line in looks),
         ]
         before = passing if found.passing is not None else []
         after = (
-            ["if (rows != NULL) show(it, time_after(it, k + 1), rows + (k + 1) * WIDTH);"]
+            [
+                "if (rows != NULL) show(it, time_after(it, k + 1), rows + (k + 1) * WIDTH);",
+                *(line.format("time_after(it, k + 1)") for line in looks),
+            ]
             if found.passing is None
             else []
         )
@@ -698,7 +761,12 @@ class Text:
             else []
         )
         first = (
-            ["if (it->made == 0 && rows != NULL) show(it, it->start_time, rows);"]
+            [
+                "if (it->made == 0) {",
+                "    if (rows != NULL) show(it, it->start_time, rows);",
+                *(f"    {line.format('it->start_time')}" for line in looks),
+                "}",
+            ]
             if found.passing is None
             else []
         )
