@@ -22,7 +22,6 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import DEFAULT_FOLDERS
 from orchestrator.runs.own_components import (
-    CONTROLLER_BASES,
     LIKENESSES,
     build_own,
     changes,
@@ -114,21 +113,20 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     )
     component.set_defaults(action=_component)
     controller = kinds.add_parser(
-        "controller", help="create a folder with a controller and a scenario, ready to run"
+        "controller", help="create a folder with a controller for the closed loop, ready to run"
     )
     describe(
         controller,
-        "Create a folder with a controller, a scenario that runs it, and a README.",
-        "new controller my_law --base hardened",
+        "Create a folder with a controller in the language of equations, its FMU, its tests, a "
+        "scenario that runs it in the closed loop and a README.",
+        "new controller my_law",
     )
     _add_place(controller, "controller", "MyLaw or my_law")
     controller.add_argument(
-        "--base",
-        choices=CONTROLLER_BASES,
-        default=CONTROLLER_BASES[0],
-        help="what the controller is: plain (a class of PythonFMU) or hardened (a component in the "
-        "form of the bundle's: checks values, saves states, survives exceptions); default: "
-        f"{CONTROLLER_BASES[0]}",
+        "--python",
+        action="store_true",
+        help="make it a script with a class of PythonFMU, which may use numpy, scipy and any other "
+        "package; it has no tests, and its FMU needs Python",
     )
     controller.set_defaults(action=_controller)
 
@@ -214,22 +212,20 @@ def _described(settings: Mapping[str, str]) -> str:
 
 
 def _controller(options: argparse.Namespace) -> int:
-    files = new_controller(options.name, options.folder, options.base)
-    return _next_steps(files, scenario=files[1])
+    return _next_steps(new_controller(options.name, options.folder, python=options.python))
 
 
 def _component(options: argparse.Namespace) -> int:
-    files = new_component(options.name, options.folder, options.like, options.network)
-    return _next_steps(files, scenario=files[2], test=files[1])
+    return _next_steps(new_component(options.name, options.folder, options.like, options.network))
 
 
-def _next_steps(files: list[Path], scenario: Path, test: Path | None = None) -> int:
+def _next_steps(files: list[Path]) -> int:
     """Say what was made, and what to do with it."""
     show(*files)
-    script = files[0]
-    show(f"edit {script}, then {'test, ' if test else ''}build and run it:")
-    if test:
-        show(f"  pytest {test}")
+    script, tests = files[0], [path for path in files[1:] if path.suffix == ".py"]
+    [scenario] = [path for path in files if path.suffix == ".toml"]
+    show(f"edit {script}, then {'test, ' * len(tests)}build and run it:")
+    show(*(f"  pytest {test}" for test in tests))
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")
     return OK

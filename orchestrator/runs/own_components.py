@@ -26,10 +26,6 @@ from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
-#: What a controller for the closed loop can be: a class of PythonFMU, or a component in the form
-#: that the bundle's have.
-CONTROLLER_BASES = ("plain", "hardened")
-
 #: What a component can be like at first.
 LIKENESSES = ("controller", "plant", "filter", "empty")
 
@@ -50,31 +46,32 @@ _SETTING, _OUTPUT, _INPUT = "own_setting", "own_output", "own_input"
 _INTERVAL = 0.2
 
 
-def new_controller(
-    name: str, folder: Path | None = None, base: str = CONTROLLER_BASES[0]
-) -> list[Path]:
+def new_controller(name: str, folder: Path | None = None, *, python: bool = False) -> list[Path]:
     """Make a folder with a controller that runs in the closed loop.
 
     Args:
         name: of the controller, `MyLaw` or `my_law`.
         folder: made if it does not exist; None: one with the name of its module.
-        base: one of :data:`CONTROLLER_BASES`.
+        python: whether it is a class of PythonFMU, which may be any Python, and not a component in
+            the language of equations.
 
     Returns:
-        The script, the scenario, the README and the FMU.
+        The script, its tests if it is a component, the scenario, the README and the FMU.
 
     Raises:
         InputError: the name is not usable, the folder is not empty or cannot be written.
 
     """
     module, class_name = _names(name, "controller")
+    form = "python" if python else "equations"
     contents = {
-        f"{module}.py": f"controller/{base}.py.txt",
-        f"{module}.toml": f"controller/{_MODULE}.toml",
-        "README.md": "controller/README.md",
+        f"{module}.py": f"{form}.py.txt",
+        **({} if python else {f"test_{module}.py": "test.py.txt"}),
+        f"{module}.toml": f"{_MODULE}.toml",
+        "README.md": f"{form}.md",
     }
-    texts = {target: _template(file) for target, file in contents.items()}
-    names = {_CLASS: class_name, _MODULE: module}
+    texts = {target: _template(f"controller/{file}") for target, file in contents.items()}
+    names = {_CLASS: class_name if python else name_of(module), _MODULE: module}
     files = _write(folder or Path(module), texts, names)
     return [*files, build_own(files[0])]
 

@@ -27,21 +27,27 @@ from orchestrator.runs.own_components import (
 )
 from support.own import write
 
+#: The controller of the closed loop, which has its FMU from the beginning.
+OF_THE_LOOP = "controller of the loop"
 
-@pytest.fixture(params=LIKENESSES)
+
+@pytest.fixture(params=[*LIKENESSES, OF_THE_LOOP])
 def made(request, tmp_path) -> Path:
     """The script of a component to begin with."""
-    script, *_ = new_component("tiny_thing", tmp_path / "tiny", request.param)
+    if request.param == OF_THE_LOOP:
+        script, *_ = new_controller("tiny_thing", tmp_path / "tiny")
+    else:
+        script, *_ = new_component("tiny_thing", tmp_path / "tiny", request.param)
     return script
 
 
 def test_files_bear_the_name_and_no_other(made: Path):
-    assert {path.name for path in made.parent.iterdir() if path.name[0] != "."} == {
-        "tiny_thing.py", "test_tiny_thing.py", "tiny_thing.toml", "README.md",
-    }  # fmt: skip
-    for path in made.parent.glob("*.*"):
-        assert "own_" not in path.read_text()
-        assert "OwnComponent" not in path.read_text()
+    files = [path for path in made.parent.iterdir() if path.name[0] != "."]
+    texts = {path.name: path.read_text() for path in files if path.suffix != ".fmu"}
+    assert {*texts} == {"tiny_thing.py", "test_tiny_thing.py", "tiny_thing.toml", "README.md"}
+    for text in texts.values():
+        assert "own_" not in text
+        assert "OwnCo" not in text
 
 
 def test_its_tests_pass(made: Path):
@@ -84,7 +90,8 @@ def test_its_scenario_runs(made: Path, capsys):
     assert main(["check", str(scenario)]) == 0
     assert main(["run", str(scenario), "--out", str(made.parent / "results")]) == 0
     assert (made.parent / "results/result.csv").is_file()
-    assert "tiny_thing: t = " in capsys.readouterr().err
+    told_of_an_event = "tiny_thing: t = " in capsys.readouterr().err
+    assert told_of_an_event == ("[[events]]" in scenario.read_text())
 
 
 def test_its_check_finds_nothing(made: Path, capsys):
@@ -126,6 +133,32 @@ def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
         "  auv-fmu build rain_barrel/rain_barrel.py",
         f"  auv-fmu run rain_barrel/rain_barrel.toml --out rain_barrel{os.sep}results",
     ]
+
+
+@pytest.mark.parametrize(
+    ("options", "tests", "test"),
+    [
+        ([], ["my_law/test_my_law.py"], ["  pytest my_law/test_my_law.py"]),
+        (["--python"], [], []),
+    ],
+)
+def test_controller_comes_with_its_fmu(tmp_path, monkeypatch, capsys, options, tests, test):
+    monkeypatch.chdir(tmp_path)
+    assert main(["new", "controller", "MyLaw", *options]) == 0
+    assert capsys.readouterr().out.splitlines() == [
+        "my_law/my_law.py",
+        *tests,
+        "my_law/my_law.toml",
+        "my_law/README.md",
+        "my_law/MyLaw.fmu",
+        f"edit my_law/my_law.py, then {'test, ' * bool(test)}build and run it:",
+        *test,
+        "  auv-fmu build my_law/my_law.py",
+        f"  auv-fmu run my_law/my_law.toml --out my_law{os.sep}results",
+    ]
+    assert {path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("my_law/[!.]*")} == {
+        "my_law/my_law.py", *tests, "my_law/my_law.toml", "my_law/README.md", "my_law/MyLaw.fmu",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("name", ["RainBarrel", "rain_barrel", "PIDController"])
