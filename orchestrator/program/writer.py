@@ -28,14 +28,23 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL
 from orchestrator.master.plan import Plan, stages
 from orchestrator.program.reducing import Looking, ReducerText
-from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Visit, stages_of
+from orchestrator.master.stages import (
+    DIRECT,
+    ONLY_STATES,
+    STATES,
+    Stage,
+    Stages,
+    Visit,
+    stages_of,
+)
+from orchestrator.program.events import beginning, text_of_events
 from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear, Mapped
 
 #: What a call of the program comes to: all is well, or what was refused of which component.
-CALLS = START, INPUT, OUTPUTS, STEP = "START", "INPUT", "OUTPUTS", "STEP"
+CALLS = START, INPUT, OUTPUTS, STEP, SET = "START", "INPUT", "OUTPUTS", "STEP", "SET"
 
 #: What stands in the equations of the time step.
 _EULER = (euler.internal_steps, euler.end_of_step)
@@ -148,6 +157,8 @@ class _Kind:
         functions: its hooks as trees.
         emitter: of all equations.
         name: of its structure, and what its functions begin with.
+        euler: equations of the time step.
+        alters: whether events can happen to it.
 
     """
 
@@ -156,6 +167,7 @@ class _Kind:
     emitter: Emitter
     name: str
     euler: Mapping[str, Function]
+    alters: bool
 
     def __post_init__(self) -> None:
         said = self.definition.behaviour
@@ -182,6 +194,8 @@ class _Kind:
         yield self._evaluate()
         yield self._start()
         yield self._advance()
+        if self.alters:
+            yield self._adopt()
 
     def _call(self, hook: str, **given: str) -> str:
         function = self.functions[hook]
@@ -300,8 +314,18 @@ class _Kind:
             body += self._needs_noise()
         return self._function("start", ", double t", body)
 
+    def _adopt(self) -> str:
+        """What follows from parameters that have changed."""
+        body = [f"{self._call('check')};"] if self.said.hooks["check"] else []
+        if self.said.derived:
+            body.append("it->underived = 1;")
+        return self._function("adopt", "", body)
+
     def _needs_noise(self) -> list[str]:
         """What finds out whether noise is multiplied by zero: then none need be drawn."""
+        if self.alters:
+            # It may be multiplied by something else later.
+            return ["it->is_noisy = 1;"]
         n, group = self.said.draws, self.functions["measured"].returns
         name = self.emitter.type(group)
         draws = f"{{{', '.join(['HUGE_DRAW'] * n)}}}"
@@ -379,13 +403,16 @@ class Text:
         plan: of the run that it makes.
         definitions: of its components, by their names.
         indices: that look on.
+        alters: whether events can happen in it.
 
     """
 
     plan: Plan
     definitions: Mapping[str, Definition]
     indices: Sequence[Looking] = ()
-    mappings: list[str] = field(default_factory=list)
+    alters: bool = False
+    #: Functions of connections that map values, by what follows their names.
+    mappings: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         system = self.plan.system
@@ -412,6 +439,7 @@ class Text:
                 self.emitter,
                 self.emitter.unused(f"{_lower(one.name)}_component"),
                 {one.__name__: program.function(one) for one in _EULER},
+                self.alters,
             )
             for one in kinds
         }
@@ -459,6 +487,23 @@ class Text:
         return found
 
     @cached_property
+    def inputs(self) -> dict[PortName, int]:
+        """The numbers of all inputs."""
+        groups = (self._group(name, "inputs", "input") for name in self.components)
+        return {port: i for i, port in enumerate(port for group in groups for port in group)}
+
+    @cached_property
+    def stages(self) -> Stages:
+        """The stages of every step."""
+        sequence = stages(self.plan.system, self.plan.experiment.order or FEEDTHROUGH)
+        return stages_of(self.plan, sequence)
+
+    @property
+    def passes(self) -> bool:
+        """Whether values pass before a row shows them."""
+        return self.stages.passing is not None
+
+    @cached_property
     def parameters(self) -> dict[PortName, Place]:
         """All parameters, and the inputs that nothing feeds."""
         system, found = self.plan.system, dict[PortName, Place]()
@@ -489,7 +534,8 @@ class Text:
         arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
         noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
         names = f"{len(self.components)} components"
-        steps = self._steps()
+        begin, steps = self._begin(), self._steps()
+        events = [text_of_events(self)] if self.alters else []
         parts = [
             f"/* {closed(self.plan.system.name)}: {names} as one program. */\n#include <float.h>\n#include <stddef.h>\n#include <stdint.h>\n\n"
             "#ifndef EXPORTED\n#define EXPORTED\n#endif",
@@ -502,11 +548,12 @@ class Text:
             *(part for one in self.reducers.values() for part in one.text()),
             self._simulation(),
             _TIMES.strip(),
-            *self.mappings,
-            self._begin(),
+            *(head + body for body, head in self.mappings.items()),
+            begin,
             self._show(),
             *self._look(),
             *steps,
+            *events,
         ]
         return "\n\n".join(parts) + "\n"
 
@@ -524,6 +571,14 @@ class Text:
         ]
         if self.indices:
             rows.append("double looked; /* when the last row was looked at [s] */")
+        if self.alters:
+            n = len(self.inputs)
+            rows += [
+                f"double factors[{n}], offsets[{n}]; /* of what inputs take */",
+                f"double supplied[{n}]; /* to inputs that nothing feeds */",
+                f"double started[{len(self.components)}]; /* when components were [s] */",
+                "int due; /* after how many steps an event needs action */",
+            ]
         body = "\n".join(f"    {row}" for row in rows)
         calls = ", ".join(CALLS)
         return (
@@ -531,7 +586,7 @@ class Text:
             "typedef struct {\n"
             "    double start_time, step, stop_time;\n"
             "    int full_steps, steps; /* if there is one more of all steps, it is shorter */\n"
-            "    int made;\n"
+            "    int made, shown; /* steps, and rows */\n"
             "    int component, call, port; /* that has refused */\n"
             f"{body}\n}} simulation;\n\n"
             f"enum {{ {calls} }};"
@@ -555,6 +610,8 @@ class Text:
             port = self._port(connection.target)
             place = self.columns[connection.target]
             lines.append(f"    {place.text} = {number_in_c(_start(port, place))};")
+        if self.alters:
+            lines += [f"    {line}" for line in beginning(self)]
         order = [name for names in stages(self.plan.system, GAUSS_SEIDEL) for name in names]
         turn = {name: i for i, name in enumerate(order)}
         ahead = {
@@ -574,10 +631,10 @@ class Text:
             for connection in self.plan.system.feeding[name]:
                 target = self.columns[connection.target]
                 function = "take" if target.type == FLOAT else "take_whole"
-                value = self._value(connection)
+                value = self.value(connection)
                 settled.append(f"    is_other |= {function}(&{target.text}, {value});")
             settled.append("    if (is_other || everything) {")
-            settled += [f"        {line}" for line in self._checked_inputs(name)]
+            settled += [f"        {line}" for line in self.checked_inputs(name)]
             settled += [f"        {line}" for line in self._started(name)]
             settled += ["        changed = 1;", "    }"]
         return "\n".join(
@@ -634,14 +691,22 @@ class Text:
             if port.name == name.port
         )
 
-    def _checked_inputs(self, name: str) -> Iterator[str]:
+    def checked_inputs(self, name: str) -> Iterator[str]:
         """Refuse inputs that are out of range."""
         transformed = {
             one.target for one in self.plan.system.feeding[name] if one.transformation is not None
         }
         i, found = self.components.index(name), self._group(name, "inputs", "input")
+        kind = self.kind(name)
+        if self.alters:
+            inputs = f"it->{self.members[name]}.inputs"
+            finite = _over(kind.types["inputs"], inputs, "all_finite", "0.0 * {}", "== 0.0", "1")
+            whole = any(found[one.target].type != FLOAT for one in self.plan.system.feeding[name])
+            tests = ["noted.raised"] * whole + [f"!({finite})"] * (finite != "1")
+            if tests:
+                yield f"if ({' || '.join(tests)}) return refused(it, {i}, INPUT, -1);"
         for number, (port, (target, place)) in enumerate(
-            zip(self.kind(name).ports("input"), found.items(), strict=True)
+            zip(kind.ports("input"), found.items(), strict=True)
         ):
             tests = []
             if port.minimum is not None:
@@ -651,30 +716,35 @@ class Text:
             if port.choices:
                 choices = " || ".join(f"{place.text} == {int(c)}" for c in port.choices.values())
                 tests.append(f"({choices})" if tests else choices)
-            if target in transformed and place.type == FLOAT:
+            if target in transformed and place.type == FLOAT and not self.alters:
                 tests.append(f"0.0 * {place.text} == 0.0")
             if tests:
                 yield f"if (!({' && '.join(tests)})) return refused(it, {i}, INPUT, {number});"
 
-    def _value(self, connection: Connection) -> str:
-        """What arrives at the end of a connection."""
-        value = self.columns[connection.source].text
-        match connection.transformation:
-            case Linear(factor, offset):
-                return f"{number_in_c(factor)} * {value} + {number_in_c(offset)}"
-            case Mapped(pairs):
-                whole = self.columns[connection.target].type != FLOAT
-                name = f"mapped_{len(self.mappings)}"
-                of = "int" if whole else "double"
-                tests = "".join(
-                    f"    if (value == {number_in_c(float(a))}) return {number_in_c(int(b) if whole else float(b))};\n"
-                    for a, b in pairs
-                )
-                self.mappings.append(
-                    f"static {of} {name}(double value) {{\n{tests}    return ({of})value;\n}}"
-                )
-                return f"{name}({value})"
+    def value(self, connection: Connection, owner: str = "it") -> str:
+        """What arrives at the end of a connection, from the outputs of a simulation."""
+        value = self.columns[connection.source].text.replace("it->", f"{owner}->", 1)
+        target, change = connection.target, connection.transformation
+        if isinstance(change, Mapped):
+            value = self._mapped(target, change, value)
+        if self.alters:
+            i = self.inputs[target]
+            value = f"it->factors[{i}] * {value} + it->offsets[{i}]"
+            return value if self.columns[target].type == FLOAT else f"int_of({value}, error)"
+        if isinstance(change, Linear):
+            return f"{number_in_c(change.factor)} * {value} + {number_in_c(change.offset)}"
         return value
+
+    def _mapped(self, target: PortName, change: Mapped, value: str) -> str:
+        whole = self.columns[target].type != FLOAT
+        of = "int" if whole else "double"
+        pairs = [(float(a), int(b) if whole else float(b)) for a, b in change.pairs]
+        tests = "".join(
+            f"    if (value == {number_in_c(a)}) return {number_in_c(b)};\n" for a, b in pairs
+        )
+        body = f"(double value) {{\n{tests}    return ({of})value;\n}}"
+        head = self.mappings.setdefault(body, f"static {of} mapped_{len(self.mappings)}")
+        return f"{head.rpartition(' ')[2]}({value})"
 
     def _show(self) -> str:
         lines = [
@@ -725,67 +795,51 @@ class Text:
         return number_in_c(float(source))
 
     def _steps(self) -> list[str]:
-        sequence = stages(self.plan.system, self.plan.experiment.order or FEEDTHROUGH)
-        found = stages_of(self.plan, sequence)
+        found = self.stages
         parts = []
         if found.passing is not None:
             parts.append(self._made("pass", "Lets values of t_k pass", found.passing))
         parts.append(self._made("make_step", "Makes the step after the k-th", found.stepping))
-        shown = (
-            "if (rows != NULL) show(it, t, rows + k * WIDTH);"
-        )
-        looks = ["look(it, {});"] * bool(self.indices)
-        passing = [
-            "if (pass(it, k, t)) return 1;",
-            shown,
-            *(line.format("t") for line in looks),
-        ]
-        before = passing if found.passing is not None else []
-        after = (
-            [
-                "if (rows != NULL) show(it, time_after(it, k + 1), rows + (k + 1) * WIDTH);",
-                *(line.format("time_after(it, k + 1)") for line in looks),
-            ]
-            if found.passing is None
-            else []
-        )
-        last = (
-            [
-                "if (it->made == it->steps) {",
-                "    const int k = it->made;",
-                "    const double t = time_after(it, k);",
-                *[f"    {line}" for line in passing],
-                "}",
-            ]
-            if found.passing is not None
-            else []
-        )
-        first = (
-            [
-                "if (it->made == 0) {",
-                "    if (rows != NULL) show(it, it->start_time, rows);",
-                *(f"    {line.format('it->start_time')}" for line in looks),
-                "}",
-            ]
-            if found.passing is None
-            else []
-        )
-        body = [
-            *first,
-            "while (it->made < until) {",
-            "    const int k = it->made;",
+        looks = ["    look(it, t);"] * bool(self.indices)
+        keep = [
+            f"enum {{ WIDTH = {1 + len(self.columns)} }};\n",
+            "/* Keeps the row after k steps. */",
+            "static void keep(simulation *it, int k, double rows[]) {",
             "    const double t = time_after(it, k);",
-            *[f"    {line}" for line in before],
-            "    if (make_step(it, k, t)) return 1;",
-            *[f"    {line}" for line in after],
-            "    it->made = k + 1;",
+            "    if (rows != NULL) show(it, t, rows + k * WIDTH);",
+            *looks,
+            "    it->shown = k + 1;",
             "}",
-            *last,
-            "return 0;",
         ]
+        parts.append("\n".join(keep))
+        if found.passing is not None:
+            passing = ["if (pass(it, k, time_after(it, k))) return 1;", "keep(it, k, rows);"]
+            body = [
+                "while (it->made < until) {",
+                "    const int k = it->made;",
+                *(f"    {line}" for line in passing),
+                "    if (make_step(it, k, time_after(it, k))) return 1;",
+                "    it->made = k + 1;",
+                "}",
+                "if (it->made == it->steps && it->shown == it->steps) {",
+                "    const int k = it->made;",
+                *(f"    {line}" for line in passing),
+                "}",
+                "return 0;",
+            ]
+        else:
+            body = [
+                "if (it->shown == 0) keep(it, 0, rows);",
+                "while (it->made < until) {",
+                "    const int k = it->made;",
+                "    if (make_step(it, k, time_after(it, k))) return 1;",
+                "    keep(it, k + 1, rows);",
+                "    it->made = k + 1;",
+                "}",
+                "return 0;",
+            ]
         text = "\n".join(f"    {line}" for line in body)
         parts.append(
-            f"enum {{ WIDTH = {1 + len(self.columns)} }};\n\n"
             "/* Makes steps until so many are made, and a row after each if there are rows; whether a\n"
             " * component refuses. */\n"
             f"EXPORTED int run(simulation *it, int until, double rows[]) {{\n{text}\n}}\n\n"
@@ -793,7 +847,9 @@ class Text:
             "/* What has refused: the component, by its number, what was called, and which input. */\n"
             "EXPORTED void failure(const simulation *it, int found[]) {\n"
             "    found[0] = it->component;\n    found[1] = it->call;\n    found[2] = it->port;\n"
-            "    found[3] = it->made;\n}"
+            "    found[3] = it->made;\n}\n\n"
+            "/* How many rows there are. */\n"
+            "EXPORTED int rows_shown(const simulation *it) { return it->shown; }"
         )
         return parts
 
@@ -819,7 +875,7 @@ class Text:
     def _stage(self, stage: Stage) -> Iterator[str]:
         for connection in stage.connections:
             target = self.columns[connection.target]
-            yield f"{target.text} = {self._value(connection)};"
+            yield f"{target.text} = {self.value(connection)};"
         for port in stage.shows:
             if port.component in self.slow:
                 hidden = self._group(port.component, "outputs", "output")
@@ -833,13 +889,13 @@ class Text:
             kind = self.kind(visit.component)
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
             if is_stale and self._reads(visit):
-                yield from self._evaluated(visit.component)
+                yield from self.evaluated(visit.component)
 
     def _visited(self, visit: Visit, every: int) -> Iterator[str]:
         name, kind = visit.component, self.kind(visit.component)
         member, i = f"it->{self.members[name]}", self.components.index(visit.component)
         if visit.takes:
-            yield from self._checked_inputs(name)
+            yield from self.checked_inputs(name)
             if kind.said.derived and kind.said.takes("derive", "inputs"):
                 yield f"{member}.underived = 1;"
         if not visit.steps:
@@ -849,18 +905,19 @@ class Text:
             if visit.takes:
                 if kind.is_timed:
                     yield f"if ({member}.time != t) {{ {member}.time = t;{anew} }}"
-                yield from self._evaluated(name)
+                yield from self.evaluated(name)
             elif kind.is_timed:
                 yield f"if ({member}.time != t) {{"
                 yield f"    {member}.time = t;{anew}"
-                yield from (f"    {line}" for line in self._evaluated(name))
+                yield from (f"    {line}" for line in self.evaluated(name))
                 yield "}"
+        begun = f"it->started[{i}]" if self.alters else "it->start_time"
         yield (
-            f"{kind.name}_advance(&{member}, it->start_time, t, length_of(it, k, {every}), error);"
+            f"{kind.name}_advance(&{member}, {begun}, t, length_of(it, k, {every}), error);"
         )
         yield f"if (noted.raised) return refused(it, {i}, STEP, 0);"
 
-    def _evaluated(self, name: str) -> Iterator[str]:
+    def evaluated(self, name: str) -> Iterator[str]:
         kind, i = self.kind(name), self.components.index(name)
         yield f"{kind.name}_evaluate(&it->{self.members[name]}, error);"
         yield f"if (noted.raised) return refused(it, {i}, OUTPUTS, 0);"
@@ -920,4 +977,7 @@ def _distinct(names: Sequence[str]) -> list[str]:
 
 
 #: Other members of the simulation.
-_TAKEN = ("start_time", "step", "stop_time", "full_steps", "steps", "made", "component", "call", "port")
+_TAKEN = (
+    "start_time", "step", "stop_time", "full_steps", "steps", "made", "shown", "component", "call",
+    "port", "factors", "offsets", "supplied", "started", "due",
+)  # fmt: skip

@@ -31,7 +31,7 @@ COMPARISONS: Mapping[str, Callable[[Any, float], bool]] = {
 }
 
 #: How often the same event is listed: a condition may chatter for ever.
-_MOST_LISTED = 1000
+MOST_LISTED = 1000
 
 
 @dataclass(frozen=True)
@@ -287,6 +287,23 @@ class Event:
         return f"{self.text}, {when}"
 
 
+def occurrence(event: Event, number: int, time: float, n: int, *, ends: bool) -> Occurrence:
+    """An event that begins or ends.
+
+    Args:
+        event: that does.
+        number: of it.
+        time: of now [s].
+        n: how often it has begun or ended until now; at most :data:`MOST_LISTED`.
+        ends: whether it ends.
+
+    """
+    text = f"{event.text}, ended" if ends else event.text
+    if n == MOST_LISTED:
+        text += "; later occurrences are not listed"
+    return Occurrence(time, text, "" if ends else event.label, number)
+
+
 @dataclass
 class _Progress:
     """How far an event has come.
@@ -358,7 +375,7 @@ class Events:
     def _begin(self, run: Run, number: int) -> None:
         event, progress_of = self._events[number], self._progress[number]
         progress_of.happened = True
-        self._say(run, number, event.text, event.label)
+        self._say(run, number)
         event.action.act(run, number, self._layers)
         if event.lasts is not None:
             progress_of.end = max(run.experiment.reaching(run.time + event.lasts), run.made + 1)
@@ -366,15 +383,14 @@ class Events:
     def _end(self, run: Run, number: int) -> None:
         self._progress[number].end = NEVER
         self._layers.take(run, number)
-        self._say(run, number, f"{self._events[number].text}, ended")
+        self._say(run, number, ends=True)
 
-    def _say(self, run: Run, number: int, text: str, label: str = "") -> None:
+    def _say(self, run: Run, number: int, *, ends: bool = False) -> None:
         progress_of = self._progress[number]
         progress_of.listed += 1
-        if progress_of.listed == _MOST_LISTED:
-            text += "; later occurrences are not listed"
-        if progress_of.listed <= _MOST_LISTED:
-            self._happened.append(Occurrence(run.time, text, label, number))
+        if progress_of.listed <= MOST_LISTED:
+            event, n = self._events[number], progress_of.listed
+            self._happened.append(occurrence(event, number, run.time, n, ends=ends))
 
     def _next(self, run: Run, number: int) -> int:
         """After how many steps an event needs action."""
