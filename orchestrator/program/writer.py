@@ -19,7 +19,7 @@ from auv_fmu.paper import euler
 from fmus.language.build import Program
 from fmus.language.tree import Function
 from fmus.language.types import FLOAT, Array, Scalar, Type, count, is_whole, scalars_in, type_of
-from fmus.native.emit import Emitter, closed, lines_of, members, number_in_c
+from fmus.native.emit import Emitter, closed, lines_of, members, number_in_c, unbroken
 from fmus.native.names import RUNTIME, in_c
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
@@ -28,14 +28,14 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL
 from orchestrator.master.plan import Plan, stages
 from orchestrator.program.reducing import Looking, ReducerText
-from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Visit, stages_of
+from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Stages, Visit, stages_of
 from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear, Mapped
 
 #: What a call of the program comes to: all is well, or what was refused of which component.
-CALLS = START, INPUT, OUTPUTS, STEP = "START", "INPUT", "OUTPUTS", "STEP"
+CALLS = START, INPUT, OUTPUTS, STEP = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP"
 
 #: What stands in the equations of the time step.
 _EULER = (euler.internal_steps, euler.end_of_step)
@@ -53,12 +53,23 @@ typedef struct {
 #define raise_error(error, ...) ((void)((error)->raised = 1))
 """
 
+#: What is said of a step that is refused, where there is somebody to hear it.
+_NOT_FINITE, _UNSOUND, _TOO_MANY = (
+    f"raise_error(error, {unbroken(why)});"
+    for why in (
+        "an output is not finite",
+        f"the state is not finite, or exceeds {euler.LARGEST_STATE:g}",
+        f"the step needs more than {euler.MOST_INTERNAL_STEPS} internal steps; take shorter ones, "
+        "or raise h_max",
+    )
+)
+
 _CHECKS = """\
 /* Partial sums that processors add side by side. */
 enum { LANES = 4 };
 
 /* Times zero, what is finite is zero and what is not is NaN. */
-static inline int all_finite(const double values[], int n) {
+static inline int are_finite(const double values[], int n) {
     double sums[LANES] = {0.0};
     int i = 0, j;
     for (; i + LANES <= n; i += LANES) {
@@ -93,7 +104,7 @@ static inline int take_whole(int *input, int value) {
 """
 
 _DRAWING = """\
-static inline void draw(generator *noise, double draws[], int n) {
+static inline void draw_normals(generator *noise, double draws[], int n) {
     for (int i = 0; i < n; i++) draws[i] = standard_normal(noise);
 }
 """
@@ -148,6 +159,8 @@ class _Kind:
         functions: its hooks as trees.
         emitter: of all equations.
         name: of its structure, and what its functions begin with.
+        euler: functions of the time step.
+        is_tuned: whether parameters may change after the start.
 
     """
 
@@ -156,6 +169,7 @@ class _Kind:
     emitter: Emitter
     name: str
     euler: Mapping[str, Function]
+    is_tuned: bool = False
 
     def __post_init__(self) -> None:
         said = self.definition.behaviour
@@ -246,7 +260,7 @@ class _Kind:
         if self.said.draws:
             group = f"it->outputs.{in_c(self.said.noisy)}"
             body.append(f"{group} = {self._measured('it->draws', group)};")
-        body.append(f"if (!({self._finite()})) error->raised = 1;")
+        body.append(f"if (!({self._finite()})) {_NOT_FINITE}")
         return self._function("evaluate", "", body)
 
     def _measured(self, draws: str, group: str) -> str:
@@ -266,7 +280,7 @@ class _Kind:
 
     def _finite(self) -> str:
         """Whether all outputs are finite."""
-        return _over(self.types["outputs"], "it->outputs", "all_finite", "0.0 * {}", "== 0.0", "1")
+        return _over(self.types["outputs"], "it->outputs", "are_finite", "0.0 * {}", "== 0.0", "1")
 
     def _sound(self, state: str) -> str:
         """Whether a run can go on from a state."""
@@ -291,13 +305,13 @@ class _Kind:
             body.append("it->underived = 1;")
         if self.said.draws:
             body.append(f"seed_generator(&it->noise, (uint32_t){self._call('seed')});")
-            body.append(f"draw(&it->noise, it->draws, {self.said.draws});")
+            body.append(f"draw_normals(&it->noise, it->draws, {self.said.draws});")
         if self.said.hooks["start"]:
             body.append(f"it->state = {self._call('start', t='t')};")
-            body.append(f"if (!({self._sound('it->state')})) error->raised = 1;")
+            body.append(f"if (!({self._sound('it->state')})) {_UNSOUND}")
         body.append(f"{self.name}_evaluate(it, error);")
         if self.said.draws:
-            body += self._needs_noise()
+            body += ["it->is_noisy = 1;"] if self.is_tuned else self._needs_noise()
         return self._function("start", ", double t", body)
 
     def _needs_noise(self) -> list[str]:
@@ -327,7 +341,7 @@ class _Kind:
                 "int n = 1;",
                 "if (h > it->longest_step) {",
                 f"    if (h / it->longest_step > {float(euler.MOST_INTERNAL_STEPS)!r}) {{",
-                "        error->raised = 1;",
+                f"        {_TOO_MANY}",
                 "        return;",
                 "    }",
                 f"    n = {split};",
@@ -343,7 +357,7 @@ class _Kind:
                 body.append("    it->underived = 1;")
             body += [
                 "}",
-                f"if (!({self._sound('state')})) error->raised = 1;",
+                f"if (!({self._sound('state')})) {_UNSOUND}",
                 "if (error->raised) return;",
                 "it->state = state;",
             ]
@@ -351,7 +365,7 @@ class _Kind:
             end = self.emitter.call(self.euler["end_of_step"], ["start", "t", "h"])
             body.append(f"it->time = {end};")
         if said.draws:
-            body.append(f"if (it->is_noisy) draw(&it->noise, it->draws, {said.draws});")
+            body.append(f"if (it->is_noisy) draw_normals(&it->noise, it->draws, {said.draws});")
         if not said.is_sampled and not self.follows_inputs:
             body.append(f"{self.name}_evaluate(it, error);")
         return self._function("advance", ", double start, double t, double h", body)
@@ -379,12 +393,14 @@ class Text:
         plan: of the run that it makes.
         definitions: of its components, by their names.
         indices: that look on.
+        is_tuned: whether parameters may change after the start.
 
     """
 
     plan: Plan
     definitions: Mapping[str, Definition]
     indices: Sequence[Looking] = ()
+    is_tuned: bool = False
     mappings: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -412,6 +428,7 @@ class Text:
                 self.emitter,
                 self.emitter.unused(f"{_lower(one.name)}_component"),
                 {one.__name__: program.function(one) for one in _EULER},
+                self.is_tuned,
             )
             for one in kinds
         }
@@ -480,35 +497,58 @@ class Text:
             }
         return found
 
+    @cached_property
+    def sequence(self) -> list[list[str]]:
+        """The components in the order in which they are stepped."""
+        return stages(self.plan.system, self.plan.experiment.order or FEEDTHROUGH)
+
+    @cached_property
+    def stages(self) -> Stages:
+        """What happens in a step."""
+        return stages_of(self.plan, self.sequence)
+
     # The text
 
     def text(self) -> str:
         """All of it."""
-        kinds = [part for kind in self.kinds.values() for part in kind.text()]
-        is_noisy = any(kind.said.draws for kind in self.kinds.values())
         arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
         noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
         names = f"{len(self.components)} components"
-        steps = self._steps()
         parts = [
             f"/* {closed(self.plan.system.name)}: {names} as one program. */\n#include <float.h>\n#include <stddef.h>\n#include <stdint.h>\n\n"
             "#ifndef EXPORTED\n#define EXPORTED\n#endif",
             arithmetic.replace('#include "error.h"\n', _FAILURE).strip(),
-            *([noise.strip()] if is_noisy else []),
-            self.emitter.text(),
-            _CHECKS.strip(),
-            *([_DRAWING.strip()] if is_noisy else []),
-            *kinds,
-            *(part for one in self.reducers.values() for part in one.text()),
-            self._simulation(),
-            _TIMES.strip(),
-            *self.mappings,
+            *([noise.strip()] if self.is_noisy else []),
+            *self.core(),
             self._begin(),
             self._show(),
             *self._look(),
-            *steps,
+            self._run(),
         ]
         return "\n\n".join(parts) + "\n"
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether random numbers are drawn."""
+        return any(kind.said.draws for kind in self.kinds.values())
+
+    def core(self) -> list[str]:
+        """What it is whoever calls it: equations, components, the start, and a step."""
+        # Writing these adds to the structures and the mappings.
+        parts = [part for kind in self.kinds.values() for part in kind.text()]
+        parts += [part for one in self.reducers.values() for part in one.text()]
+        simulation, rest, steps = self._simulation(), self.rest(), self._steps()
+        return [
+            self.emitter.text(),
+            _CHECKS.strip(),
+            *([_DRAWING.strip()] if self.is_noisy else []),
+            *parts,
+            simulation,
+            _TIMES.strip(),
+            *self.mappings,
+            rest,
+            *steps,
+        ]
 
     def _simulation(self) -> str:
         rows = [
@@ -550,6 +590,27 @@ class Text:
             kind = self.kind(name)
             if kind.said.hooks["update"] and not kind.has_h_max:
                 lines.append(f"    it->{self.members[name]}.longest_step = DBL_MAX;")
+        return "\n".join(
+            [
+                "/* Sets parameters, and lets values come to rest at the start; whether a component refuses. */",
+                "EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,",
+                "                   double stop_time, int full_steps, int steps) {",
+                "    Error noted = {0};",
+                "    memset(it, 0, sizeof *it);",
+                "    it->start_time = start_time;",
+                "    it->step = step;",
+                "    it->stop_time = stop_time;",
+                "    it->full_steps = full_steps;",
+                "    it->steps = steps;",
+                *lines,
+                "    return come_to_rest(it, &noted) != 0;",
+                "}",
+            ]
+        )
+
+    def rest(self) -> str:
+        """What lets values come to rest at the start."""
+        lines: list[str] = []
         for connection in self.plan.system.connections:
             # What an input has that is fed, until it is.
             port = self._port(connection.target)
@@ -584,38 +645,30 @@ class Text:
             [
                 "/* Hands values along all connections once, at the start; whether one has changed: 0, 1,",
                 " * or -1 where a component refuses. */",
-                "static int settle(simulation *it, int everything) {",
+                "static int settle(simulation *it, int everything, Error *error) {",
                 "    const double t = it->start_time;",
                 "    int changed = 0, is_other;",
-                "    Error noted = {0}, *error = &noted;",
-                *[line.replace("return 1;", "return -1;") for line in settled],
+                "    (void)error;",
+                *[line.replace("return refused", "return -refused") for line in settled],
                 "    return changed;",
                 "}",
                 "",
-                "/* Sets parameters, and lets values come to rest at the start; whether a component refuses. */",
-                "EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,",
-                "                   double stop_time, int full_steps, int steps) {",
-                "    const double t = start_time;",
+                "/* Lets values come to rest at the start: 0, 1 where they do not, or -1 where a component",
+                " * refuses. */",
+                "static int come_to_rest(simulation *it, Error *error) {",
+                "    const double t = it->start_time;",
                 "    int changed, rounds = 0;",
-                "    Error noted = {0}, *error = &noted;",
-                "    memset(it, 0, sizeof *it);",
-                "    it->start_time = start_time;",
-                "    it->step = step;",
-                "    it->stop_time = stop_time;",
-                "    it->full_steps = full_steps;",
-                "    it->steps = steps;",
+                "    (void)t;",
                 *lines,
-                *started,
-                "    changed = settle(it, 1);",
-                f"    while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0);",
+                *[line.replace("return refused", "return -refused") for line in started],
+                "    changed = settle(it, 1, error);",
+                f"    while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
                 *[
                     f"    it->{self.members[name]}_shown = it->{self.members[name]}.outputs;"
                     for name in self.components
                     if name in self.slow
                 ],
-                "    (void)t;",
-                "    (void)error;",
-                "    return changed != 0;",
+                "    return changed;",
                 "}",
             ]
         )
@@ -624,7 +677,7 @@ class Text:
         i, kind = self.components.index(name), self.kind(name)
         return [
             f"{kind.name}_start(&it->{self.members[name]}, t, error);",
-            f"if (noted.raised) return refused(it, {i}, START, 0);",
+            f"if (error->raised) return refused(it, {i}, {START}, 0);",
         ]
 
     def _port(self, name: PortName) -> Port:
@@ -654,7 +707,7 @@ class Text:
             if target in transformed and place.type == FLOAT:
                 tests.append(f"0.0 * {place.text} == 0.0")
             if tests:
-                yield f"if (!({' && '.join(tests)})) return refused(it, {i}, INPUT, {number});"
+                yield f"if (!({' && '.join(tests)})) return refused(it, {i}, {INPUT}, {number});"
 
     def _value(self, connection: Connection) -> str:
         """What arrives at the end of a connection."""
@@ -725,18 +778,20 @@ class Text:
         return number_in_c(float(source))
 
     def _steps(self) -> list[str]:
-        sequence = stages(self.plan.system, self.plan.experiment.order or FEEDTHROUGH)
-        found = stages_of(self.plan, sequence)
-        parts = []
+        found, parts = self.stages, []
         if found.passing is not None:
             parts.append(self._made("pass", "Lets values of t_k pass", found.passing))
         parts.append(self._made("make_step", "Makes the step after the k-th", found.stepping))
+        return parts
+
+    def _run(self) -> str:
+        found = self.stages
         shown = (
             "if (rows != NULL) show(it, t, rows + k * WIDTH);"
         )
         looks = ["look(it, {});"] * bool(self.indices)
         passing = [
-            "if (pass(it, k, t)) return 1;",
+            "if (pass(it, k, t, error)) return 1;",
             shown,
             *(line.format("t") for line in looks),
         ]
@@ -771,12 +826,13 @@ class Text:
             else []
         )
         body = [
+            "Error noted = {0}, *error = &noted;",
             *first,
             "while (it->made < until) {",
             "    const int k = it->made;",
             "    const double t = time_after(it, k);",
             *[f"    {line}" for line in before],
-            "    if (make_step(it, k, t)) return 1;",
+            "    if (make_step(it, k, t, error)) return 1;",
             *[f"    {line}" for line in after],
             "    it->made = k + 1;",
             "}",
@@ -784,7 +840,7 @@ class Text:
             "return 0;",
         ]
         text = "\n".join(f"    {line}" for line in body)
-        parts.append(
+        return (
             f"enum {{ WIDTH = {1 + len(self.columns)} }};\n\n"
             "/* Makes steps until so many are made, and a row after each if there are rows; whether a\n"
             " * component refuses. */\n"
@@ -795,7 +851,6 @@ class Text:
             "    found[0] = it->component;\n    found[1] = it->call;\n    found[2] = it->port;\n"
             "    found[3] = it->made;\n}"
         )
-        return parts
 
     def _made(self, name: str, doc: str, found: Sequence[Stage]) -> str:
         lines: list[str] = []
@@ -811,8 +866,7 @@ class Text:
         text = "\n".join(part for line in lines for part in lines_of(line.lstrip(), "    " + " " * (len(line) - len(line.lstrip()))))
         return (
             f"/* {doc}; whether a component refuses. */\n"
-            f"static int {name}(simulation *it, int k, double t) {{\n"
-            "    Error noted = {0}, *error = &noted;\n"
+            f"static int {name}(simulation *it, int k, double t, Error *error) {{\n"
             f"    (void)k;\n    (void)t;\n    (void)error;\n{text}\n    return 0;\n}}"
         )
 
@@ -858,12 +912,12 @@ class Text:
         yield (
             f"{kind.name}_advance(&{member}, it->start_time, t, length_of(it, k, {every}), error);"
         )
-        yield f"if (noted.raised) return refused(it, {i}, STEP, 0);"
+        yield f"if (error->raised) return refused(it, {i}, {STEP}, 0);"
 
     def _evaluated(self, name: str) -> Iterator[str]:
         kind, i = self.kind(name), self.components.index(name)
         yield f"{kind.name}_evaluate(&it->{self.members[name]}, error);"
-        yield f"if (noted.raised) return refused(it, {i}, OUTPUTS, 0);"
+        yield f"if (error->raised) return refused(it, {i}, {OUTPUTS}, 0);"
 
     def _reads(self, visit: Visit) -> bool:
         """Whether one of the outputs is read that the component computes."""
