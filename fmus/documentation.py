@@ -14,6 +14,7 @@ from markdown_it import MarkdownIt
 
 from fmus.discovery import Source, related_files
 from fmus.kinds import NATIVE, PYTHON
+from fmus.ports.definition import Model
 from fmus.ports.description_fmi3 import TYPES
 from fmus.ports.port import FAULT, Port
 
@@ -74,7 +75,7 @@ _EXAMPLE = """\
 Run only this FMU for 10 s, with the inputs at zero:
 
 ```sh
-fmpy simulate {name}.fmu --stop-time 10 --output-interval 0.02 --output-file result.csv
+fmpy simulate {name}.fmu --stop-time 10 --output-interval {step:g} --output-file result.csv
 ```
 
 In Python:
@@ -83,7 +84,7 @@ In Python:
 import fmpy
 
 
-result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval=0.02)
+result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval={step:g})
 ```
 
 If the FMU has a parameter `h_max`, a longer step is split evenly, with held inputs."""
@@ -91,15 +92,28 @@ If the FMU has a parameter `h_max`, a longer step is split evenly, with held inp
 
 def component_page(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
     """Write the page of a component in Markdown: description, ports, refusals, an example."""
-    name, ports = source.name, (*source.definition.ports, FAULT)
+    made_of = (_NATIVE,) if kind == NATIVE else ()
+    reference = (_REFERENCE.format(name=source.name),) if related_files(source) else ()
+    return page_of(source.definition, (source.page, *made_of), fmi, reference)
+
+
+def page_of(model: Model, head: Sequence[str], fmi: str = "2", more: Sequence[str] = ()) -> str:
+    """The page of a model in Markdown.
+
+    Args:
+        model: that it is about.
+        head: what stands before the ports.
+        fmi: version.
+        more: what stands before the example.
+
+    """
     refusals = _REFUSALS
     if fmi == "3":
         refusals = refusals.replace("fmi2GetReal", "fmi3GetFloat64").replace("fmi2", "fmi3")
-    made_of = (_NATIVE,) if kind == NATIVE else ()
-    tables = _tables(ports, TYPES if fmi == "3" else {})
-    reference = (_REFERENCE.format(name=name),) if related_files(source) else ()
-    parts = (source.page, *made_of, *tables, refusals, *reference, _EXAMPLE.format(name=name))
-    return "\n\n".join(parts) + "\n"
+    tables = _tables((*model.ports, FAULT), TYPES if fmi == "3" else {})
+    experiment = model.experiment
+    example = _EXAMPLE.format(name=model.name, step=experiment.step)
+    return "\n\n".join((*head, *tables, refusals, *more, example)) + "\n"
 
 
 def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
@@ -172,9 +186,15 @@ def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[st
 
 def component_html(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(component_page(source, kind, fmi))
+    citation = source.definition.origin.citation
+    return html_of(source.name, component_page(source, kind, fmi), citation)
+
+
+def html_of(title: str, page: str, citation: str = "") -> str:
+    """A page in Markdown as one HTML file."""
+    body = MarkdownIt("commonmark").enable("table").render(page)
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(
-        title=source.name, citation=source.definition.origin.citation, body=body
+        title=title, citation=citation, body=body
     )

@@ -84,6 +84,11 @@ def quoted(text: str) -> str:
     return f'"{escaped}"'
 
 
+def unbroken(text: str) -> str:
+    """A text in C that no line is broken in."""
+    return quoted(text).replace(" ", _KEPT)
+
+
 def lines_of(text: str, indent: str) -> list[str]:
     """A statement as lines, which end after the commas of its outermost list if that will do."""
     lines: list[str] = []
@@ -326,7 +331,7 @@ class _Definition:
             text = number_in_c(one.value)
             return text, _UNARY if text.startswith("-") else _POSTFIX
         if isinstance(one, tree.Text):
-            return quoted(one.value).replace(" ", _KEPT), _POSTFIX
+            return unbroken(one.value), _POSTFIX
         if isinstance(one, Local):
             name = in_c(one.name)
             return f"(*{name})" if one.name == self._function.by_address else name, _POSTFIX

@@ -30,7 +30,7 @@ _TAKEN = frozenset(
         "popen", "sa_handler", "sa_sigaction", "sched_priority", "stderr", "stdin", "stdout",
         "sys_errlist", "sys_nerr", "toascii", "wcswcs", "wpopen",
         # what functions are given
-        "error", *FUNCTIONS,
+        "error", "raise_error", *FUNCTIONS,
     )
 )  # fmt: skip
 

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from fmus import documentation
 from fmus.compilers import Compiler, library
 from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
+from fmus.native.emit import quoted
 from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
 from fmus.ports import description, description_fmi3
-from fmus.ports.definition import Definition
-from fmus.ports.port import Port
+from fmus.ports.definition import Definition, Model
 
 _FOLDER = Path(__file__).parent
 
@@ -29,29 +30,48 @@ _IDENTITY = """\
 #ifndef IDENTITY_H
 #define IDENTITY_H
 
-#define MODEL_NAME "{name}"
+#define MODEL_NAME {name}
 #define MODEL_GUID "{guid}"
 
 #endif
 """
 
 
-def _described(definition: Definition, guid: str, fmi: str, arrays: bool) -> bytes:
+def _described(model: Model, guid: str, fmi: str, arrays: bool) -> bytes:
     if fmi == FMI_VERSIONS[0]:
-        return description.fmi2_description(definition, guid)
-    return description_fmi3.fmi3_description(definition, guid, arrays)
+        return description.fmi2_description(model, guid)
+    return description_fmi3.fmi3_description(model, guid, arrays)
 
 
-def _pictures(name: str, ports: Sequence[Port], fmi: str, arrays: bool) -> dict[str, bytes]:
+class Parts(NamedTuple):
+    """What a native FMU is made of.
+
+    Attributes:
+        model: what its description says.
+        equations, tables: the files equations.c and ports.h.
+        documents: what it holds for its user, by the places in it.
+        terminals: of FMI 3.0, the file terminalsAndIcons.xml.
+        arrays: whether vectors and matrices of one unit are variables of FMI 3.0.
+
+    """
+
+    model: Model
+    equations: str
+    tables: str
+    documents: Mapping[str, bytes]
+    terminals: bytes
+    arrays: bool = False
+
+
+def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
     """What a version of FMI has besides, nearly all of it to be drawn."""
     icon = documentation.ICON.read_bytes()
     if fmi == FMI_VERSIONS[0]:
         return {"model.png": icon}
+    build = description_fmi3.fmi3_build_description(parts.model.identifier)
     return {
-        "sources/buildDescription.xml": description_fmi3.fmi3_build_description(name),
-        "terminalsAndIcons/terminalsAndIcons.xml": description_fmi3.terminals_and_icons(
-            ports, arrays
-        ),
+        "sources/buildDescription.xml": build,
+        "terminalsAndIcons/terminalsAndIcons.xml": parts.terminals,
         "terminalsAndIcons/icon.png": icon,
         "terminalsAndIcons/terminal.png": (_FOLDER / "terminal.png").read_bytes(),
     }
@@ -61,6 +81,10 @@ def sources(
     definition: Definition, fmi: str = FMI_VERSIONS[0], arrays: bool = False
 ) -> dict[str, str]:
     """The C sources of a component by their names, all but identity.h."""
+    return _sources(translated(definition), tables(definition, arrays), fmi)
+
+
+def _sources(equations: str, ports: str, fmi: str) -> dict[str, str]:
     others = {name for version, name in MAIN.items() if version != fmi}
     return {
         **{
@@ -68,8 +92,8 @@ def sources(
             for path in sorted(RUNTIME.glob("*.[ch]"))
             if path.name not in others
         },
-        "equations.c": translated(definition),
-        "ports.h": tables(definition, arrays),
+        "equations.c": equations,
+        "ports.h": ports,
     }
 
 
@@ -81,12 +105,10 @@ def fmu_entries(
     tell: Callable[[str], None],
     arrays: bool = False,
 ) -> dict[str, bytes]:
-    """The contents of an FMU.
-
-    Its GUID follows from its description and its sources, and is the same for all platforms.
+    """The contents of the FMU of a component.
 
     Args:
-        source: of the component; its libraries have its name.
+        source: of the component.
         fmi: version.
         platforms: that it has libraries for.
         compiler: that makes them.
@@ -97,24 +119,59 @@ def fmu_entries(
         OSError: the compiler fails.
 
     """
-    component, definition = source.name, source.definition
-    describe = partial(_described, definition, fmi=fmi, arrays=arrays)
-    written = {name: text.encode() for name, text in sources(definition, fmi, arrays).items()}
-    guid = guid_of(digest_of({**written, "modelDescription.xml": describe("")}))
-    written["identity.h"] = _IDENTITY.format(name=component, guid=guid).encode()
-    libraries = {}
-    for platform in platforms:
-        path = f"binaries/{platform.name}/{component}{platform.ending}"
-        libraries[path] = library(compiler, platform, component, written, MAIN[fmi])
-        tell(f"{component} for {platform.name}, FMI {fmi}.0")
+    definition = source.definition
     documents = documentation.fmu_documents(source, NATIVE, fmi)
     if arrays:
         # The reference results that it would carry are of scalars.
         documents = {name: text for name, text in documents.items() if name.endswith(".html")}
+    parts = Parts(
+        definition,
+        translated(definition),
+        tables(definition, arrays),
+        documents,
+        description_fmi3.terminals_and_icons(definition.ports, arrays),
+        arrays,
+    )
+    return entries_of(parts, fmi, platforms, compiler, tell)
+
+
+def entries_of(
+    parts: Parts,
+    fmi: str,
+    platforms: Sequence[Platform],
+    compiler: Compiler,
+    tell: Callable[[str], None],
+) -> dict[str, bytes]:
+    """The contents of an FMU.
+
+    Its GUID follows from its description and its sources, and is the same for all platforms.
+
+    Args:
+        parts: that it is made of.
+        fmi: version.
+        platforms: that it has libraries for.
+        compiler: that makes them.
+        tell: called with a line when a library is made.
+
+    Raises:
+        OSError: the compiler fails.
+
+    """
+    model, name = parts.model, parts.model.identifier
+    describe = partial(_described, model, fmi=fmi, arrays=parts.arrays)
+    texts = _sources(parts.equations, parts.tables, fmi)
+    written = {name: text.encode() for name, text in texts.items()}
+    guid = guid_of(digest_of({**written, "modelDescription.xml": describe("")}))
+    written["identity.h"] = _IDENTITY.format(name=quoted(model.name), guid=guid).encode()
+    libraries = {}
+    for platform in platforms:
+        path = f"binaries/{platform.name}/{name}{platform.ending}"
+        libraries[path] = library(compiler, platform, name, written, MAIN[fmi])
+        tell(f"{model.name} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": describe(guid),
-        **_pictures(component, definition.ports, fmi, arrays),
-        **documents,
+        **_pictures(parts, fmi),
+        **parts.documents,
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
         **{f"sources/{name}": content for name, content in written.items()},
         **libraries,

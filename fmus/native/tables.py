@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from itertools import groupby
 from typing import Any
@@ -40,17 +40,38 @@ _TYPES = {float: "REAL", int: "INTEGER", bool: "BOOLEAN"}
 
 def tables(definition: Definition, arrays: bool = False) -> str:
     """The file ports.h of a component; some of its ports may be elements of arrays."""
-    ports = (*definition.ports, FAULT)
-    places = {FAULT.name: "0", H_MAX: "PARAMETER_AT(h_max)"}
-    parameters = type_of(definition.behaviour.parameters)
-    for name, path in definition.parameters.paths.items():
-        places[name] = f"PARAMETER_AT(model{_member(parameters, path)})"
+    said = definition.behaviour
+    places = places_of(definition, "model") | {H_MAX: "PARAMETER_AT(h_max)"}
+    return port_tables(definition.ports, places, scalars_of(said.state), arrays)
+
+
+def places_of(definition: Definition, owner: str) -> dict[str, str]:
+    """The places of parameters, all but `h_max`, by their names, in a member of their structure."""
+    type_ = type_of(definition.behaviour.parameters)
+    paths = definition.parameters.paths.items()
+    return {name: f"PARAMETER_AT({owner}{_member(type_, path)})" for name, path in paths}
+
+
+def port_tables(
+    ports: Sequence[Port], parameters: Mapping[str, str], state: Iterable[Any], arrays: bool = False
+) -> str:
+    """The file ports.h.
+
+    Args:
+        ports: all but `fault`.
+        parameters: places of parameters, by their names.
+        state: the types of its numbers, in Python.
+        arrays: whether ports of one array are one variable.
+
+    """
     values = {
-        causality: reals_first([port for port in definition.ports if port.causality == causality])
+        causality: reals_first([port for port in ports if port.causality == causality])
         for causality in ("input", "output")
     }
+    places = {FAULT.name: "0", **parameters}
     for found in values.values():
         places |= {port.name: str(place) for place, port in enumerate(found)}
+    ports = (*ports, FAULT)
     names = names_of_choices(ports)
     rows = "".join(f"    {{{_row(port, places, names)}}},\n" for port in ports)
     return "\n".join(
@@ -62,7 +83,7 @@ def tables(definition: Definition, arrays: bool = False) -> str:
             *(_arrays(ports) if arrays else ()),
             *(_references(causality, found, ports) for causality, found in values.items()),
             *_counts(values),
-            *_state(definition.behaviour.state),
+            *_state(state),
         )
     )
 
@@ -142,9 +163,9 @@ def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
     )
 
 
-def _state(hint: object) -> Iterator[str]:
+def _state(scalars: Iterable[Any]) -> Iterator[str]:
     """What the numbers of a state are, one after the other."""
-    runs = [(scalar, len([*found])) for scalar, found in groupby(scalars_of(hint))]
+    runs = [(scalar, len([*found])) for scalar, found in groupby(scalars)]
     rows: list[str] = []
     enumerations: dict[Any, str] = {}
     for scalar, n in runs:

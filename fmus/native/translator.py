@@ -24,12 +24,12 @@ from fmus.language.types import (
     Scalar,
     Type,
     count,
-    parts_of,
     scalars_in,
     type_of,
 )
 from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, members, quoted
 from fmus.native.names import in_c
+from fmus.native.numbers import has_only_doubles, moves
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
@@ -272,7 +272,7 @@ class _Passage:
 def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
     """How inputs, outputs or a state pass; ports have their Reals first, a state has none first."""
     name = emitter.type(type_)
-    if _has_only_doubles(type_) or not count(type_):
+    if has_only_doubles(type_) or not count(type_):
         return _Passage(name, name)
     scalars = [*scalars_in(type_)]
     n = len(scalars)
@@ -281,54 +281,14 @@ def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
         order = sorted(places, key=lambda i: scalars[i] != FLOAT)
         places = [order.index(number) for number in range(n)]
     gather, scatter = f"model_{what}_of", f"model_put_{what}"
-    gathered = "\n".join(_moves(type_, "it", places, "{member} = {cast}from[{place}];"))
-    scattered = "\n".join(_moves(type_, "it", places, "to[{place}] = {member};"))
+    gathered = "\n".join(moves(type_, "it", places, "{member} = {cast}from[{place}];"))
+    scattered = "\n".join(moves(type_, "it", places, "to[{place}] = {member};"))
     functions = (
         f"static {name} {gather}(const double from[]) {{\n"
         f"    {name} it;\n{gathered}\n    return it;\n}}",
         f"static void {scatter}({name} it, double to[]) {{\n{scattered}\n}}",
     )
     return _Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
-
-
-@cache
-def _has_only_doubles(type_: Type) -> bool:
-    """Whether a structure is an array of doubles; C has no empty structure within it."""
-    if isinstance(type_, Array):
-        return _has_only_doubles(type_.item)
-    parts = parts_of(type_)
-    return all(map(_has_only_doubles, parts)) if parts else type_ == FLOAT
-
-
-def _moves(
-    type_: Type, member: str, places: Sequence[int], text: str, depth: int = 0, place: str = ""
-) -> Iterator[str]:
-    """A statement for each number, in loops over arrays of numbers that are alike."""
-    indent = "    " * (depth + 1)
-    if isinstance(type_, Scalar):
-        cast = "" if type_ == FLOAT else "(int)"
-        yield indent + text.format(member=member, place=place or places[0], cast=cast)
-        return
-    if _is_even(type_):
-        assert isinstance(type_, Array)
-        letter, step = f"i{depth}", count(type_.item)
-        before = place or (str(places[0]) if places[0] else "")
-        further = f"{step} * {letter}" if step > 1 else letter
-        yield f"{indent}for (int {letter} = 0; {letter} < {type_.n}; {letter}++) {{"
-        at = f"{before} + {further}" if before else further
-        yield from _moves(type_.item, f"{member}.v[{letter}]", places, text, depth + 1, at)
-        yield f"{indent}}}"
-        return
-    for suffix, part in members(type_):
-        n = count(part)
-        if n:
-            yield from _moves(part, f"{member}{suffix}", places[:n], text, depth)
-        places = places[n:]
-
-
-def _is_even(type_: Type) -> bool:
-    """Whether a type is a number, or an array of what is even."""
-    return isinstance(type_, Scalar) or (isinstance(type_, Array) and _is_even(type_.item))
 
 
 def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:

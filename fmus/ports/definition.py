@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -25,18 +26,25 @@ class Origin(NamedTuple):
     citation: str = ""  #: what its equation numbers refer to
 
 
+class DefaultExperiment(NamedTuple):
+    """The experiment that a host runs if nothing else is asked for; times are in seconds."""
+
+    stop: float
+    step: float
+    start: float = 0.0
+    takes_any_step: bool = True  #: whether steps of another size can be made, too
+
+
 @dataclass(frozen=True, eq=False)
-class Definition:
-    """A component.
+class Model:
+    """What the description of an FMU says.
 
     Attributes:
-        name: of the component, and of its FMU.
+        name: of the model, and of its FMU.
         summary: one line.
         origin: where it comes from.
         ports: all but `fault`, in the order of their value references.
-        parameters: what its parameters mean to the equations, all but `h_max`.
-        noisy: the names of the outputs that have noise.
-        behaviour: how it runs.
+        experiment: that it is made for.
 
     """
 
@@ -44,9 +52,13 @@ class Definition:
     summary: str
     origin: Origin
     ports: tuple[Port, ...]
-    parameters: ParameterSet[Any]
-    noisy: tuple[str, ...]
-    behaviour: Behaviour
+    experiment: DefaultExperiment
+
+    @property
+    def identifier(self) -> str:
+        """The name of its library, and what names in C can begin with."""
+        found = re.sub(r"\W", "_", self.name, flags=re.ASCII)
+        return found if found[:1].isalpha() else f"of_{found}"
 
     @property
     def about(self) -> dict[str, str]:
@@ -59,6 +71,22 @@ class Definition:
     def description(self) -> str:
         """What modelDescription.xml says of it."""
         return ". ".join(filter(None, (self.summary, self.origin.citation)))
+
+
+@dataclass(frozen=True, eq=False)
+class Definition(Model):
+    """A component.
+
+    Attributes:
+        parameters: what its parameters mean to the equations, all but `h_max`.
+        noisy: the names of the outputs that have noise.
+        behaviour: how it runs.
+
+    """
+
+    parameters: ParameterSet[Any]
+    noisy: tuple[str, ...]
+    behaviour: Behaviour
 
 
 @cache
@@ -89,14 +117,15 @@ def define(name: str, module: ModuleType) -> Definition:
         *([] if said.h_max is None else [largest_step(said.h_max)]),
     )
     _hold_apart(said, ports)
-    _check_enumerations(ports)
+    check_enumerations(ports)
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
     origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
     for place, text in {"its docstring": summary, **origin._asdict()}.items():
         if not is_line(text.replace("\n", " ").replace("\t", " ")):
             raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
     noisy = tuple(port.name for port in outputs[said.noisy]) if said.noisy else ()
-    return Definition(name, summary, origin, ports, own, noisy, said)
+    experiment = DefaultExperiment(said.stop, said.step)
+    return Definition(name, summary, origin, ports, experiment, own, noisy, said)
 
 
 def _fed_through(
@@ -109,7 +138,7 @@ def _fed_through(
     for field, ports in outputs.items():
         for port in ports:
             place = (said.outputs.__name__, field)
-            for one in (*port.feedthrough, *port.initially):
+            for one in (*port.feedthrough, *(port.initially or ())):
                 if one not in names:
                     why = f"depends on {one!r}; there are {', '.join(names)}"
                     raise Misdeclared(f"{'.'.join(place)} {why}", *place)
@@ -117,7 +146,7 @@ def _fed_through(
             if said.is_sampled and not {*direct} - {TIME.name}:
                 why = "is sampled with the inputs, so it has feedthrough; leave out feedthrough=()"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-            initial = (name for one in port.initially for name in names[one])
+            initial = (name for one in port.initially or () for name in names[one])
             yield replace(
                 port,
                 variability="discrete" if said.is_sampled else port.variability,
@@ -138,8 +167,13 @@ def _hold_apart(said: Behaviour, ports: tuple[Port, ...]) -> None:
         taken[port.name] = name if port.name != H_MAX else "H_MAX"
 
 
-def _check_enumerations(ports: tuple[Port, ...]) -> None:
-    """Refuse types of one name that are two, or whose name something else has."""
+def check_enumerations(ports: tuple[Port, ...]) -> None:
+    """Refuse types of one name that are two, or whose name something else has.
+
+    Raises:
+        Misdeclared: there is one.
+
+    """
     taken: dict[str, object] = {port.name: port for port in ports}
     taken |= {unit_of(port.unit).type_name: port.unit for port in ports if port.unit}
     for port in ports:

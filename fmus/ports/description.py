@@ -6,22 +6,24 @@ from the ports.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import count
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
-from fmus.ports.behaviour import Behaviour
-from fmus.ports.definition import Definition
+from fmus.ports.definition import DefaultExperiment, Model
 from fmus.ports.port import FAULT, Port, Value
 from fmus.ports.units import unit_of
 
-#: What a component can do, where all versions of FMI have the same word for it.
+#: Whether steps may differ in size.
+_ANY_STEP = "canHandleVariableCommunicationStepSize"
+
+#: What an FMU can do, where all versions of FMI have the same word for it.
 CAPABILITIES = {
     "needsExecutionTool": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
-    "canHandleVariableCommunicationStepSize": "true",
+    _ANY_STEP: "true",
 }
 
 #: Statuses that messages are logged with and that have a category.
@@ -36,7 +38,7 @@ class Dependency(NamedTuple):
 
     number: int  #: of the output
     direct: list[int]  #: what its value depends on without a state between
-    initial: list[int]  #: what its value at the start time depends on
+    initial: list[int] | None  #: what its value at the start time depends on; None: all there is
 
 
 def _literal(value: Value) -> str:
@@ -47,14 +49,19 @@ def _literal(value: Value) -> str:
     return repr(float(value)).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
-def root_of(version: str, definition: Definition, **identity: str) -> Element:
+def capabilities_of(model: Model, said: Mapping[str, str]) -> dict[str, str]:
+    """What an FMU can do of what others can."""
+    return {**said, _ANY_STEP: str(model.experiment.takes_any_step).lower()}
+
+
+def root_of(version: str, model: Model, **identity: str) -> Element:
     """The root of a description that no other tool has written, with guid or token."""
     said = {
         "fmiVersion": version,
-        "modelName": definition.name,
+        "modelName": model.name,
         **identity,
-        "description": definition.description,
-        **definition.about,
+        "description": model.description,
+        **model.about,
         "generationTool": f"auv-fmu {__version__}",
         "variableNamingConvention": "structured",
     }
@@ -146,13 +153,19 @@ def dependencies(
             # FMI 2.0 has no variable for the time.
             direct = [places[name] for name in port.feedthrough if name in places]
             # fault is false at the start, unless what is set is refused.
-            start = [places[name] for name in port.initially]
-            initial = [] if port == FAULT else [*direct, *start, *parameters]
+            initial: list[int] | None = None
+            if port == FAULT:
+                initial = []
+            elif port.initially is not None:
+                start = [places[name] for name in port.initially]
+                initial = [*direct, *start, *parameters]
             yield Dependency(places[port.name], direct, initial)
 
 
-def dependent_on(known: Sequence[int]) -> dict[str, str]:
-    """What is said of an output that depends on variables at these places."""
+def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
+    """What is said of an output that depends on variables at these places; None: on all."""
+    if known is None:
+        return {}
     return {
         "dependencies": " ".join(map(str, known)),
         "dependenciesKind": " ".join(["dependent"] * len(known)),
@@ -169,10 +182,10 @@ def log_categories(fmi: str) -> Element:
     return categories
 
 
-def default_experiment(said: Behaviour) -> Element:
+def default_experiment(said: DefaultExperiment) -> Element:
     """The experiment that a host runs if nothing else is asked for."""
-    stop, step = str(said.stop), str(said.step)
-    return Element("DefaultExperiment", startTime="0.0", stopTime=stop, stepSize=step)
+    times = {"startTime": said.start, "stopTime": said.stop, "stepSize": said.step}
+    return Element("DefaultExperiment", {name: str(time) for name, time in times.items()})
 
 
 # FMI 2.0
@@ -188,21 +201,23 @@ _CAPABILITIES = {
 SOURCE = "fmi2.c"
 
 
-def fmi2_description(definition: Definition, guid: str) -> bytes:
-    """The description of a component that is a library of the same name.
+def fmi2_description(model: Model, guid: str) -> bytes:
+    """The description of a model that is a library with the name of its identifier.
 
     Args:
-        definition: of the component.
+        model: that it is about.
         guid: as the library knows it.
 
     """
-    root = root_of("2.0", definition, guid=guid)
-    implementation = SubElement(root, "CoSimulation", modelIdentifier=definition.name)
+    root = root_of("2.0", model, guid=guid)
+    implementation = SubElement(root, "CoSimulation", modelIdentifier=model.identifier)
     SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCE)
-    root.extend((log_categories("fmi2"), default_experiment(definition.behaviour)))
+    root.extend((log_categories("fmi2"), default_experiment(model.experiment)))
     SubElement(root, "ModelVariables")
     SubElement(root, "ModelStructure")
-    return text(complete(root, (*definition.ports, FAULT)))
+    complete(root, (*model.ports, FAULT))
+    implementation.attrib.update(capabilities_of(model, implementation.attrib))
+    return text(root)
 
 
 def complete(root: Element, ports: Sequence[Port]) -> Element:

@@ -7,7 +7,7 @@ exchange the same, so a tool that joins two terminals of one name joins the righ
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import groupby
 from operator import itemgetter
@@ -15,9 +15,10 @@ from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement
 
 from auv_fmu.language.quantities import member_of
-from fmus.ports.definition import Definition
+from fmus.ports.definition import Model
 from fmus.ports.description import (
     CAPABILITIES,
+    capabilities_of,
     default_experiment,
     dependencies,
     dependent_on,
@@ -49,25 +50,26 @@ SOURCE, _LANGUAGE = "fmi3.c", "C99"
 _PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
 
 
-def fmi3_description(definition: Definition, token: str, arrays: bool = False) -> bytes:
-    """The description of a component that is a library of the same name.
+def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
+    """The description of a model that is a library with the name of its identifier.
 
     Args:
-        definition: of the component.
+        model: that it is about.
         token: as the library knows it.
         arrays: whether vectors and matrices of one unit are variables of their own.
 
     """
-    ports = (*definition.ports, FAULT, TIME)
+    ports = (*model.ports, FAULT, TIME)
     variables = variables_of(ports, arrays)
-    root = root_of(_VERSION, definition, instantiationToken=token)
-    SubElement(root, "CoSimulation", _CAPABILITIES, modelIdentifier=definition.name)
+    root = root_of(_VERSION, model, instantiationToken=token)
+    said = capabilities_of(model, _CAPABILITIES)
+    SubElement(root, "CoSimulation", said, modelIdentifier=model.identifier)
     root.extend(
         (
             unit_definitions(units_of(ports)),
             type_definitions(ports, _add_type),
             log_categories("fmi3"),
-            default_experiment(definition.behaviour),
+            default_experiment(model.experiment),
             _variables(variables),
             _structure(variables),
         )
@@ -118,16 +120,23 @@ def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]
         _, reference, first = members[0]
         elements = [port for _, _, port in members]
         described = first.array.description if first.array else first.description
-        direct, initial = (
-            dict.fromkeys(names.get(one, one) for port in elements for one in getattr(port, on))
-            for on in ("feedthrough", "initially")
-        )
+        direct = tuple(_names(names, (name for port in elements for name in port.feedthrough)))
+        initial = _names(names, (name for port in elements for name in port.initially or ()))
         later = tuple(one for one in initial if one not in direct)
         whole = replace(
-            first, name=name, description=described, feedthrough=tuple(direct), initially=later
+            first,
+            name=name,
+            description=described,
+            feedthrough=direct,
+            initially=None if first.initially is None else later,
         )
         variables.append(_Variable(reference, whole, elements))
     return variables
+
+
+def _names(names: Mapping[str, str], found: Iterable[str]) -> dict[str, None]:
+    """Names of scalars as those of variables, each once."""
+    return dict.fromkeys(names.get(one, one) for one in found)
 
 
 def _variables(variables: Sequence[_Variable]) -> Element:

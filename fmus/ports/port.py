@@ -62,7 +62,8 @@ class Port:
         choices: the values of an Enumeration by their names.
         enumeration: what its type is called.
         feedthrough: of an output, what it depends on without a state between: inputs, the time.
-        initially: of an output, inputs that its value at the start depends on besides.
+        initially: of an output, inputs that its value at the start depends on besides; None: it
+            depends on all that is set.
         array: that it is an element of, all of which have one unit; None: of none.
 
     """
@@ -79,7 +80,7 @@ class Port:
     choices: Mapping[str, int] = field(default_factory=dict)
     enumeration: str = ""
     feedthrough: tuple[str, ...] = ()
-    initially: tuple[str, ...] = ()
+    initially: tuple[str, ...] | None = ()
     array: Array | None = None
 
     def __post_init__(self) -> None:

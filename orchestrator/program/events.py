@@ -34,7 +34,8 @@ from orchestrator.system.units import Linear
 from orchestrator.system.values import Value, items_of
 
 if TYPE_CHECKING:
-    from orchestrator.program.writer import Place, Text
+    from orchestrator.program.kind import Place
+    from orchestrator.program.writer import Text
 
 _SOURCE = Path(__file__).with_name("events.c")
 
@@ -82,7 +83,7 @@ static const parameter parameters[] = {{
 
 #: Whether values pass before a row shows them.
 _PASSING = {
-    True: "enum { HAS_PASSING = 1 };\n\n#define PASS pass",
+    True: "enum { HAS_PASSING = 1 };\n\n#define PASS(it, k, t) pass(it, k, t, &(Error){0})",
     False: "enum { HAS_PASSING = 0 };\n\n#define PASS(it, k, t) 0",
 }
 
@@ -157,7 +158,7 @@ def _retune(text: Text) -> str:
         kind = text.kind(name)
         lines = [
             f"{kind.name}_adopt(&it->{member}, error);",
-            f"if (noted.raised) return refused(it, {i}, SET, 0);",
+            f"if (error->raised) return refused(it, {i}, AT_SET, 0);",
         ]
         if text.passes and (kind.follows_inputs or kind.said.takes("outputs", "parameters")):
             # Outputs that follow from them are of now.
@@ -178,7 +179,7 @@ def _restart(text: Text) -> str:
             *text.checked_inputs(name),
             f"it->started[{i}] = t;",
             f"{text.kind(name).name}_start(&it->{member}, t, error);",
-            f"if (noted.raised) return refused(it, {i}, START, 0);",
+            f"if (error->raised) return refused(it, {i}, AT_START, 0);",
         ]
         cases[i] = lines
     doc = "Starts a component over, with what feeds it now; whether it refuses."

@@ -11,50 +11,58 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 from auv_fmu.paper import euler
+from fmus.language import tree
 from fmus.language.build import Program
-from fmus.language.tree import Function
-from fmus.language.types import FLOAT, Array, Scalar, Type, count, is_whole, scalars_in, type_of
-from fmus.native.emit import Emitter, closed, lines_of, members, number_in_c
+from fmus.language.types import FLOAT, Array, Type, is_whole
+from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
 from fmus.ports.definition import Definition
-from fmus.ports.groups import Nothing
 from fmus.ports.port import H_MAX, Port
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Order
 from orchestrator.master.plan import Plan, stages
-from orchestrator.program.reducing import Looking, ReducerText
-from orchestrator.master.stages import (
-    DIRECT,
-    ONLY_STATES,
-    STATES,
-    Stage,
-    Stages,
-    Visit,
-    stages_of,
-)
+from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Stages, Visit, stages_of
 from orchestrator.program.events import beginning, text_of_events
+from orchestrator.program.kind import EULER, Kind, Place, function, scalars
+from orchestrator.program.reducing import Looking, ReducerText
 from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
+from orchestrator.system.names import PortName, listed
 from orchestrator.system.units import Linear, Mapped
 
-#: What a call of the program comes to: all is well, or what was refused of which component.
-CALLS = START, INPUT, OUTPUTS, STEP, SET = "START", "INPUT", "OUTPUTS", "STEP", "SET"
+#: What a component has refused, where `failure` names one.
+CALLS = START, INPUT, OUTPUTS, STEP, SET = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP", "AT_SET"
 
-#: What stands in the equations of the time step.
-_EULER = (euler.internal_steps, euler.end_of_step)
+#: Values go along all connections so often at the start, until they rest.
+_MOST_ROUNDS = 1000
 
-#: From so many numbers on, a loop checks them.
-_MANY = 4
+_INCLUDES = """\
+#include <float.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#ifndef EXPORTED
+#define EXPORTED
+#endif"""
+
+#: How functions are called: those of components lie apart, and equations within them.
+_HEADS = {
+    False: "#define APART static",
+    True: (
+        "#if defined(__GNUC__)\n"
+        "#define APART static __attribute__((noinline))\n"
+        "#define WITHIN static inline __attribute__((always_inline))\n"
+        "#else\n#define APART static\n#define WITHIN static inline\n#endif"
+    ),
+}
 
 _FAILURE = """\
 /* Where Python raises, an equation goes on with what C gives; only that something was raised is
- * noted. What it says, Python says of the same step. */
+ * noted. */
 typedef struct {
     int raised;
 } Error;
@@ -66,15 +74,15 @@ _CHECKS = """\
 /* Partial sums that processors add side by side. */
 enum { LANES = 4 };
 
-/* Times zero, what is finite is zero and what is not is NaN. */
-static inline int all_finite(const double values[], int n) {
+/* Zero, where all values are finite; else it is not a number. */
+static inline double sum_of_zeros(const double values[], int n) {
     double sums[LANES] = {0.0};
     int i = 0, j;
     for (; i + LANES <= n; i += LANES) {
         for (j = 0; j < LANES; j++) sums[j] += 0.0 * values[i + j];
     }
     for (; i < n; i++) sums[0] += 0.0 * values[i];
-    return sums[0] + sums[1] + sums[2] + sums[3] == 0.0;
+    return sums[0] + sums[1] + sums[2] + sums[3];
 }
 
 static inline double sum_of_squares(const double values[], int n) {
@@ -87,7 +95,7 @@ static inline double sum_of_squares(const double values[], int n) {
     return sums[0] + sums[1] + sums[2] + sums[3];
 }
 
-/* Whether a value that an input takes is another one, bit for bit. */
+/* Takes a value into an input; whether it is another one, bit for bit. */
 static inline int take(double *input, double value) {
     const int is_other = memcmp(input, &value, sizeof value) != 0;
     *input = value;
@@ -98,14 +106,12 @@ static inline int take_whole(int *input, int value) {
     const int is_other = *input != value;
     *input = value;
     return is_other;
-}
-"""
+}"""
 
 _DRAWING = """\
-static inline void draw(generator *noise, double draws[], int n) {
+static inline void draw_normals(generator *noise, double draws[], int n) {
     for (int i = 0; i < n; i++) draws[i] = standard_normal(noise);
-}
-"""
+}"""
 
 _TIMES = """\
 static inline double time_after(const simulation *it, int k) {
@@ -119,280 +125,41 @@ static inline double length_of(const simulation *it, int k, int n) {
     return (double)(it->full_steps - k) * it->step;
 }
 
-/* Notes what refused. */
+/* Notes what was refused. */
 static int refused(simulation *it, int component, int call, int port) {
     it->component = component;
     it->call = call;
     it->port = port;
     return 1;
+}"""
+
+_BEGIN = """\
+/* Sets parameters, and lets values come to rest at the start; whether a component refuses. */
+EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,
+                   double stop_time, int full_steps, int steps)"""
+
+_RUN = """\
+/* Makes steps until so many are made, and rows if there is room for them; whether a component
+ * refuses. */
+EXPORTED int run(simulation *it, int until, double rows[])"""
+
+_ACCESS = """\
+EXPORTED size_t size_of_simulation(void) { return sizeof(simulation); }
+
+/* What was refused: the component, by its number; a call; and which input; after how many steps. */
+EXPORTED void failure(const simulation *it, int found[]) {
+    found[0] = it->component;
+    found[1] = it->call;
+    found[2] = it->port;
+    found[3] = it->made;
 }
-"""
+
+/* How many rows there are. */
+EXPORTED int rows_shown(const simulation *it) { return it->shown; }"""
 
 
 class Unsupported(InputError):
     """A system that cannot be one program; the text says why."""
-
-
-class Place(NamedTuple):
-    """A number of the program: where it lies, and its type."""
-
-    text: str  #: after the name of the simulation
-    type: Scalar
-
-
-def scalars(type_: Type, text: str) -> Iterator[Place]:
-    """All numbers in a value, in their order."""
-    if isinstance(type_, Scalar):
-        yield Place(text, type_)
-    for suffix, part in members(type_):
-        yield from scalars(part, text + suffix)
-
-
-@dataclass
-class _Kind:
-    """A component of which the system may have several.
-
-    Attributes:
-        definition: of it.
-        functions: its hooks as trees.
-        emitter: of all equations.
-        name: of its structure, and what its functions begin with.
-        euler: equations of the time step.
-        alters: whether events can happen to it.
-
-    """
-
-    definition: Definition
-    functions: Mapping[str, Function]
-    emitter: Emitter
-    name: str
-    euler: Mapping[str, Function]
-    alters: bool
-
-    def __post_init__(self) -> None:
-        said = self.definition.behaviour
-        self.said, self.types = said, {
-            "parameters": type_of(said.parameters),
-            "inputs": type_of(said.inputs),
-            "state": type_of(said.state),
-            "outputs": type_of(said.outputs),
-            "derived": type_of(said.derived or Nothing),
-        }
-        self.is_timed = said.takes("outputs", "t") or said.takes("derive", "t")
-        self.follows_inputs = said.takes("outputs", "inputs")
-        self.derives_anew = any(said.takes("derive", one) for one in ("state", "inputs", "t"))
-        self.has_h_max = said.h_max is not None
-
-    def ports(self, causality: str) -> list[Port]:
-        """Its ports of a causality, in the order of the numbers of their group."""
-        found = [port for port in self.definition.ports if port.causality == causality]
-        return [port for port in found if port.name != H_MAX or causality != "parameter"]
-
-    def text(self) -> Iterator[str]:
-        """Its structure and its functions."""
-        yield self._structure()
-        yield self._evaluate()
-        yield self._start()
-        yield self._advance()
-        if self.alters:
-            yield self._adopt()
-
-    def _call(self, hook: str, **given: str) -> str:
-        function = self.functions[hook]
-        known = {
-            "parameters": "it->parameters", "inputs": "it->inputs", "state": "it->state",
-            "derived": "it->derived", "t": "it->time", **given,
-        }  # fmt: skip
-        return self.emitter.call(function, [known[name] for name in function.arguments])
-
-    def _structure(self) -> str:
-        rows = [
-            f"{self.emitter.type(self.types[what])} {what};"
-            for what in ("parameters", "inputs", "state", "outputs")
-        ]
-        if self.said.derived:
-            rows.append(f"{self.emitter.type(self.types['derived'])} derived;")
-            rows.append("int underived; /* whether it is to be derived again before it is used */")
-        if self.said.hooks["update"]:
-            rows.append("double longest_step; /* that is not split [s] */")
-        if self.is_timed:
-            rows.append("double time; /* of the state [s] */")
-        if self.said.draws:
-            rows += [
-                f"double draws[{self.said.draws}];",
-                "int is_noisy; /* whether it makes a difference what is drawn */",
-                "generator noise;",
-            ]
-        body = "\n".join(f"    {row}" for row in rows)
-        return f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
-
-    def _function(self, name: str, arguments: str, body: Sequence[str]) -> str:
-        text = "\n".join(line for part in body for line in lines_of(part, "    "))
-        head = f"static void {self.name}_{name}({self.name} *it{arguments}, Error *error) {{"
-        unused = [
-            f"    (void){argument};\n"
-            for argument in ("error", *re.findall(r"(\w+)(?:,|$)", arguments.lstrip(", ")))
-            if not re.search(rf"\b{argument}\b", text)
-        ]
-        return f"{head}\n{''.join(unused)}{text}\n}}"
-
-    def _derive(self, state: str = "it->state", time: str = "it->time") -> list[str]:
-        if not self.said.derived:
-            return []
-        derived = f"it->derived = {self._call('derive', state=state, t=time)};"
-        return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
-
-    def _guarded(self, state: str) -> list[str]:
-        if not self.said.hooks["credible"]:
-            return []
-        test = self._call("credible", state=state)
-        return [f"if (!{test}) {state} = {self._call('restarted', state=state)};"]
-
-    def _evaluate(self) -> str:
-        state, body = "it->state", []
-        if self.said.hooks["credible"]:
-            state = "state"
-            body += [f"{self.emitter.type(self.types['state'])} state = it->state;"]
-            body += self._guarded(state)
-        if self.said.takes("outputs", "derived"):
-            body += self._derive(state)
-        body.append(f"it->outputs = {self._call('outputs', state=state)};")
-        if self.said.draws:
-            group = f"it->outputs.{in_c(self.said.noisy)}"
-            body.append(f"{group} = {self._measured('it->draws', group)};")
-        body.append(f"if (!({self._finite()})) error->raised = 1;")
-        return self._function("evaluate", "", body)
-
-    def _measured(self, draws: str, group: str) -> str:
-        type_ = self.functions["measured"].arguments["n"]
-        places = iter(f"{draws}[{i}]" for i in range(self.said.draws))
-        n = next(places) if isinstance(type_, Scalar) else self._made(type_, places)
-        return self._call("measured", **{"n": n, self.said.noisy: group})
-
-    def _made(self, type_: Type, places: Iterator[str]) -> str:
-        return f"({self.emitter.type(type_)}){self._initial(type_, places)}"
-
-    def _initial(self, type_: Type, places: Iterator[str]) -> str:
-        if isinstance(type_, Scalar):
-            return next(places)
-        parts = ", ".join(self._initial(part, places) for _, part in members(type_))
-        return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
-
-    def _finite(self) -> str:
-        """Whether all outputs are finite."""
-        return _over(self.types["outputs"], "it->outputs", "all_finite", "0.0 * {}", "== 0.0", "1")
-
-    def _sound(self, state: str) -> str:
-        """Whether a run can go on from a state."""
-        found = _over(
-            self.types["state"], state, "sum_of_squares", "{0} * {0}",
-            f"<= {number_in_c(euler.LARGEST_STATE**2)}", "1", is_sum=True,
-        )  # fmt: skip
-        members_of = [
-            f"({' || '.join(f'{place.text} == {int(one)}' for one in place.type.made)})"
-            for place in scalars(self.types["state"], state)
-            if place.type.made is not None
-        ]
-        return " && ".join([*members_of, found])
-
-    def _start(self) -> str:
-        body = []
-        if self.said.hooks["check"]:
-            body.append(f"{self._call('check')};")
-        if self.is_timed:
-            body.append("it->time = t;")
-        if self.said.derived:
-            body.append("it->underived = 1;")
-        if self.said.draws:
-            body.append(f"seed_generator(&it->noise, (uint32_t){self._call('seed')});")
-            body.append(f"draw(&it->noise, it->draws, {self.said.draws});")
-        if self.said.hooks["start"]:
-            body.append(f"it->state = {self._call('start', t='t')};")
-            body.append(f"if (!({self._sound('it->state')})) error->raised = 1;")
-        body.append(f"{self.name}_evaluate(it, error);")
-        if self.said.draws:
-            body += self._needs_noise()
-        return self._function("start", ", double t", body)
-
-    def _adopt(self) -> str:
-        """What follows from parameters that have changed."""
-        body = [f"{self._call('check')};"] if self.said.hooks["check"] else []
-        if self.said.derived:
-            body.append("it->underived = 1;")
-        return self._function("adopt", "", body)
-
-    def _needs_noise(self) -> list[str]:
-        """What finds out whether noise is multiplied by zero: then none need be drawn."""
-        if self.alters:
-            # It may be multiplied by something else later.
-            return ["it->is_noisy = 1;"]
-        n, group = self.said.draws, self.functions["measured"].returns
-        name = self.emitter.type(group)
-        draws = f"{{{', '.join(['HUGE_DRAW'] * n)}}}"
-        return [
-            f"const double large[{n}] = {draws};".replace("HUGE_DRAW", "1e300"),
-            f"const {name} none = {'0.0' if isinstance(group, Scalar) else '{0}'};",
-            f"const {name} all = {self._measured('large', 'none')};",
-            "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
-            f"if (!it->is_noisy) memset(it->draws, 0, sizeof it->draws);",
-        ]
-
-    def _advance(self) -> str:
-        said, body = self.said, []
-        if self.is_timed:
-            anew = "it->underived = 1; " if said.takes("derive", "t") else ""
-            change = f"{{ it->time = t; {anew}}}" if anew else "it->time = t;"
-            body.append(f"if (it->time != t) {change}")
-        if said.hooks["update"]:
-            body.append(f"{self.emitter.type(self.types['state'])} state = it->state;")
-            body += self._guarded("state")
-            split = self.emitter.call(self.euler["internal_steps"], ["h", "it->longest_step"])
-            body += [
-                "int n = 1;",
-                "if (h > it->longest_step) {",
-                f"    if (h / it->longest_step > {float(euler.MOST_INTERNAL_STEPS)!r}) {{",
-                "        error->raised = 1;",
-                "        return;",
-                "    }",
-                f"    n = {split};",
-                "}",
-                "const double step = h / n;",
-                "for (int i = 0; i < n && !error->raised; i++) {",
-            ]
-            time = "t + i * step"
-            if said.takes("update", "derived"):
-                body += [f"    {line}" for line in self._derive("state", time)]
-            body.append(f"    state = {self._call('update', state='state', t=time, h='step')};")
-            if said.takes("derive", "state") or said.takes("derive", "t"):
-                body.append("    it->underived = 1;")
-            body += [
-                "}",
-                f"if (!({self._sound('state')})) error->raised = 1;",
-                "if (error->raised) return;",
-                "it->state = state;",
-            ]
-        if self.is_timed:
-            end = self.emitter.call(self.euler["end_of_step"], ["start", "t", "h"])
-            body.append(f"it->time = {end};")
-        if said.draws:
-            body.append(f"if (it->is_noisy) draw(&it->noise, it->draws, {said.draws});")
-        if not said.is_sampled and not self.follows_inputs:
-            body.append(f"{self.name}_evaluate(it, error);")
-        return self._function("advance", ", double start, double t, double h", body)
-
-
-def _over(
-    type_: Type, text: str, function: str, term: str, test: str, nothing: str, is_sum: bool = False
-) -> str:
-    """A test of all floats in a value; whole numbers pass it."""
-    places = [place for place in scalars(type_, text) if place.type == FLOAT]
-    whole = [place for place in scalars(type_, text) if place.type != FLOAT]
-    if not places:
-        return nothing
-    if len(places) >= _MANY and not whole:
-        made = f"{function}((const double *)&{text}, {len(places)})"
-        return f"{made} {test}" if is_sum else made
-    return f"{' + '.join(term.format(place.text) for place in places)} {test}"
 
 
 @dataclass
@@ -403,172 +170,207 @@ class Text:
         plan: of the run that it makes.
         definitions: of its components, by their names.
         indices: that look on.
+        is_tuned: whether parameters may change after the start.
         alters: whether events can happen in it.
+        is_quick: whether all that has been computed is checked at once, when a row is shown; that
+            does not tell which component has refused.
 
     """
 
     plan: Plan
     definitions: Mapping[str, Definition]
     indices: Sequence[Looking] = ()
+    is_tuned: bool = False
     alters: bool = False
+    is_quick: bool = False
     #: Functions of connections that map values, by what follows their names.
     mappings: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        """Translate the equations.
+
+        Raises:
+            Unsupported: the system has a ring of direct feedthroughs.
+            Untranslatable: a component is outside the language of equations.
+
+        """
         system = self.plan.system
         if closed_rings := rings(system):
-            names = ", ".join(closed_rings[0])
-            raise Unsupported(f"{names}: direct feedthroughs form a ring, which a program cannot have")
-        experiment = self.plan.experiment
-        if experiment.order is None:
-            self.plan = _with_order(self.plan)
+            names = listed(closed_rings[0])
+            raise Unsupported(
+                f"direct feedthroughs of {names} form a ring, which no program can have"
+            )
+        order: Order = self.plan.experiment.order or FEEDTHROUGH
+        self.plan = replace(self.plan, experiment=replace(self.plan.experiment, order=order))
+        self.stages: Stages = stages_of(self.plan, stages(system, order))
+        self.passes = self.stages.passing is not None
+        self.is_tuned = self.is_tuned or self.alters
         self.components = [*system.components]
-        kinds = [*dict.fromkeys(self.definitions.values())]
-        hooks = {one: one.behaviour.hooks for one in kinds}
+        self.members = dict(zip(self.components, _distinct(self.components), strict=True))
+        self.slow = [name for name, n in self.plan.decimations.items() if n > 1]
+        definitions = [*dict.fromkeys(self.definitions[name] for name in self.components)]
+        hooks = {one: one.behaviour.hooks for one in definitions}
+        reducers = {id(one.reducer): one.reducer for one in self.indices}
         program = Program(
-            *(hook for one in kinds for hook in hooks[one].values() if hook),
-            *_EULER,
-            *(hook for one in self.indices for hook in one.reducer.hooks.values()),
+            *(hook for one in definitions for hook in hooks[one].values() if hook),
+            *EULER,
+            *(hook for one in reducers.values() for hook in one.hooks.values()),
         )
         program.check()
-        self.emitter = Emitter(program.functions.values())
+        functions = program.functions.values()
+        # What waits for a number would wait for ever for one that is none.
+        self.is_quick = self.is_quick and not any(map(_waits, functions))
+        self.emitter = Emitter(functions)
         self.kinds = {
-            one: _Kind(
+            one: Kind(
                 one,
                 {name: program.function(hook) for name, hook in hooks[one].items() if hook},
                 self.emitter,
                 self.emitter.unused(f"{_lower(one.name)}_component"),
-                {one.__name__: program.function(one) for one in _EULER},
-                self.alters,
+                {one.__name__: program.function(one) for one in EULER},
+                self.is_tuned,
+                not self.is_quick,
+                self._foreseen(one),
             )
-            for one in kinds
+            for one in definitions
         }
         self.reducers = {
             key: ReducerText(
                 one, program, self.emitter, self.emitter.unused(f"{_lower(one.name)}_index")
             )
-            for key, one in {id(one.reducer): one.reducer for one in self.indices}.items()
+            for key, one in reducers.items()
         }
-        self.members = dict(zip(self.components, _distinct(self.components)))
-        self.slow = {name for name, n in self.plan.decimations.items() if n > 1}
 
     # What there is
 
-    def kind(self, component: str) -> _Kind:
+    def kind(self, component: str) -> Kind:
         """The kind of a component."""
         return self.kinds[self.definitions[component]]
-
-    def _group(self, component: str, group: str, causality: str) -> dict[PortName, Place]:
-        kind, owner = self.kind(component), f"it->{self.members[component]}.{group}"
-        type_ = kind.types["outputs" if causality == "output" else group]
-        return {
-            PortName(component, port.name): place
-            for port, place in zip(kind.ports(causality), scalars(type_, owner), strict=True)
-        }
 
     @cached_property
     def columns(self) -> dict[PortName, Place]:
         """All inputs and outputs, as a row shows them."""
         found: dict[PortName, Place] = {}
         for name in self.components:
-            found |= self._group(name, "inputs", "input")
-            shown = "outputs" if name not in self.slow else "outputs_shown"
-            if name in self.slow:
-                owner = f"it->{self.members[name]}_shown"
-                kind = self.kind(name)
-                found |= {
-                    PortName(name, port.name): place
-                    for port, place in zip(
-                        kind.ports("output"), scalars(kind.types["outputs"], owner), strict=True
-                    )
-                }
-            else:
-                found |= self._group(name, shown, "output")
+            found |= self._inputs(name)
+            found |= self._outputs(name, "_shown" if name in self.slow else ".outputs")
         return found
 
     @cached_property
     def inputs(self) -> dict[PortName, int]:
         """The numbers of all inputs."""
-        groups = (self._group(name, "inputs", "input") for name in self.components)
-        return {port: i for i, port in enumerate(port for group in groups for port in group)}
-
-    @cached_property
-    def stages(self) -> Stages:
-        """The stages of every step."""
-        sequence = stages(self.plan.system, self.plan.experiment.order or FEEDTHROUGH)
-        return stages_of(self.plan, sequence)
-
-    @property
-    def passes(self) -> bool:
-        """Whether values pass before a row shows them."""
-        return self.stages.passing is not None
+        names = (port for name in self.components for port in self._inputs(name))
+        return {port: i for i, port in enumerate(names)}
 
     @cached_property
     def parameters(self) -> dict[PortName, Place]:
         """All parameters, and the inputs that nothing feeds."""
-        system, found = self.plan.system, dict[PortName, Place]()
+        found: dict[PortName, Place] = {}
         for name in self.components:
-            kind, owner = self.kind(name), self.members[name]
-            places = scalars(kind.types["parameters"], f"it->{owner}.parameters")
-            ports = [p for p in kind.definition.parameters.ports]
-            found |= {
-                PortName(name, port.name): place
-                for port, place in zip(ports, places, strict=True)
-            }
+            kind, owner = self.kind(name), f"it->{self.members[name]}"
+            found |= self._named(name, "parameter", "parameters", f"{owner}.parameters")
             if kind.has_h_max:
-                found[PortName(name, H_MAX)] = Place(f"it->{owner}.longest_step", FLOAT)
-            fed = {connection.target for connection in system.feeding[name]}
-            found |= {
-                port: place
-                for port, place in self._group(name, "inputs", "input").items()
-                if port not in fed
-            }
+                found[PortName(name, H_MAX)] = Place(f"{owner}.longest_step", FLOAT)
+            fed = {connection.target for connection in self.plan.system.feeding[name]}
+            inputs = self._inputs(name).items()
+            found |= {port: place for port, place in inputs if port not in fed}
         return found
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether random numbers are drawn."""
+        return any(kind.said.draws for kind in self.kinds.values())
+
+    def _inputs(self, name: str) -> dict[PortName, Place]:
+        return self._named(name, "input", "inputs", f"it->{self.members[name]}.inputs")
+
+    def _outputs(self, name: str, where: str = ".outputs") -> dict[PortName, Place]:
+        return self._named(name, "output", "outputs", f"it->{self.members[name]}{where}")
+
+    def _named(self, name: str, causality: str, group: str, owner: str) -> dict[PortName, Place]:
+        kind = self.kind(name)
+        places = scalars(kind.types[group], owner)
+        return {
+            PortName(name, port.name): place
+            for port, place in zip(kind.ports[causality], places, strict=True)
+        }
+
+    @cached_property
+    def _arrays(self) -> dict[str, str]:
+        """The types of all arrays of numbers among inputs and outputs, by where they lie."""
+        found: dict[str, str] = {}
+        for name in self.components:
+            kind, owner = self.kind(name), f"it->{self.members[name]}"
+            shown = f"{owner}_shown" if name in self.slow else f"{owner}.outputs"
+            for group, where in (("inputs", f"{owner}.inputs"), ("outputs", shown)):
+                for text, type_ in _arrays(kind.types[group], where):
+                    found[text] = f"{self.emitter.type(type_)} of {type_.n}"
+        return found
+
+    def _foreseen(self, definition: Definition) -> list[str]:
+        """The outputs that others take before they pass, in a program that computes only these."""
+        if not (self.is_quick and self.passes):
+            return []
+        sources = dict.fromkeys(one.source for one in self.plan.system.connections)
+        return [
+            *dict.fromkeys(
+                source.port
+                for source in sources
+                if self.definitions[source.component] is definition
+                and not self.plan.system.components[source.component].has_feedthrough(source.port)
+            )
+        ]
 
     # The text
 
     def text(self) -> str:
         """All of it."""
-        kinds = [part for kind in self.kinds.values() for part in kind.text()]
-        is_noisy = any(kind.said.draws for kind in self.kinds.values())
         arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
         noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
-        names = f"{len(self.components)} components"
-        begin, steps = self._begin(), self._steps()
-        events = [text_of_events(self)] if self.alters else []
+        title = closed(f"{self.plan.system.name}: {listed(self.components)} as one program.")
         parts = [
-            f"/* {closed(self.plan.system.name)}: {names} as one program. */\n#include <float.h>\n#include <stddef.h>\n#include <stdint.h>\n\n"
-            "#ifndef EXPORTED\n#define EXPORTED\n#endif",
+            f"/* {title} */\n{_INCLUDES}",
             arithmetic.replace('#include "error.h"\n', _FAILURE).strip(),
-            *([noise.strip()] if is_noisy else []),
-            self.emitter.text(),
-            _CHECKS.strip(),
-            *([_DRAWING.strip()] if is_noisy else []),
-            *kinds,
-            *(part for one in self.reducers.values() for part in one.text()),
-            self._simulation(),
-            _TIMES.strip(),
-            *(head + body for body, head in self.mappings.items()),
-            begin,
+            *([noise.strip()] if self.is_noisy else []),
+            *self.core(),
+            self._begin(),
             self._show(),
             *self._look(),
-            *steps,
-            *events,
+            *self._run(),
+            _ACCESS,
+            *([text_of_events(self)] if self.alters else []),
         ]
         return "\n\n".join(parts) + "\n"
 
+    def core(self) -> list[str]:
+        """What it is, whoever calls it: equations, components, the start, and a step."""
+        # Writing these adds to the structures and the mappings.
+        parts = [part for kind in self.kinds.values() for part in kind.text()]
+        parts += [part for one in self.reducers.values() for part in one.text()]
+        simulation, rest, steps = self._simulation(), self._rest(), self._steps()
+        equations = self.emitter.text()
+        if self.is_quick:
+            equations = re.sub(r"^static (?=[\w ]+[ *]\w+\()", "WITHIN ", equations, flags=re.M)
+        return [
+            _HEADS[self.is_quick],
+            equations,
+            _CHECKS,
+            *([_DRAWING] if self.is_noisy else []),
+            *parts,
+            simulation,
+            _TIMES,
+            *(head + body for body, head in self.mappings.items()),
+            rest,
+            *steps,
+        ]
+
     def _simulation(self) -> str:
-        rows = [
-            f"{self.kind(name).name} {member};" for name, member in self.members.items()
-        ]
-        rows += [
-            f"{self.emitter.type(self.kind(name).types['outputs'])} {self.members[name]}_shown;"
-            for name in self.components
-            if name in self.slow
-        ]
-        rows += [
-            f"{self.reducers[id(one.reducer)].name} index_{i};" for i, one in enumerate(self.indices)
-        ]
+        rows = [f"{self.kind(name).name} {member};" for name, member in self.members.items()]
+        for name in self.slow:
+            kind = self.kind(name)
+            rows.append(f"{self.emitter.type(kind.types['outputs'])} {self.members[name]}_shown;")
+        for i, (reducer, _) in enumerate(self.indices):
+            rows.append(f"{self.reducers[id(reducer)].name} index_{i};")
         if self.indices:
             rows.append("double looked; /* when the last row was looked at [s] */")
         if self.alters:
@@ -580,146 +382,152 @@ class Text:
                 "int due; /* after how many steps an event needs action */",
             ]
         body = "\n".join(f"    {row}" for row in rows)
-        calls = ", ".join(CALLS)
         return (
             "/* All that a run depends on. */\n"
             "typedef struct {\n"
             "    double start_time, step, stop_time;\n"
             "    int full_steps, steps; /* if there is one more of all steps, it is shorter */\n"
             "    int made, shown; /* steps, and rows */\n"
-            "    int component, call, port; /* that has refused */\n"
+            "    int component, call, port; /* that was refused */\n"
             f"{body}\n}} simulation;\n\n"
-            f"enum {{ {calls} }};"
+            f"enum {{ {', '.join(CALLS)} }};"
         )
 
+    # The start
+
     def _begin(self) -> str:
-        lines = []
+        values = []
         for i, (name, place) in enumerate(self.parameters.items()):
             value = f"parameters[{i}]"
             if place.type != FLOAT:
                 value = f"(int){value}"
             elif name.port == H_MAX:
                 value = f"fmin({value} * (1.0 + {euler.ROUNDING!r}), DBL_MAX)"
-            lines.append(f"    {place.text} = {value};")
+            values.append((place.text, value))
+        lines = [
+            "Error noted = {0};",
+            "memset(it, 0, sizeof *it);",
+            "it->start_time = start_time;",
+            "it->step = step;",
+            "it->stop_time = stop_time;",
+            "it->full_steps = full_steps;",
+            "it->steps = steps;",
+            *_copies(values),
+            *(beginning(self) if self.alters else ()),
+            *self.unsplit(),
+            "return come_to_rest(it, &noted) != 0;",
+        ]
+        return function(_BEGIN, lines, ())
+
+    def unsplit(self) -> Iterator[str]:
+        """Let steps of components that cannot split them be as long as they may."""
         for name in self.components:
             kind = self.kind(name)
-            if kind.said.hooks["update"] and not kind.has_h_max:
-                lines.append(f"    it->{self.members[name]}.longest_step = DBL_MAX;")
-        for connection in self.plan.system.connections:
-            # What an input has that is fed, until it is.
-            port = self._port(connection.target)
-            place = self.columns[connection.target]
-            lines.append(f"    {place.text} = {number_in_c(_start(port, place))};")
-        if self.alters:
-            lines += [f"    {line}" for line in beginning(self)]
-        order = [name for names in stages(self.plan.system, GAUSS_SEIDEL) for name in names]
+            if kind.steps and not kind.has_h_max:
+                yield f"it->{self.members[name]}.longest_step = DBL_MAX;"
+
+    def _rest(self) -> str:
+        """What lets values come to rest at the start."""
+        system = self.plan.system
+        order = [name for names in stages(system, GAUSS_SEIDEL) for name in names]
         turn = {name: i for i, name in enumerate(order)}
-        ahead = {
+        # What feeds a component before it is its own component's turn.
+        early = {
             one.source.component
-            for one in self.plan.system.connections
+            for one in system.connections
             if turn[one.source.component] >= turn[one.target.component]
         }
-        started = [
-            f"    {line}"
-            for name in self.components
-            if name in ahead
-            for line in self._started(name)
-        ]
-        settled = []
+        settled = ["const double t = it->start_time;", "int changed = 0, is_other;"]
         for name in order:
-            settled.append("    is_other = 0;")
-            for connection in self.plan.system.feeding[name]:
+            settled.append("is_other = 0;")
+            for connection in system.feeding[name]:
                 target = self.columns[connection.target]
-                function = "take" if target.type == FLOAT else "take_whole"
-                value = self.value(connection)
-                settled.append(f"    is_other |= {function}(&{target.text}, {value});")
-            settled.append("    if (is_other || everything) {")
-            settled += [f"        {line}" for line in self.checked_inputs(name)]
-            settled += [f"        {line}" for line in self._started(name)]
-            settled += ["        changed = 1;", "    }"]
-        return "\n".join(
-            [
-                "/* Hands values along all connections once, at the start; whether one has changed: 0, 1,",
-                " * or -1 where a component refuses. */",
-                "static int settle(simulation *it, int everything) {",
-                "    const double t = it->start_time;",
-                "    int changed = 0, is_other;",
-                "    Error noted = {0}, *error = &noted;",
-                *[line.replace("return 1;", "return -1;") for line in settled],
-                "    return changed;",
-                "}",
-                "",
-                "/* Sets parameters, and lets values come to rest at the start; whether a component refuses. */",
-                "EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,",
-                "                   double stop_time, int full_steps, int steps) {",
-                "    const double t = start_time;",
-                "    int changed, rounds = 0;",
-                "    Error noted = {0}, *error = &noted;",
-                "    memset(it, 0, sizeof *it);",
-                "    it->start_time = start_time;",
-                "    it->step = step;",
-                "    it->stop_time = stop_time;",
-                "    it->full_steps = full_steps;",
-                "    it->steps = steps;",
-                *lines,
-                *started,
-                "    changed = settle(it, 1);",
-                f"    while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0);",
-                *[
-                    f"    it->{self.members[name]}_shown = it->{self.members[name]}.outputs;"
-                    for name in self.components
-                    if name in self.slow
-                ],
-                "    (void)t;",
-                "    (void)error;",
-                "    return changed != 0;",
+                take = "take" if target.type == FLOAT else "take_whole"
+                settled.append(f"is_other |= {take}(&{target.text}, {self.value(connection)});")
+            settled += [
+                "if (is_other || everything) {",
+                *(f"    {line}" for line in self.checked_inputs(name)),
+                *(f"    {line}" for line in self._started(name)),
+                "    changed = 1;",
                 "}",
             ]
+        starts = []
+        for connection in system.connections:
+            place = self.columns[connection.target]
+            start = self._port(connection.target).start or 0
+            starts.append(f"{place.text} = {number_in_c(_as(place, start))};")
+        lines = [
+            "const double t = it->start_time;",
+            "int changed, rounds = 0;",
+            *starts,
+            *(line for name in self.components if name in early for line in self._started(name)),
+            "changed = settle(it, 1, error);",
+            f"while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
+            *(f"it->{self.members[one]}_shown = it->{self.members[one]}.outputs;" for one in self.slow),
+            "return changed;",
+        ]  # fmt: skip
+        return "\n\n".join(
+            (
+                "/* Hands values along all connections once: 1 where one has changed, 0, or -1 where a\n"
+                " * component refuses. */\n"
+                + function(
+                    "static int settle(simulation *it, int everything, Error *error)",
+                    [*map(_negative, settled), "return changed;"],
+                ),
+                "/* Lets values come to rest at the start: 0, 1 where they do not, or -1 where a component\n"
+                " * refuses. */\n"
+                + function(
+                    "static int come_to_rest(simulation *it, Error *error)",
+                    list(map(_negative, lines)),
+                    ("error", "t"),
+                ),
+            )
         )
 
     def _started(self, name: str) -> list[str]:
-        i, kind = self.components.index(name), self.kind(name)
         return [
-            f"{kind.name}_start(&it->{self.members[name]}, t, error);",
-            f"if (noted.raised) return refused(it, {i}, START, 0);",
+            f"{self.kind(name).name}_start(&it->{self.members[name]}, t, error);",
+            self._refusal(name, START),
         ]
 
+    def _refusal(self, name: str, call: str) -> str:
+        return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
+
     def _port(self, name: PortName) -> Port:
-        return next(
-            port
-            for port in self.definitions[name.component].ports
-            if port.name == name.port
-        )
+        ports = self.definitions[name.component].ports
+        return next(port for port in ports if port.name == name.port)
+
+    # What goes along connections
 
     def checked_inputs(self, name: str) -> Iterator[str]:
         """Refuse inputs that are out of range."""
-        transformed = {
-            one.target for one in self.plan.system.feeding[name] if one.transformation is not None
+        found, kind = self._inputs(name), self.kind(name)
+        feeding = self.plan.system.feeding[name]
+        # What is multiplied may become infinite, and whole numbers too large.
+        changed = {
+            one.target for one in feeding if self.alters or isinstance(one.transformation, Linear)
         }
-        i, found = self.components.index(name), self._group(name, "inputs", "input")
-        kind = self.kind(name)
         if self.alters:
-            inputs = f"it->{self.members[name]}.inputs"
-            finite = _over(kind.types["inputs"], inputs, "all_finite", "0.0 * {}", "== 0.0", "1")
-            whole = any(found[one.target].type != FLOAT for one in self.plan.system.feeding[name])
-            tests = ["noted.raised"] * whole + [f"!({finite})"] * (finite != "1")
-            if tests:
-                yield f"if ({' || '.join(tests)}) return refused(it, {i}, INPUT, -1);"
-        for number, (port, (target, place)) in enumerate(
-            zip(kind.ports("input"), found.items(), strict=True)
+            changed |= {*found}
+            if any(found[one.target].type != FLOAT for one in feeding):
+                yield f"if (error->raised) return refused(it, {self.components.index(name)}, {INPUT}, -1);"
+        for i, (port, (target, place)) in enumerate(
+            zip(kind.ports["input"], found.items(), strict=True)
         ):
             tests = []
+            if target in changed and place.type == FLOAT:
+                tests.append(f"0.0 * {place.text} == 0.0")
             if port.minimum is not None:
                 tests.append(f"{place.text} >= {number_in_c(_as(place, port.minimum))}")
             if port.maximum is not None:
                 tests.append(f"{place.text} <= {number_in_c(_as(place, port.maximum))}")
             if port.choices:
-                choices = " || ".join(f"{place.text} == {int(c)}" for c in port.choices.values())
-                tests.append(f"({choices})" if tests else choices)
-            if target in transformed and place.type == FLOAT and not self.alters:
-                tests.append(f"0.0 * {place.text} == 0.0")
+                among = " || ".join(f"{place.text} == {int(one)}" for one in port.choices.values())
+                tests.append(f"({among})")
             if tests:
-                yield f"if (!({' && '.join(tests)})) return refused(it, {i}, INPUT, {number});"
+                text = tests[0] if len(tests) == 1 and not port.choices else " && ".join(tests)
+                number = self.components.index(name)
+                yield f"if (!({text})) return refused(it, {number}, {INPUT}, {i});"
 
     def value(self, connection: Connection, owner: str = "it") -> str:
         """What arrives at the end of a connection, from the outputs of a simulation."""
@@ -736,33 +544,40 @@ class Text:
         return value
 
     def _mapped(self, target: PortName, change: Mapped, value: str) -> str:
-        whole = self.columns[target].type != FLOAT
-        of = "int" if whole else "double"
-        pairs = [(float(a), int(b) if whole else float(b)) for a, b in change.pairs]
+        place = self.columns[target]
+        of = "int" if is_whole(place.type) else "double"
         tests = "".join(
-            f"    if (value == {number_in_c(a)}) return {number_in_c(b)};\n" for a, b in pairs
+            f"    if (value == {number_in_c(float(a))}) return {number_in_c(_as(place, b))};\n"
+            for a, b in change.pairs
         )
         body = f"(double value) {{\n{tests}    return ({of})value;\n}}"
         head = self.mappings.setdefault(body, f"static {of} mapped_{len(self.mappings)}")
         return f"{head.rpartition(' ')[2]}({value})"
 
+    # Rows
+
     def _show(self) -> str:
-        lines = [
-            f"    row[{i + 1}] = {place.text};" for i, place in enumerate(self.columns.values())
-        ]
-        head = "static void show(const simulation *it, double t, double row[]) {\n    row[0] = t;"
-        return "\n".join(["/* A row: the time, and all inputs and outputs. */", head, *lines, "}"])
+        values = [(f"row[{i}]", place.text) for i, place in enumerate(self.columns.values(), 1)]
+        return (
+            f"enum {{ WIDTH = {1 + len(self.columns)} }};\n\n"
+            "/* A row: the time, and all inputs and outputs. */\n"
+            + function(
+                "static void show(const simulation *it, double t, double row[])",
+                ["row[0] = t;", *_copies(values)],
+                (),
+            )
+        )
 
     def _look(self) -> list[str]:
         """What looks at a row, and what gives the indices at the end."""
         if not self.indices:
             return []
         acts_at_end = int(self.plan.experiment.acting_row)
-        lines, gives, n = [], [], 0
+        lines, gives, n = ["const double h = t - it->looked;"], [], 0
         for i, (reducer, sources) in enumerate(self.indices):
             text = self.reducers[id(reducer)]
             of = dict(zip((port.name for port in reducer.ports), sources, strict=True))
-            row = text.row(lambda port: self._source(of[port.name]))
+            row = text.row(lambda port, of=of: self._source(of[port.name]))  # type: ignore[misc]
             look = (
                 f"{text.name}_look(&it->index_{i}, {row}, {acts_at_end}, t, h, it->start_time, "
                 "it->stop_time);"
@@ -776,17 +591,15 @@ class Text:
                 f"found + {n});"
             )
             n += sum(map(len, reducer.results.values()))
+        lines.append("it->looked = t;")
         return [
             "/* Lets indices look at a row. */\n"
-            "static void look(simulation *it, double t) {\n"
-            "    const double h = t - it->looked;\n"
-            + "".join(f"    {line}\n" for line in lines)
-            + "    it->looked = t;\n}",
+            + function("static void look(simulation *it, double t)", lines, ()),
             f"enum {{ INDICES = {n} }};\n\n"
             "/* The indices of the rows so far; what is not there is not a number. */\n"
-            "EXPORTED void indices(const simulation *it, double found[]) {\n"
-            + "".join(f"    {line}\n" for line in gives)
-            + "}",
+            + function(
+                "EXPORTED void indices(const simulation *it, double found[])", gives, ()
+            ),
         ]
 
     def _source(self, source: PortName | float) -> str:
@@ -794,174 +607,244 @@ class Text:
             return (self.columns.get(source) or self.parameters[source]).text
         return number_in_c(float(source))
 
-    def _steps(self) -> list[str]:
-        found = self.stages
-        parts = []
-        if found.passing is not None:
-            parts.append(self._made("pass", "Lets values of t_k pass", found.passing))
-        parts.append(self._made("make_step", "Makes the step after the k-th", found.stepping))
-        looks = ["    look(it, t);"] * bool(self.indices)
-        keep = [
-            f"enum {{ WIDTH = {1 + len(self.columns)} }};\n",
-            "/* Keeps the row after k steps. */",
-            "static void keep(simulation *it, int k, double rows[]) {",
-            "    const double t = time_after(it, k);",
-            "    if (rows != NULL) show(it, t, rows + k * WIDTH);",
-            *looks,
-            "    it->shown = k + 1;",
-            "}",
-        ]
-        parts.append("\n".join(keep))
-        if found.passing is not None:
-            passing = ["if (pass(it, k, time_after(it, k))) return 1;", "keep(it, k, rows);"]
-            body = [
+    # Steps
+
+    def _run(self) -> Iterator[str]:
+        looks = ["look(it, t);"] * bool(self.indices)
+        yield "/* Keeps the row after k steps. */\n" + function(
+            "static void keep(simulation *it, int k, double rows[])",
+            [
+                "const double t = time_after(it, k);",
+                "if (rows != NULL) show(it, t, rows + k * WIDTH);",
+                *looks,
+                "it->shown = k + 1;",
+            ],
+            ("t",),
+        )
+        sound = ["if (!is_sound(it, error)) return 1;"] * self.is_quick
+        lines = ["Error noted = {0}, *error = &noted;"]
+        if self.passes:
+            row = ["if (pass(it, k, time_after(it, k), error)) return 1;", *sound]
+            row.append("keep(it, k, rows);")
+            lines += [
                 "while (it->made < until) {",
                 "    const int k = it->made;",
-                *(f"    {line}" for line in passing),
-                "    if (make_step(it, k, time_after(it, k))) return 1;",
+                *(f"    {line}" for line in row),
+                "    if (make_step(it, k, time_after(it, k), error)) return 1;",
                 "    it->made = k + 1;",
                 "}",
                 "if (it->made == it->steps && it->shown == it->steps) {",
                 "    const int k = it->made;",
-                *(f"    {line}" for line in passing),
+                *(f"    {line}" for line in row),
                 "}",
-                "return 0;",
             ]
         else:
-            body = [
+            lines += [
                 "if (it->shown == 0) keep(it, 0, rows);",
                 "while (it->made < until) {",
                 "    const int k = it->made;",
-                "    if (make_step(it, k, time_after(it, k))) return 1;",
+                "    if (make_step(it, k, time_after(it, k), error)) return 1;",
+                *(f"    {line}" for line in sound),
                 "    keep(it, k + 1, rows);",
                 "    it->made = k + 1;",
                 "}",
-                "return 0;",
             ]
-        text = "\n".join(f"    {line}" for line in body)
-        parts.append(
-            "/* Makes steps until so many are made, and a row after each if there are rows; whether a\n"
-            " * component refuses. */\n"
-            f"EXPORTED int run(simulation *it, int until, double rows[]) {{\n{text}\n}}\n\n"
-            "EXPORTED size_t size_of_simulation(void) { return sizeof(simulation); }\n\n"
-            "/* What has refused: the component, by its number, what was called, and which input. */\n"
-            "EXPORTED void failure(const simulation *it, int found[]) {\n"
-            "    found[0] = it->component;\n    found[1] = it->call;\n    found[2] = it->port;\n"
-            "    found[3] = it->made;\n}\n\n"
-            "/* How many rows there are. */\n"
-            "EXPORTED int rows_shown(const simulation *it) { return it->shown; }"
-        )
+        yield function(_RUN, [*lines, "return 0;"], ())
+
+    def _steps(self) -> list[str]:
+        passing, parts = self.stages.passing, []
+        if passing is not None:
+            parts.append(self._made("pass", "Lets values of t_k pass", passing, ()))
+        begin = [
+            "const double h = length_of(it, k, 1);",
+            # What a host that counts its steps would reach.
+            "const int is_counted = k < it->full_steps && it->start_time == 0.0;",
+            f"const double end = is_counted ? time_after(it, k + 1) : {self._end('it->start_time')};",
+        ] * (not self.alters)  # fmt: skip
+        doc = "Makes the step after the k-th"
+        parts.append(self._made("make_step", doc, self.stages.stepping, begin))
+        if self.is_quick:
+            parts.append(self._sound())
         return parts
 
-    def _made(self, name: str, doc: str, found: Sequence[Stage]) -> str:
-        lines: list[str] = []
+    def _end(self, start: str) -> str:
+        kind = next(iter(self.kinds.values()))
+        return self.emitter.call(kind.euler["end_of_step"], [start, "t", "h"])
+
+    def _sound(self) -> str:
+        """What checks all that has been computed."""
+        tests = ["!error->raised"]
+        for name, member in self.members.items():
+            kind = self.kind(name)
+            tests += filter(None, [kind.are_finite(f"it->{member}.outputs")])
+            tests += filter(None, [kind.is_sound(f"it->{member}.state")] * kind.steps)
+        lines = [f"int is_sound = {tests[0]};", *(f"is_sound &= {test};" for test in tests[1:])]
+        return "/* Whether all that was computed is what a run can go on from. */\n" + function(
+            "static inline int is_sound(const simulation *it, const Error *error)",
+            [*lines, "return is_sound;"],
+        )
+
+    def _made(self, name: str, doc: str, found: Sequence[Stage], begin: Sequence[str]) -> str:
+        lines = [*begin]
         for stage in found:
             inner = list(self._stage(stage))
             if (when := stage.decimation) is not None:
-                k = "k + 1" if when.at_end else "k"
-                test = f"({k}) % {when.every} == 0" if when.at_end else f"k % {when.every} == 0"
-                end = " || k + 1 == it->steps" if when.at_end else " || k == it->steps"
-                lines += [f"if ({test}{end}) {{", *(f"    {line}" for line in inner), "}"]
+                k = "(k + 1)" if when.at_end else "k"
+                test = f"if ({k} % {when.every} == 0 || {k} == it->steps) {{"
+                lines += [test, *(f"    {line}" for line in inner), "}"]
             else:
                 lines += inner
-        text = "\n".join(part for line in lines for part in lines_of(line.lstrip(), "    " + " " * (len(line) - len(line.lstrip()))))
-        return (
-            f"/* {doc}; whether a component refuses. */\n"
-            f"static int {name}(simulation *it, int k, double t) {{\n"
-            "    Error noted = {0}, *error = &noted;\n"
-            f"    (void)k;\n    (void)t;\n    (void)error;\n{text}\n    return 0;\n}}"
+        return f"/* {doc}; whether a component refuses. */\n" + function(
+            f"static int {name}(simulation *it, int k, double t, Error *error)",
+            [*lines, "return 0;"],
+            ("k", "t", "error", *(("h", "end") if begin else ())),
         )
 
     def _stage(self, stage: Stage) -> Iterator[str]:
-        for connection in stage.connections:
-            target = self.columns[connection.target]
-            yield f"{target.text} = {self.value(connection)};"
-        for port in stage.shows:
-            if port.component in self.slow:
-                hidden = self._group(port.component, "outputs", "output")
-                if port in hidden:
-                    yield f"{self.columns[port].text} = {hidden[port].text};"
+        values = [(self.columns[one.target].text, self.value(one)) for one in stage.connections]
+        yield from _copies(values, self._arrays)
+        shown = {
+            port: place
+            for name in self.slow
+            if any(port.component == name for port in stage.shows)
+            for port, place in self._outputs(name).items()
+        }
+        yield from _copies(
+            [(self.columns[one].text, shown[one].text) for one in stage.shows if one in shown]
+        )
         visits = [visit for visit in stage.visits if isinstance(visit, Visit)]
-        every = stage.decimation.every if stage.decimation else 1
         for visit in visits:
-            yield from self._visited(visit, every)
+            yield from self._visited(visit, stage.decimation.every if stage.decimation else 1)
         for visit in visits:
             kind = self.kind(visit.component)
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
             if is_stale and self._reads(visit):
-                yield from self.evaluated(visit.component)
+                is_early = bool(kind.foreseen) and visit.steps and not visit.takes
+                yield from self.evaluated(visit.component, "foresee" if is_early else "evaluate")
 
     def _visited(self, visit: Visit, every: int) -> Iterator[str]:
         name, kind = visit.component, self.kind(visit.component)
-        member, i = f"it->{self.members[name]}", self.components.index(visit.component)
+        member, said = f"it->{self.members[name]}", kind.said
         if visit.takes:
             yield from self.checked_inputs(name)
-            if kind.said.derived and kind.said.takes("derive", "inputs"):
+            if said.derived and said.takes("derive", "inputs"):
                 yield f"{member}.underived = 1;"
         if not visit.steps:
             return
-        if kind.said.is_sampled:
-            anew = f" {member}.underived = 1;" * kind.said.takes("derive", "t")
-            if visit.takes:
-                if kind.is_timed:
-                    yield f"if ({member}.time != t) {{ {member}.time = t;{anew} }}"
-                yield from self.evaluated(name)
-            elif kind.is_timed:
+        if said.is_sampled:
+            timed = [f"{member}.time = t;"] * kind.is_timed
+            timed += [f"{member}.underived = 1;"] * bool(timed and said.takes("derive", "t"))
+            anew = list(self.evaluated(name))
+            lines = timed if visit.takes else [*timed, *anew]
+            if timed:
                 yield f"if ({member}.time != t) {{"
-                yield f"    {member}.time = t;{anew}"
-                yield from (f"    {line}" for line in self.evaluated(name))
+                yield from (f"    {line}" for line in lines)
                 yield "}"
-        begun = f"it->started[{i}]" if self.alters else "it->start_time"
-        yield (
-            f"{kind.name}_advance(&{member}, {begun}, t, length_of(it, k, {every}), error);"
-        )
-        yield f"if (noted.raised) return refused(it, {i}, STEP, 0);"
+            yield from anew if visit.takes else ()
+        times = ["t", "h", "end"]
+        if every > 1 or self.alters:
+            begun = "it->start_time"
+            if self.alters:
+                begun = f"it->started[{self.components.index(name)}]"
+            yield "{"
+            yield f"    const double h = length_of(it, k, {every});"
+            times[2] = self._end(begun) if kind.is_timed else "t"
+        call = f"{kind.name}_advance(&{member}, {', '.join(times)}, error);"
+        if every > 1 or self.alters:
+            yield f"    {call}"
+            yield "}"
+        else:
+            yield call
+        if not self.is_quick:
+            yield self._refusal(name, STEP)
 
-    def evaluated(self, name: str) -> Iterator[str]:
-        kind, i = self.kind(name), self.components.index(name)
-        yield f"{kind.name}_evaluate(&it->{self.members[name]}, error);"
-        yield f"if (noted.raised) return refused(it, {i}, OUTPUTS, 0);"
+    def evaluated(self, name: str, how: str = "evaluate") -> Iterator[str]:
+        """Compute the outputs of a component."""
+        yield f"{self.kind(name).name}_{how}(&it->{self.members[name]}, error);"
+        if not self.is_quick:
+            yield self._refusal(name, OUTPUTS)
 
     def _reads(self, visit: Visit) -> bool:
         """Whether one of the outputs is read that the component computes."""
         component = self.plan.system.components[visit.component]
-        computed = {port.name for port in self.kind(visit.component).ports("output")}
+        # Whether those of each type have feedthrough.
         types: dict[str, set[bool]] = {}
-        for variable in component.having("output"):
-            if variable.name in computed:
-                types.setdefault(variable.type, set()).add(
-                    bool(component.has_feedthrough(variable.name))
-                )
-        has_states = [kinds for kinds in types.values() if False in kinds]
+        for port in self.kind(visit.component).ports["output"]:
+            types.setdefault(port.type, set()).add(bool(component.has_feedthrough(port.name)))
         if visit.reads == DIRECT:
-            return any(True in kinds for kinds in types.values())
+            return any(True in found for found in types.values())
         if visit.reads == STATES:
-            return bool(has_states)
+            return any(False in found for found in types.values())
         if visit.reads == ONLY_STATES:
-            return any(True not in kinds for kinds in has_states)
+            return any(found == {False} for found in types.values())
         return bool(types)
 
 
-#: Values go along all connections so often, until they rest.
-_MOST_ROUNDS = 1000
+def _waits(function: tree.Function) -> bool:
+    """Whether a function may go round in a loop for ever."""
+    statements = tree.statements_in(function.body)
+    return any(isinstance(one, tree.While) for one in statements)
 
 
 def _as(place: Place, value: float) -> float:
     return int(value) if is_whole(place.type) else float(value)
 
 
-def _start(port: Port, place: Place) -> float:
-    return _as(place, port.start or 0)
-
-
-def _with_order(plan: Plan) -> Plan:
-    from dataclasses import replace
-
-    return replace(plan, experiment=replace(plan.experiment, order=FEEDTHROUGH))
+def _negative(line: str) -> str:
+    return line.replace("return refused(", "return -refused(")
 
 
 def _lower(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()
+
+
+def _arrays(type_: Type, text: str) -> Iterator[tuple[str, Array]]:
+    """The arrays of numbers in a value, and where they lie."""
+    if isinstance(type_, Array) and not members(type_.item):
+        yield text, type_
+        return
+    for suffix, part in members(type_):
+        yield from _arrays(part, text + suffix)
+
+
+#: A number of an array: the array, and its place.
+_ELEMENT = re.compile(r"(\(int\))?(.+)\[(\d+)\]")
+
+
+def _copies(values: Sequence[tuple[str, str]], arrays: Mapping[str, str] = {}) -> Iterator[str]:
+    """Assignments, whole arrays in one and neighbours in a loop."""
+    run: list[tuple[str, str]] = []
+    for one in [*values, ("", "")]:
+        if run and not _follows(run[-1], one):
+            yield from _copied(run, arrays)
+            run = []
+        run.append(one)
+
+
+def _follows(one: tuple[str, str], other: tuple[str, str]) -> bool:
+    """Whether two assignments are of neighbours."""
+    found = [(_ELEMENT.fullmatch(a), _ELEMENT.fullmatch(b)) for a, b in zip(one, other, strict=True)]
+    return all(
+        a is not None and b is not None and a[1] == b[1] and a[2] == b[2] and int(b[3]) == int(a[3]) + 1
+        for a, b in found
+    )  # fmt: skip
+
+
+def _copied(run: Sequence[tuple[str, str]], arrays: Mapping[str, str]) -> Iterator[str]:
+    if len(run) == 1:
+        yield from (f"{target} = {value};" for target, value in run if target)
+        return
+    ends = [_ELEMENT.fullmatch(text) for text in run[0]]
+    (cast, to, at), (cast, of, begin) = ((end[1] or "", end[2], int(end[3])) for end in ends if end)
+    whole = f" of {len(run)}"
+    types = {arrays.get(to.removesuffix(".v"), "a"), arrays.get(of.removesuffix(".v"), "b")}
+    if len(types) == 1 and types.pop().endswith(whole):
+        yield f"{to.removesuffix('.v')} = {of.removesuffix('.v')};"
+        return
+    places = (f"i + {n}" if n else "i" for n in (at, begin))
+    yield (
+        f"for (int i = 0; i < {len(run)}; i++) {to}[{next(places)}] = {cast}{of}[{next(places)}];"
+    )
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
@@ -979,5 +862,5 @@ def _distinct(names: Sequence[str]) -> list[str]:
 #: Other members of the simulation.
 _TAKEN = (
     "start_time", "step", "stop_time", "full_steps", "steps", "made", "shown", "component", "call",
-    "port", "factors", "offsets", "supplied", "started", "due",
+    "port", "looked", "factors", "offsets", "supplied", "started", "due",
 )  # fmt: skip

@@ -3,6 +3,9 @@
  * The Mersenne Twister MT19937 of Matsumoto and Nishimura (https://doi.org/10.1145/272991.272995),
  * seeded as Python seeds it with an integer of one word.
  */
+#ifndef NOISE_C
+#define NOISE_C
+
 #include <math.h>
 #include <stdint.h>
 #include <string.h>
@@ -84,3 +87,5 @@ static double standard_normal(generator *it) {
     /* Python gives mean + z * deviation: it has no negative zero. */
     return 0.0 + z;
 }
+
+#endif

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
 from auv_fmu import __version__
 from fmus.kinds import TARGETS
-from fmus.ports.definition import Definition, Origin
+from fmus.ports.definition import DefaultExperiment, Definition, Origin
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
     fmi3_description,
@@ -124,8 +123,8 @@ def canonical(content: str | bytes) -> str:
 def test_description_says_what_the_ports_are():
     nothing: Any = None
     origin = Origin("Me", "MIT", "1.2", "From a book")
-    behaviour: Any = SimpleNamespace(step=10.0, stop=3600.0)
-    it = Definition("It", "A thing", origin, PORTS, nothing, (), behaviour)
+    experiment = DefaultExperiment(3600.0, 10.0)
+    it = Definition("It", "A thing", origin, PORTS, experiment, nothing, (), nothing)
     found = fmi3_description(it, "{1}")
     assert canonical(found) == canonical(DESCRIPTION)
 

@@ -6,7 +6,6 @@ from enum import IntEnum
 from itertools import chain
 from math import inf, nan
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Annotated, Any, NamedTuple, cast
 
 import pytest
@@ -15,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
-from fmus.ports.definition import Definition, Origin
+from fmus.ports.definition import DefaultExperiment, Definition, Origin
 from fmus.ports.description import fmi2_description
 from fmus.ports.description_fmi3 import fmi3_description
 from fmus.ports.fields import declared
@@ -418,8 +417,8 @@ def test_what_is_declared_can_be_described(folder, causality, fields):
         assert len(str(flaw).splitlines()) == 1
         assert flaw.place[0] in ("Fields", "Odd", "Far")
         return
-    nothing, behaviour = cast(Any, None), cast(Any, SimpleNamespace(step=0.02, stop=100.0))
-    it = Definition("It", "A thing", Origin(), tuple(found), nothing, (), behaviour)
+    nothing, experiment = cast(Any, None), DefaultExperiment(100.0, 0.02)
+    it = Definition("It", "A thing", Origin(), tuple(found), experiment, nothing, (), nothing)
     for describe in (fmi2_description, fmi3_description):
         (folder / "modelDescription.xml").write_bytes(describe(it, "{1}"))
         assert validate_fmu(str(folder)) == []

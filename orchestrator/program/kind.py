@@ -1,0 +1,323 @@
+"""A component in C, as a program has it: its structure, its start, its outputs and its step.
+
+What the FMUs' runtime does is written here for one component, without what only a host asks for.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+from auv_fmu.paper import euler
+from fmus.language.tree import Function
+from fmus.language.types import FLOAT, Array, Scalar, Type, type_of
+from fmus.native.emit import Emitter, closed, lines_of, members, number_in_c, unbroken
+from fmus.native.names import in_c
+from fmus.ports.definition import Definition
+from fmus.ports.groups import Nothing
+from fmus.ports.port import H_MAX, Port
+
+#: Equations of the time step.
+EULER = (euler.internal_steps, euler.end_of_step)
+
+#: What is said of a step that is refused, where there is somebody to hear it.
+_NOT_FINITE, _UNSOUND, _TOO_MANY = (
+    f"raise_error(error, {unbroken(why)});"
+    for why in (
+        "an output is not finite",
+        f"the state is not finite, or exceeds {euler.LARGEST_STATE:g}",
+        f"the step needs more than {euler.MOST_INTERNAL_STEPS} internal steps; take shorter ones, "
+        "or raise h_max",
+    )
+)
+
+#: From so many numbers on, a loop checks them.
+_MANY = 4
+
+#: A number so large that whatever it is multiplied by shows, unless that is zero.
+_LARGE = "1e300"
+
+
+class Place(NamedTuple):
+    """A number of a program: where it lies, and its type."""
+
+    text: str  #: after the name of the simulation
+    type: Scalar
+
+
+def scalars(type_: Type, text: str) -> Iterator[Place]:
+    """All numbers in a value, in their order."""
+    if isinstance(type_, Scalar):
+        yield Place(text, type_)
+    for suffix, part in members(type_):
+        yield from scalars(part, text + suffix)
+
+
+def initializer(type_: Type, texts: Iterator[str]) -> str:
+    """A value from the texts of its numbers."""
+    if isinstance(type_, Scalar):
+        return next(texts) if type_ == FLOAT else f"(int){next(texts)}"
+    parts = ", ".join(initializer(part, texts) for _, part in members(type_))
+    return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
+
+
+def function(head: str, lines: Sequence[str], arguments: Sequence[str] = ("error",)) -> str:
+    """A function of statements; arguments that it does not use are marked so."""
+    text = "\n".join(line for one in lines for line in _indented(one))
+    unused = [f"    (void){name};\n" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    return f"{head} {{\n{''.join(unused)}{text}\n}}"
+
+
+def _indented(line: str) -> list[str]:
+    inner = line.lstrip()
+    return lines_of(inner, " " * (4 + len(line) - len(inner)))
+
+
+@dataclass
+class Kind:
+    """A component in C, of which a system may have several.
+
+    Attributes:
+        definition: of it.
+        functions: its hooks as trees.
+        emitter: of all equations.
+        name: of its structure, and what its functions begin with.
+        euler: equations of the time step.
+        is_tuned: whether parameters may change after the start.
+        is_checked: whether each call says whether what it has computed is sound.
+        foreseen: outputs that others take before their inputs are known, if only these are wanted
+            then.
+
+    """
+
+    definition: Definition
+    functions: Mapping[str, Function]
+    emitter: Emitter
+    name: str
+    euler: Mapping[str, Function]
+    is_tuned: bool
+    is_checked: bool
+    foreseen: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        said = self.said = self.definition.behaviour
+        self.types = {
+            "parameters": type_of(said.parameters),
+            "inputs": type_of(said.inputs),
+            "state": type_of(said.state),
+            "outputs": type_of(said.outputs),
+            "derived": type_of(said.derived or Nothing),
+        }
+        self.is_timed = said.takes("outputs", "t") or said.takes("derive", "t")
+        self.follows_inputs = said.takes("outputs", "inputs")
+        self.steps = said.hooks["update"] is not None
+        self.has_h_max = said.h_max is not None
+
+    @cached_property
+    def ports(self) -> Mapping[str, Sequence[Port]]:
+        """Its ports by causality, in the order of the numbers of their group."""
+        found: dict[str, list[Port]] = {"input": [], "output": [], "parameter": []}
+        for port in self.definition.ports:
+            if port.name != H_MAX or not self.has_h_max:
+                found[port.causality].append(port)
+        return found
+
+    def text(self) -> Iterator[str]:
+        """Its structure and its functions."""
+        yield self._structure()
+        yield self._evaluate()
+        if self.foreseen:
+            yield self._foresee()
+        yield self._start()
+        yield self._advance()
+        if self.is_tuned:
+            yield self._adopt()
+
+    def are_finite(self, outputs: str) -> str:
+        """Whether all outputs are finite; empty: they have no floats."""
+        return _of_all(self.types["outputs"], outputs, "sum_of_zeros", "0.0 * {}", "== 0.0")
+
+    def is_sound(self, state: str) -> str:
+        """Whether a run can go on from a state; empty: it has no numbers."""
+        limit = f"<= {number_in_c(euler.LARGEST_STATE**2)}"
+        size = _of_all(self.types["state"], state, "sum_of_squares", "{0} * {0}", limit)
+        among = [
+            f"({' || '.join(f'{place.text} == {int(one)}' for one in place.type.made)})"
+            for place in scalars(self.types["state"], state)
+            if place.type.made is not None
+        ]
+        return " && ".join([*among, *([size] if size else [])])
+
+    def _type(self, group: str) -> str:
+        return self.emitter.type(self.types[group])
+
+    def _call(self, hook: str, **given: str) -> str:
+        called = self.functions[hook]
+        known = {
+            "parameters": "it->parameters", "inputs": "it->inputs", "state": "it->state",
+            "derived": "it->derived", "t": "it->time", **given,
+        }  # fmt: skip
+        return self.emitter.call(called, [known[name] for name in called.arguments])
+
+    def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
+        head = f"APART void {self.name}_{name}({self.name} *it{arguments}, Error *error)"
+        names = re.findall(r"(\w+)(?=,|$)", arguments)
+        return function(head, lines, ["error", *filter(None, names)])
+
+    def _structure(self) -> str:
+        rows = [f"{self._type(what)} {what};" for what in ("parameters", "inputs", "state")]
+        rows.append(f"{self._type('outputs')} outputs;")
+        if self.said.derived:
+            rows.append(f"{self._type('derived')} derived;")
+            rows.append("int underived; /* whether it is to be derived again before it is used */")
+        if self.steps:
+            rows.append("double longest_step; /* that is not split [s] */")
+        if self.is_timed:
+            rows.append("double time; /* of the state [s] */")
+        if self.said.draws:
+            rows.append(f"double draws[{self.said.draws}];")
+            rows.append("int is_noisy; /* whether it makes a difference what is drawn */")
+            rows.append("generator noise;")
+        body = "\n".join(f"    {row}" for row in rows)
+        return f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
+
+    def _derive(self, state: str, time: str) -> list[str]:
+        if not self.said.derived:
+            return []
+        derived = f"it->derived = {self._call('derive', state=state, t=time)};"
+        return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
+
+    def _guarded(self) -> list[str]:
+        """A copy of the state, which a guard may start over."""
+        lines = [f"{self._type('state')} state = it->state;"]
+        if self.said.hooks["credible"]:
+            test = self._call("credible", state="state")
+            lines.append(f"if (!{test}) state = {self._call('restarted', state='state')};")
+        return lines
+
+    def _computed(self) -> list[str]:
+        """What computes the outputs."""
+        is_guarded = self.said.hooks["credible"] is not None
+        lines, state = self._guarded() * is_guarded, "state" if is_guarded else "it->state"
+        if self.said.takes("outputs", "derived"):
+            lines += self._derive(state, "it->time")
+        lines.append(f"{self._type('outputs')} outputs = {self._call('outputs', state=state)};")
+        if self.said.draws:
+            group = f"outputs.{in_c(self.said.noisy)}"
+            lines.append(f"{group} = {self._measured('it->draws', group)};")
+        return lines
+
+    def _evaluate(self) -> str:
+        finite = self.are_finite("outputs")
+        check = [f"if (!({finite})) {_NOT_FINITE}"] * bool(finite and self.is_checked)
+        return self._function("evaluate", "", [*self._computed(), *check, "it->outputs = outputs;"])
+
+    def _foresee(self) -> str:
+        places = zip(
+            self.ports["output"],
+            scalars(self.types["outputs"], "it->outputs"),
+            scalars(self.types["outputs"], "outputs"),
+            strict=True,
+        )
+        lines = [f"{to.text} = {of.text};" for port, to, of in places if port.name in self.foreseen]
+        return self._function("foresee", "", [*self._computed(), *lines])
+
+    def _measured(self, draws: str, group: str) -> str:
+        type_ = self.functions["measured"].arguments["n"]
+        n = initializer(type_, (f"{draws}[{i}]" for i in range(self.said.draws)))
+        n = n if isinstance(type_, Scalar) else f"({self.emitter.type(type_)}){n}"
+        return self._call("measured", **{"n": n, self.said.noisy: group})
+
+    def _start(self) -> str:
+        said, lines = self.said, list[str]()
+        if said.hooks["check"]:
+            lines.append(f"{self._call('check')};")
+        if self.is_timed:
+            lines.append("it->time = t;")
+        if said.derived:
+            lines.append("it->underived = 1;")
+        if said.draws:
+            lines.append(f"seed_generator(&it->noise, (uint32_t){self._call('seed')});")
+            lines.append(f"draw_normals(&it->noise, it->draws, {said.draws});")
+        if said.hooks["start"]:
+            lines.append(f"it->state = {self._call('start', t='t')};")
+            if sound := self.is_sound("it->state"):
+                lines.append(f"if (!({sound})) {_UNSOUND}")
+        lines.append(f"{self.name}_evaluate(it, error);")
+        if not self.is_checked and (finite := self.are_finite("it->outputs")):
+            lines.append(f"if (!({finite})) {_NOT_FINITE}")
+        if said.draws:
+            lines += ["it->is_noisy = 1;"] if self.is_tuned else self._needs_noise()
+        return self._function("start", ", double t", lines)
+
+    def _needs_noise(self) -> list[str]:
+        """What finds out whether noise is multiplied by zero: then none need be drawn."""
+        n, type_ = self.said.draws, self.functions["measured"].returns
+        name = self.emitter.type(type_)
+        return [
+            f"const double large[{n}] = {{{', '.join([_LARGE] * n)}}};",
+            f"const {name} none = {'0.0' if isinstance(type_, Scalar) else '{0}'};",
+            f"const {name} all = {self._measured('large', 'none')};",
+            "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
+            "if (!it->is_noisy) memset(it->draws, 0, sizeof it->draws);",
+        ]
+
+    def _advance(self) -> str:
+        said, lines = self.said, list[str]()
+        if self.is_timed:
+            anew = " it->underived = 1;" * said.takes("derive", "t")
+            lines += ["if (it->time != t) {", f"    it->time = t;{anew}", "}"]
+        if self.steps:
+            split = self.emitter.call(self.euler["internal_steps"], ["h", "it->longest_step"])
+            lines += [
+                *self._guarded(),
+                "int n = 1;",
+                "if (h > it->longest_step) {",
+                f"    if (h / it->longest_step > {float(euler.MOST_INTERNAL_STEPS)!r}) {{",
+                f"        {_TOO_MANY}",
+                "        return;",
+                "    }",
+                f"    n = {split};",
+                "}",
+                "const double step = h / n;",
+                "for (int i = 0; i < n && !error->raised; i++) {",
+            ]
+            time = "t + i * step"
+            if said.takes("update", "derived"):
+                lines += [f"    {line}" for line in self._derive("state", time)]
+            lines.append(f"    state = {self._call('update', state='state', t=time, h='step')};")
+            if said.takes("derive", "state") or said.takes("derive", "t"):
+                lines.append("    it->underived = 1;")
+            lines.append("}")
+            if self.is_checked:
+                sound = self.is_sound("state")
+                lines += [f"if (!({sound})) {_UNSOUND}"] * bool(sound)
+                lines.append("if (error->raised) return;")
+            lines.append("it->state = state;")
+        if self.is_timed:
+            lines.append("it->time = end;")
+        if said.draws:
+            lines.append(f"if (it->is_noisy) draw_normals(&it->noise, it->draws, {said.draws});")
+        if not said.is_sampled and not self.follows_inputs:
+            lines.append(f"{self.name}_evaluate(it, error);")
+        return self._function("advance", ", double t, double h, double end", lines)
+
+    def _adopt(self) -> str:
+        """What follows from parameters that have changed."""
+        lines = [f"{self._call('check')};"] if self.said.hooks["check"] else []
+        lines += ["it->underived = 1;"] * bool(self.said.derived)
+        return self._function("adopt", "", lines)
+
+
+def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
+    """A test of all floats in a value; empty: there is none."""
+    places = [*scalars(type_, text)]
+    floats = [place.text for place in places if place.type == FLOAT]
+    if not floats:
+        return ""
+    if _MANY <= len(floats) == len(places):
+        return f"{name}((const double *)&{text}, {len(floats)}) {test}"
+    return f"{' + '.join(term.format(one) for one in floats)} {test}"
