@@ -288,7 +288,7 @@ class Emitter:
         if raises == RANGE:
             body = f"    return bounded_result(x, {name}(x), error);"
         else:
-            body = f"    if ({raises}) raise_domain_error(error);\n{body}"
+            body = f"    raise_if({raises}, error, DOMAIN_ERROR);\n{body}"
         head = f"static inline double math_{name}(double x, Error *error) {{"
         self._wrappers[name] = f"{head}\n{body}\n}}"
 

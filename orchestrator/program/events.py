@@ -178,6 +178,7 @@ def _restart(text: Text) -> str:
         lines += [
             *text.checked_inputs(name),
             f"it->started[{i}] = t;",
+            *([f"it->{member}.is_seeded = 0;"] * bool(text.kind(name).said.draws)),
             f"{text.kind(name).name}_start(&it->{member}, t, error);",
             f"if (error->raised) return refused(it, {i}, AT_START, 0);",
         ]

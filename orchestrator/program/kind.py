@@ -138,7 +138,7 @@ class Kind:
 
     def are_finite(self, outputs: str) -> str:
         """Whether all outputs are finite; empty: they have no floats."""
-        return _of_all(self.types["outputs"], outputs, "sum_of_zeros", "0.0 * {}", "== 0.0")
+        return _of_all(self.types["outputs"], outputs, "are_finite", "0.0 * {}", "== 0.0")
 
     def is_sound(self, state: str) -> str:
         """Whether a run can go on from a state; empty: it has no numbers."""
@@ -180,7 +180,7 @@ class Kind:
         if self.said.draws:
             rows.append(f"double draws[{self.said.draws}];")
             rows.append("int is_noisy; /* whether it makes a difference what is drawn */")
-            rows.append("generator noise;")
+            rows += ["int is_seeded;", "generator noise;"]
         body = "\n".join(f"    {row}" for row in rows)
         return f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
 
@@ -240,8 +240,7 @@ class Kind:
         if said.derived:
             lines.append("it->underived = 1;")
         if said.draws:
-            lines.append(f"seed_generator(&it->noise, (uint32_t){self._call('seed')});")
-            lines.append(f"draw_normals(&it->noise, it->draws, {said.draws});")
+            lines += ["if (!it->is_seeded) {", *(f"    {line}" for line in self._seed()), "}"]
         if said.hooks["start"]:
             lines.append(f"it->state = {self._call('start', t='t')};")
             if sound := self.is_sound("it->state"):
@@ -249,20 +248,26 @@ class Kind:
         lines.append(f"{self.name}_evaluate(it, error);")
         if not self.is_checked and (finite := self.are_finite("it->outputs")):
             lines.append(f"if (!({finite})) {_NOT_FINITE}")
-        if said.draws:
-            lines += ["it->is_noisy = 1;"] if self.is_tuned else self._needs_noise()
         return self._function("start", ", double t", lines)
 
-    def _needs_noise(self) -> list[str]:
-        """What finds out whether noise is multiplied by zero: then none need be drawn."""
+    def _seed(self) -> list[str]:
+        """What begins the noise, unless it is multiplied by zero: then none need be drawn."""
         n, type_ = self.said.draws, self.functions["measured"].returns
         name = self.emitter.type(type_)
-        return [
+        noisy = [
             f"const double large[{n}] = {{{', '.join([_LARGE] * n)}}};",
             f"const {name} none = {'0.0' if isinstance(type_, Scalar) else '{0}'};",
             f"const {name} all = {self._measured('large', 'none')};",
             "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
-            "if (!it->is_noisy) memset(it->draws, 0, sizeof it->draws);",
+        ]
+        return [
+            "it->is_seeded = 1;",
+            # Parameters that change may let it count.
+            *(["it->is_noisy = 1;"] if self.is_tuned else noisy),
+            "if (it->is_noisy) {",
+            f"    seed_generator(&it->noise, (uint32_t){self._call('seed')});",
+            f"    draw_normals(&it->noise, it->draws, {n});",
+            "}",
         ]
 
     def _advance(self) -> str:
@@ -319,5 +324,6 @@ def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
     if not floats:
         return ""
     if _MANY <= len(floats) == len(places):
-        return f"{name}((const double *)&{text}, {len(floats)}) {test}"
+        called = f"{name}((const double *)&{text}, {len(floats)})"
+        return called if name == "are_finite" else f"{called} {test}"
     return f"{' + '.join(term.format(one) for one in floats)} {test}"

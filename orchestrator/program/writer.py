@@ -68,21 +68,32 @@ typedef struct {
 } Error;
 
 #define raise_error(error, ...) ((void)((error)->raised = 1))
+#define raise_if(test, error, ...)         \\
+    do {                                   \\
+        if (test) (error)->raised = 1;     \\
+    } while (0)
 """
 
 _CHECKS = """\
 /* Partial sums that processors add side by side. */
 enum { LANES = 4 };
 
-/* Zero, where all values are finite; else it is not a number. */
-static inline double sum_of_zeros(const double values[], int n) {
+static inline double sum_of(const double values[], int n) {
     double sums[LANES] = {0.0};
     int i = 0, j;
     for (; i + LANES <= n; i += LANES) {
-        for (j = 0; j < LANES; j++) sums[j] += 0.0 * values[i + j];
+        for (j = 0; j < LANES; j++) sums[j] += values[i + j];
     }
-    for (; i < n; i++) sums[0] += 0.0 * values[i];
-    return sums[0] + sums[1] + sums[2] + sums[3];
+    for (; i < n; i++) sums[0] += values[i];
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
+/* Whether all values are finite: their sum is, or is not only because they are large. */
+static inline int are_finite(const double values[], int n) {
+    int i = 0;
+    if (isfinite(sum_of(values, n))) return 1;
+    while (i < n && isfinite(values[i])) i++;
+    return i == n;
 }
 
 static inline double sum_of_squares(const double values[], int n) {
@@ -92,7 +103,7 @@ static inline double sum_of_squares(const double values[], int n) {
         for (j = 0; j < LANES; j++) sums[j] += values[i + j] * values[i + j];
     }
     for (; i < n; i++) sums[0] += values[i] * values[i];
-    return sums[0] + sums[1] + sums[2] + sums[3];
+    return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
 /* Takes a value into an input; whether it is another one, bit for bit. */
@@ -219,6 +230,7 @@ class Text:
         program.check()
         functions = program.functions.values()
         # What waits for a number would wait for ever for one that is none.
+        self.is_fast = self.is_quick
         self.is_quick = self.is_quick and not any(map(_waits, functions))
         self.emitter = Emitter(functions)
         self.kinds = {
@@ -349,10 +361,10 @@ class Text:
         parts += [part for one in self.reducers.values() for part in one.text()]
         simulation, rest, steps = self._simulation(), self._rest(), self._steps()
         equations = self.emitter.text()
-        if self.is_quick:
+        if self.is_fast:
             equations = re.sub(r"^static (?=[\w ]+[ *]\w+\()", "WITHIN ", equations, flags=re.M)
         return [
-            _HEADS[self.is_quick],
+            _HEADS[self.is_fast],
             equations,
             _CHECKS,
             *([_DRAWING] if self.is_noisy else []),
@@ -621,11 +633,9 @@ class Text:
             ],
             ("t",),
         )
-        sound = ["if (!is_sound(it, error)) return 1;"] * self.is_quick
         lines = ["Error noted = {0}, *error = &noted;"]
         if self.passes:
-            row = ["if (pass(it, k, time_after(it, k), error)) return 1;", *sound]
-            row.append("keep(it, k, rows);")
+            row = ["if (pass(it, k, time_after(it, k), error)) return 1;", "keep(it, k, rows);"]
             lines += [
                 "while (it->made < until) {",
                 "    const int k = it->made;",
@@ -636,6 +646,7 @@ class Text:
                 "if (it->made == it->steps && it->shown == it->steps) {",
                 "    const int k = it->made;",
                 *(f"    {line}" for line in row),
+                *(f"    {line}" for line in self._unsound()),
                 "}",
             ]
         else:
@@ -644,7 +655,6 @@ class Text:
                 "while (it->made < until) {",
                 "    const int k = it->made;",
                 "    if (make_step(it, k, time_after(it, k), error)) return 1;",
-                *(f"    {line}" for line in sound),
                 "    keep(it, k + 1, rows);",
                 "    it->made = k + 1;",
                 "}",
@@ -662,10 +672,14 @@ class Text:
             f"const double end = is_counted ? time_after(it, k + 1) : {self._end('it->start_time')};",
         ] * (not self.alters)  # fmt: skip
         doc = "Makes the step after the k-th"
-        parts.append(self._made("make_step", doc, self.stages.stepping, begin))
         if self.is_quick:
             parts.append(self._sound())
+        parts.append(self._made("make_step", doc, self.stages.stepping, begin))
         return parts
+
+    def _unsound(self) -> list[str]:
+        """What refuses what a run cannot go on from, where calls do not say so."""
+        return ["if (!is_sound(it, error)) return refused(it, 0, AT_STEP, 0);"] * self.is_quick
 
     def _end(self, start: str) -> str:
         kind = next(iter(self.kinds.values()))
@@ -715,6 +729,10 @@ class Text:
         visits = [visit for visit in stage.visits if isinstance(visit, Visit)]
         for visit in visits:
             yield from self._visited(visit, stage.decimation.every if stage.decimation else 1)
+        if stage is self.stages.stepping[-1]:
+            # What was just written is slow to read in another way: outputs are better looked at
+            # before they are computed again.
+            yield from self._unsound()
         for visit in visits:
             kind = self.kind(visit.component)
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)

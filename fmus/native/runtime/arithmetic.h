@@ -26,24 +26,26 @@
 
 #include "error.h"
 
-static void raise_domain_error(Error *error) { raise_error(error, "ValueError: math domain error"); }
+/* The text of two errors. */
+#define DOMAIN_ERROR "ValueError: math domain error"
+#define RANGE_ERROR "OverflowError: math range error"
 
 static inline double py_div(double a, double b, Error *error) {
-    if (b == 0.0) raise_error(error, "ZeroDivisionError: float division by zero");
+    raise_if(b == 0.0, error, "ZeroDivisionError: float division by zero");
     return a / b;
 }
 
 /* A result that is infinite for a finite argument is out of range. */
 static inline double bounded_result(double x, double y, Error *error) {
-    if (isinf(y) && !isinf(x)) raise_error(error, "OverflowError: math range error");
+    raise_if(isinf(y) && !isinf(x), error, RANGE_ERROR);
     return y;
 }
 
 static inline double math_pow(double x, double y, Error *error) {
     double z = pow(x, y);
     if (isfinite(x) && isfinite(y) && !isfinite(z)) {
-        if (isnan(z) || x == 0.0) raise_domain_error(error);
-        raise_error(error, "OverflowError: math range error");
+        raise_if(isnan(z) || x == 0.0, error, DOMAIN_ERROR);
+        raise_error(error, RANGE_ERROR);
     }
     return z;
 }
@@ -60,7 +62,7 @@ static inline double py_pow(double x, double y, Error *error) {
 
 static inline double math_fmod(double x, double y, Error *error) {
     double z = isinf(y) && !isinf(x) ? x : fmod(x, y);
-    if (isnan(z) && !isnan(x) && !isnan(y)) raise_domain_error(error);
+    raise_if(isnan(z) && !isnan(x) && !isnan(y), error, DOMAIN_ERROR);
     return z;
 }
 
@@ -125,7 +127,7 @@ static inline int int_pow(int k, int n, Error *error) {
 }
 
 static inline double int_div(int a, int b, Error *error) {
-    if (b == 0) raise_error(error, "ZeroDivisionError: division by zero");
+    raise_if(b == 0, error, "ZeroDivisionError: division by zero");
     return (double)a / b;
 }
 

@@ -21,4 +21,9 @@ static void raise_error(Error *error, string format, ...) {
     va_end(arguments);
 }
 
+#define raise_if(test, error, ...)                     \
+    do {                                               \
+        if (test) raise_error(error, __VA_ARGS__);     \
+    } while (0)
+
 #endif
