@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from math import exp, log, pi, sqrt
 
 import numpy as np
 import pytest
 
+from fmus.ports.reducer import read_reducer
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
@@ -26,8 +26,8 @@ from orchestrator.studies.study_result import StudyResult
 from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of
-from orchestrator.vehicle.reducers import Fold, largest
-from orchestrator.vehicle.signals import AXES, EULER, STANDARD, Loop
+from orchestrator.vehicle.signals import AXES, EULER, STANDARD
+from support import largest_depth
 from support.tables import at_its_time
 
 T, H, ELL = 10.0, 0.02, 0.35
@@ -165,15 +165,7 @@ def test_closed_loop_has_all_of_them():
 def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
     """It is in metrics.json, in the table of a study, and in the labels of its figures."""
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    depth = Index(
-        "largest_depth",
-        "largest depth",
-        {"": "m"},
-        "largest z of the centre of mass",
-        Loop.for_control_point,
-        partial(Fold, lambda rows: rows.at(rows.loop.position[2]), largest),
-        is_metric=True,
-    )
+    depth = Index("largest_depth", "largest depth", read_reducer(largest_depth), is_metric=True)
     monkeypatch.setattr(table_of_indices, "INDICES", (*table_of_indices.INDICES, depth))
     result = run("fig4", {"plant.nu0.w": 1.0}, stop_time=1.0, kind="native")
     deepest = result["plant.eta.z"].max()
