@@ -80,6 +80,13 @@ class Reducer:
         return tuple(signature(self.hooks[name]).parameters)
 
 
+def is_reducer(module: ModuleType) -> bool:
+    """Whether a module with hooks is an index, by what only an index says."""
+    hooks = [one for name, one in vars(module).items() if name in HOOKS and callable(one)]
+    taken = {argument for hook in hooks for argument in getattr(hook, "__annotations__", ())}
+    return "LAST" in vars(module) or bool(taken & {"before", "acting", "begin", "end"})
+
+
 def read_reducer(module: ModuleType) -> Reducer:
     """What the hooks of an index say.
 

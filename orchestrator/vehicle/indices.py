@@ -158,6 +158,16 @@ def index_columns(
     return (*of_each, *([SMALLEST_DISTANCE] if len(loops) > 1 else []))
 
 
+def index_units(index: Index, loops: Sequence[Loop] = (STANDARD,)) -> dict[str, str]:
+    """Units of the columns of an index, and of all of it if they have one."""
+    units = dict(zip(index.columns, index.units.values(), strict=True))
+    if len({*units.values()}) == 1:
+        units[index.name] = index.unit
+    return {
+        f"{prefix}{name}": unit for _, prefix in _prefixed(loops) for name, unit in units.items()
+    }
+
+
 def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
     for loop in loops:
         yield loop, f"{loop.name}." if len(loops) > 1 else ""
