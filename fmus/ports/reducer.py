@@ -138,10 +138,12 @@ def _results(outputs: Any) -> Iterator[tuple[str, Result]]:
 
 def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The types of inputs, state and outputs, if all hooks agree on them."""
-    rows = (hint for found in hints.values() for name, hint in found.items() if name in ROWS)
+    rows = [hint for found in hints.values() for name, hint in found.items() if name in ROWS]
+    states = [found["state"] for found in hints.values() if "state" in found]
+    states += [hints[name]["return"] for name in ("start", "update")]
     types = {
-        "inputs": next(rows, Nothing),
-        "state": hints["start"]["return"],
+        "inputs": _usual(rows) if rows else Nothing,
+        "state": _usual(states),
         "outputs": hints["outputs"]["return"],
     }
     for name, found in hints.items():
@@ -160,3 +162,9 @@ def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]
             raise Misdeclared(f"{where} {why}", name)
         check_type(hint, name)
     return types
+
+
+def _usual(hints: list[Any]) -> Any:
+    """What most of some types are."""
+    forms = [form(hint) for hint in hints]
+    return max(forms, key=forms.count)

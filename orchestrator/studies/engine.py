@@ -23,7 +23,7 @@ from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
-from orchestrator.vehicle.indices import INDICES, Indices
+from orchestrator.vehicle.indices import Indices
 from orchestrator.vehicle.signals import loops_of
 
 
@@ -154,8 +154,8 @@ class FmuEngine:
             prepared.experiment, stop_time=point.stop_time, step=point.step, order=point.order
         )
         loops = loops_of(system)
-        own = chain(*(one.indices for one in self._own))
-        indices, watch = Indices(loops, (*INDICES, *own)), Watch(loops)
+        own = [*chain(*(one.indices for one in self._own))]
+        indices, watch = Indices(loops, own=own), Watch(loops)
         plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
         ending = replace(prepared, plan=plan, stepping=stepping).run([indices, watch])
         if ending.interrupts:

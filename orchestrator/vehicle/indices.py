@@ -177,16 +177,20 @@ class Indices:
     """An observer that computes the indices that a run has columns and parameters for."""
 
     def __init__(
-        self, loops: Sequence[Loop] = (STANDARD,), chosen: Sequence[Index] | None = None
+        self,
+        loops: Sequence[Loop] = (STANDARD,),
+        chosen: Sequence[Index] | None = None,
+        own: Sequence[Index] = (),
     ) -> None:
         """Take what is measured.
 
         Args:
             loops: of the vehicles.
-            chosen: such as :data:`INDICES`; None: these.
+            chosen: out of :data:`INDICES`; None: all.
+            own: indices of the user's own.
 
         """
-        self._loops, self._chosen = loops, INDICES if chosen is None else chosen
+        self._loops, self._chosen = loops, (*(INDICES if chosen is None else chosen), *own)
 
     def begin(self, header: Header) -> None:
         """Find out which indices there will be."""

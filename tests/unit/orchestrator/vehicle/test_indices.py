@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from math import exp, log, pi, sqrt
+from pkgutil import iter_modules
 
 import numpy as np
 import pytest
 
+from fmus.language.build import Program
 from fmus.ports.reducer import read_reducer
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
@@ -24,6 +27,7 @@ from orchestrator.studies.store import open_store
 from orchestrator.studies.study_file import study_of
 from orchestrator.studies.study_result import StudyResult
 from orchestrator.system.names import PortName, port_name
+from orchestrator.vehicle import index
 from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of
 from orchestrator.vehicle.signals import AXES, EULER, STANDARD
@@ -160,6 +164,12 @@ def test_closed_loop_has_all_of_them():
     )
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
+
+
+@pytest.mark.parametrize("module", [*iter_modules(index.__path__)], ids=lambda one: one.name)
+def test_an_index_is_in_the_language_of_equations(module):
+    of = read_reducer(import_module(f"{index.__name__}.{module.name}"))
+    assert Program(*of.hooks.values()).mistakes == []
 
 
 def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
