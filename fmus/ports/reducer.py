@@ -7,18 +7,18 @@ a component, and all of it is in the language of equations. A row of a run is an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from inspect import signature
 from itertools import chain
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
-from auv_fmu.language.quantities import group_name, member_of
+from auv_fmu.language.quantities import group_name
 from auv_fmu.language.variable import Variable
 from fmus.ports.behaviour import check_same, check_spelling, seconds_in, types_of_hook
 from fmus.ports.fields import declared
-from fmus.ports.groups import Nothing, check_type, fields_of, form, is_record, split, word
+from fmus.ports.groups import Nothing, check_type, class_of, fields_of, form, is_record, split, word
 from fmus.ports.port import Misdeclared, Port, Value
 
 #: The functions of an index, and the arguments that each may take: `inputs` is the row that a step
@@ -35,21 +35,6 @@ HOOKS: Mapping[str, tuple[str, ...]] = {
 ROWS = ("inputs", "before", "acting")
 
 
-class Result(NamedTuple):
-    """A field of the outputs: an index, of one number or several members.
-
-    Attributes:
-        description: what it is.
-        units: of its members, by their names; a single number is a member without a name.
-        columns: what its numbers are called: `name.member` or `name[member]`, or its name.
-
-    """
-
-    description: str
-    units: Mapping[str, str]
-    columns: tuple[str, ...]
-
-
 @dataclass(frozen=True, eq=False)
 class Reducer:
     """An index, or several that are made of the same.
@@ -60,7 +45,9 @@ class Reducer:
         inputs, state, outputs: types that they take and return.
         ports: of the inputs; their names are those of signals or parameters.
         defaults: of those that a run may lack, by name.
-        results: by the fields of the outputs; a value that is not a number is not there.
+        results: of the outputs, by their fields: an index each; a value that is not a number is
+            not there.
+        meanings: what each index is, by the same names.
         last: only the rows of so many seconds before the end of the run count [s]; None: all.
 
     """
@@ -72,7 +59,8 @@ class Reducer:
     outputs: Any
     ports: tuple[Port, ...]
     defaults: Mapping[str, Value]
-    results: Mapping[str, Result]
+    results: Mapping[str, tuple[Port, ...]]
+    meanings: Mapping[str, str]
     last: float | None
 
     def arguments(self, name: str) -> tuple[str, ...]:
@@ -103,6 +91,7 @@ def read_reducer(module: ModuleType) -> Reducer:
     hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = _types(where, hints)
     inputs = declared(types["inputs"], "input")
+    results = _results(types["outputs"])
     ports = tuple(chain(*inputs.values()))
     optional = chain(*(inputs[field] for field in types["inputs"]._field_defaults))
     return Reducer(
@@ -113,27 +102,30 @@ def read_reducer(module: ModuleType) -> Reducer:
         types["outputs"],
         ports,
         {port.name: port.start for port in optional if port.start is not None},
-        dict(_results(types["outputs"])),
+        results,
+        {field: _meaning(types["outputs"], field) for field in results},
         seconds_in(said, "LAST", None),
     )
 
 
-def _results(outputs: Any) -> Iterator[tuple[str, Result]]:
-    for field, ports in declared(outputs, "output").items():
+def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
+    """The outputs by their fields, if indices can be such."""
+    found = declared(outputs, "output")
+    for field, ports in found.items():
         place = (outputs.__name__, field)
-        hint, notes = split(fields_of(outputs)[field])
-        if is_record(hint) or any(port.type != "Real" for port in ports):
+        if is_record(class_of(fields_of(outputs)[field])) or any(p.type != "Real" for p in ports):
             why = "is no float, and no tuple or Vector of them, as every index is"
             raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-        units = {}
         for port in ports:
             if group_name(port.name) != field:
                 why = f"is called {port.name}; an index has the name of its field"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-            member = "" if port.name == field else member_of(port.name)
-            units[member] = "" if port.unit in (None, "1") else port.unit
-        [said] = (note for note in notes if isinstance(note, Variable))
-        yield field, Result(said.description, units, tuple(port.name for port in ports))
+    return found
+
+
+def _meaning(outputs: Any, field: str) -> str:
+    [said] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
+    return str(said.description)
 
 
 def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.ports.reducer import Reducer, Result, read_reducer
+from auv_fmu.language.quantities import member_of
+from fmus.ports.port import Port
+from fmus.ports.reducer import Reducer, read_reducer
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName
@@ -62,23 +64,25 @@ class Index(NamedTuple):
     is_metric: bool = False
 
     @property
-    def _result(self) -> Result:
+    def _ports(self) -> tuple[Port, ...]:
         return self.reducer.results[self.name]
 
     @property
     def meaning(self) -> str:
         """What the reference page says."""
-        return self._result.description
+        return self.reducer.meanings[self.name]
 
     @property
     def units(self) -> Mapping[str, str]:
         """Units of its members; a single number is a member without a name."""
-        return self._result.units
+        names = ("" if port.name == self.name else member_of(port.name) for port in self._ports)
+        units = ("" if port.unit in (None, "1") else port.unit for port in self._ports)
+        return dict(zip(names, units, strict=True))
 
     @property
     def columns(self) -> tuple[str, ...]:
         """The names of its numbers in the table of a study."""
-        return self._result.columns
+        return tuple(port.name for port in self._ports)
 
     @property
     def members(self) -> str:

@@ -58,10 +58,9 @@ def test_what_an_index_says(tmp_path, monkeypatch):
     assert (found.name, found.last) == ("own_index", None)
     assert [port.name for port in found.ports] == ["plant.eta.z", "a.k.a", "a.k[2]"]
     assert found.defaults == {"a.k.a": 1.0, "a.k[2]": 2.0}
-    assert found.results == {
-        "depth": ("Largest depth", {"": "m"}, ("depth",)),
-        "pair": ("Two", {"a": "", "2": "m"}, ("pair.a", "pair[2]")),
-    }
+    columns = {name: [port.name for port in ports] for name, ports in found.results.items()}
+    assert columns == {"depth": ["depth"], "pair": ["pair.a", "pair[2]"]}
+    assert found.meanings == {"depth": "Largest depth", "pair": "Two"}
     assert found.arguments("update") == ("acting", "state", "h")
     assert is_reducer(sys.modules["own_index"])
 
