@@ -397,11 +397,10 @@ def _check_figure(
     for key in ("x", "y", "show", "limits"):
         for value in listed(table.get(key, ())):
             if not is_known(value, numbers):
-                beside = f", nor is there a {value}.py" if value.isidentifier() else ""
-                raise InputError(
-                    f"{where}: {key}: the runs have no number "
-                    f"{value!r}{beside}{did_you_mean(value, numbers)}"
-                )
+                hint = did_you_mean(value, numbers)
+                if value.isidentifier():
+                    hint = hint or f", and there is no {value}.py beside the study"
+                raise InputError(f"{where}: {key}: the runs have no number {value!r}{hint}")
     for key in ("by", "where"):
         for column in listed(table.get(key, ())):
             if column not in columns:

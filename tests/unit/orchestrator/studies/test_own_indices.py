@@ -181,7 +181,7 @@ def test_an_index_is_one_file(tmp_path):
 def test_without_a_file_the_name_is_no_number(tmp_path):
     file, index = study(tmp_path)
     index.unlink()
-    with pytest.raises(Refused, match=r"no number 'settling', nor is there a settling\.py"):
+    with pytest.raises(Refused, match=r"no number 'settling', and there is no settling\.py"):
         prepare_study(read_study(str(file)), Means(kind="native"))
 
 
