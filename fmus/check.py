@@ -1,9 +1,9 @@
-"""List all that is wrong with a component of the user's own: `python -m fmus.check SCRIPT`.
+"""List all that is wrong with a component or an index of one's own: `python -m fmus.check SCRIPT`.
 
 A line for each mistake, with its file and line: what is wrong with its declaration, and what is
-outside the language of equations. If there is none, the FMUs of both kinds are written, the native
-one without libraries, and the compiler reads its C. It runs in a separate process, because it
-imports the component.
+outside the language of equations. If there is none in a component, the FMUs of both kinds are
+written, the native one without libraries, and the compiler reads its C. It runs in a separate
+process, because it imports the script.
 """
 
 from __future__ import annotations
@@ -23,31 +23,33 @@ from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from fmus.language.build import Program, Untranslatable, position
 from fmus.language.types import PLACED
 from fmus.native.packaging import MAIN, fmu_entries
+from fmus.ports import reducer
 from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
 from fmus.script import is_component, no_component, script_in, source_of_script, told
 
 
-def mistakes(path: Path, folder: Path) -> list[str]:
-    """All that is wrong with a component, by file and line.
+def mistakes(path: Path, folder: Path, is_index: bool = False) -> list[str]:
+    """All that is wrong with a component or an index, by file and line.
 
     Args:
         path: of its script, or of the folder of its name.
         folder: that its FMUs are written into, if nothing is wrong.
+        is_index: whether it is an index; else what it says decides.
 
     Raises:
         ValueError: it is no component.
 
     """
     script = script_in(path)
-    if not is_component(script):
+    if not is_index and not is_component(script):
         raise ValueError(
             f"{no_component(script)}; if it has a class of PythonFMU, build it and check its FMU: "
             f"auv-fmu build {script}"
         )
     found: dict[str, str] = {}
     try:
-        for text in _mistakes(script, folder):
+        for text in _mistakes(script, folder, is_index):
             # One line of the script has one mistake: others follow from it.
             place = PLACED.match(text)
             found.setdefault(place[0] if place else text, text)
@@ -56,18 +58,22 @@ def mistakes(path: Path, folder: Path) -> list[str]:
     return sorted(found.values(), key=position)
 
 
-def _mistakes(script: Path, folder: Path) -> Iterator[str]:
+def _mistakes(script: Path, folder: Path, is_index: bool) -> Iterator[str]:
     source = source_of_script(script)
     try:
         module = import_module(source.module)
     except Exception as error:
         yield told(error, script)
         return
-    hooks = (getattr(module, name, None) for name in HOOKS)
+    is_index = is_index or reducer.is_reducer(module)
+    hooks = (getattr(module, name, None) for name in (reducer.HOOKS if is_index else HOOKS))
     program = Program(*(hook for hook in hooks if isinstance(hook, FunctionType)))
     for mistake in program.mistakes:
         yield told(Untranslatable(mistake), script)
     try:
+        if is_index:
+            reducer.read_reducer(module)
+            return
         source.definition  # noqa: B018
         if not program.mistakes:
             write(source, folder)
@@ -97,12 +103,13 @@ def main() -> int:
     """Command line of the module."""
     parser = argparse.ArgumentParser(prog="python -m fmus.check", description=__doc__)
     parser.add_argument("script", type=Path)
+    parser.add_argument("--index", action="store_true", help="it is an index of a study")
     parser.add_argument("--out", type=Path, help="folder to write FMUs into; default: none")
     options = parser.parse_args()
     try:
         # What the component prints is no finding.
         with TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
-            found = mistakes(options.script, options.out or Path(folder))
+            found = mistakes(options.script, options.out or Path(folder), options.index)
         print("".join(f"{text}\n" for text in found), end="")
     except ValueError as error:
         print(error, file=sys.stderr)

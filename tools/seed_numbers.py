@@ -17,7 +17,7 @@ import numpy as np
 from orchestrator import load, simulate
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import read_scenario
-from orchestrator.vehicle.reducers import SMALLEST_DISTANCE_LABEL, smallest_distances
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE_LABEL, smallest_distances
 from orchestrator.vehicle.signals import Loop, limits, loops_of, tracking_error
 
 #: Over which times the largest errors count [s].

@@ -8,14 +8,17 @@ a component, and all of it is in the language of equations. A row of a run is an
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from inspect import signature
 from itertools import chain
 from types import FunctionType, ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
+from auv_fmu.language.quantities import group_name
+from auv_fmu.language.variable import Variable
 from fmus.ports.behaviour import check_same, check_spelling, seconds_in, types_of_hook
 from fmus.ports.fields import declared
-from fmus.ports.groups import Nothing, check_type, form, is_record, word
+from fmus.ports.groups import Nothing, check_type, class_of, fields_of, form, is_record, split, word
 from fmus.ports.port import Misdeclared, Port, Value
 
 #: The functions of an index, and the arguments that each may take: `inputs` is the row that a step
@@ -32,7 +35,8 @@ HOOKS: Mapping[str, tuple[str, ...]] = {
 ROWS = ("inputs", "before", "acting")
 
 
-class Reducer(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Reducer:
     """An index, or several that are made of the same.
 
     Attributes:
@@ -41,7 +45,9 @@ class Reducer(NamedTuple):
         inputs, state, outputs: types that they take and return.
         ports: of the inputs; their names are those of signals or parameters.
         defaults: of those that a run may lack, by name.
-        results: the outputs, as ports; a value that is not a number is not there.
+        results: of the outputs, by their fields: an index each; a value that is not a number is
+            not there.
+        meanings: what each index is, by the same names.
         last: only the rows of so many seconds before the end of the run count [s]; None: all.
 
     """
@@ -54,11 +60,19 @@ class Reducer(NamedTuple):
     ports: tuple[Port, ...]
     defaults: Mapping[str, Value]
     results: Mapping[str, tuple[Port, ...]]
+    meanings: Mapping[str, str]
     last: float | None
 
     def arguments(self, name: str) -> tuple[str, ...]:
         """The arguments of a hook, in its own order."""
         return tuple(signature(self.hooks[name]).parameters)
+
+
+def is_reducer(module: ModuleType) -> bool:
+    """Whether a module with hooks is an index, by what only an index says."""
+    hooks = [one for name, one in vars(module).items() if name in HOOKS and callable(one)]
+    taken = {argument for hook in hooks for argument in getattr(hook, "__annotations__", ())}
+    return "LAST" in vars(module) or bool(taken & {"before", "acting", "begin", "end"})
 
 
 def read_reducer(module: ModuleType) -> Reducer:
@@ -77,12 +91,8 @@ def read_reducer(module: ModuleType) -> Reducer:
     hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = _types(where, hints)
     inputs = declared(types["inputs"], "input")
-    results = declared(types["outputs"], "output")
+    results = _results(types["outputs"])
     ports = tuple(chain(*inputs.values()))
-    for port in chain(*results.values()):
-        if port.type != "Real":
-            place = (types["outputs"].__name__, port.name)
-            raise Misdeclared(f"{'.'.join(place)} is no float, as every index is", *place)
     optional = chain(*(inputs[field] for field in types["inputs"]._field_defaults))
     return Reducer(
         where.rpartition(".")[2],
@@ -93,16 +103,39 @@ def read_reducer(module: ModuleType) -> Reducer:
         ports,
         {port.name: port.start for port in optional if port.start is not None},
         results,
+        {field: _meaning(types["outputs"], field) for field in results},
         seconds_in(said, "LAST", None),
     )
 
 
+def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
+    """The outputs by their fields, if indices can be such."""
+    found = declared(outputs, "output")
+    for field, ports in found.items():
+        place = (outputs.__name__, field)
+        if is_record(class_of(fields_of(outputs)[field])) or any(p.type != "Real" for p in ports):
+            why = "is no float, and no tuple or Vector of them, as every index is"
+            raise Misdeclared(f"{'.'.join(place)} {why}", *place)
+        for port in ports:
+            if group_name(port.name) != field:
+                why = f"is called {port.name}; an index has the name of its field"
+                raise Misdeclared(f"{'.'.join(place)} {why}", *place)
+    return found
+
+
+def _meaning(outputs: Any, field: str) -> str:
+    [said] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
+    return str(said.description)
+
+
 def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """The types of inputs, state and outputs, if all hooks agree on them."""
-    rows = (hint for found in hints.values() for name, hint in found.items() if name in ROWS)
+    rows = [hint for found in hints.values() for name, hint in found.items() if name in ROWS]
+    states = [found["state"] for found in hints.values() if "state" in found]
+    states += [hints[name]["return"] for name in ("start", "update")]
     types = {
-        "inputs": next(rows, Nothing),
-        "state": hints["start"]["return"],
+        "inputs": _usual(rows) if rows else Nothing,
+        "state": _usual(states),
         "outputs": hints["outputs"]["return"],
     }
     for name, found in hints.items():
@@ -121,3 +154,9 @@ def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]
             raise Misdeclared(f"{where} {why}", name)
         check_type(hint, name)
     return types
+
+
+def _usual(hints: list[Any]) -> Any:
+    """What most of some types are."""
+    forms = [form(hint) for hint in hints]
+    return max(forms, key=forms.count)

@@ -20,7 +20,7 @@ from orchestrator.figures.film_scene import Scene
 from orchestrator.figures.panels import Cell, draw_all_errors, draw_commands, over_time, title
 from orchestrator.figures.style import REFERENCE, Drawn, escape_math, heading, vehicle_colours
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle.reducers import SMALLEST_DISTANCE_LABEL, size, smallest_distances
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE_LABEL, size, smallest_distances
 from orchestrator.vehicle.signals import Loop, tracking_error
 
 FRAMES_PER_SECOND = 20

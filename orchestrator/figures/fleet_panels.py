@@ -10,7 +10,7 @@ import numpy as np
 
 from orchestrator.figures.panels import Cell, Panel, frame_path, over_time, title
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes
-from orchestrator.vehicle.reducers import distances, for_distances, size, smallest_distances
+from orchestrator.vehicle.distances import distances, for_distances, size, smallest_distances
 from orchestrator.vehicle.signals import Loop, tracking_error, true_control_point
 
 #: Instants at which the vehicles are joined by lines.

@@ -17,7 +17,7 @@ from orchestrator.figures.style import (
     vehicle_colours,
 )
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.reducers import SMALLEST_DISTANCE_LABEL, size, smallest_distances
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE_LABEL, size, smallest_distances
 from orchestrator.vehicle.signals import AXES, Loop, limits, tracking_error
 
 #: Times into which a line is divided, of each of which it keeps the smallest and largest value: at

@@ -13,8 +13,9 @@ import numpy as np
 
 from orchestrator.figures.style import heading, printed_unit
 from orchestrator.vehicle import indices
-from orchestrator.vehicle.indices import REACHED, Index
-from orchestrator.vehicle.reducers import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
+from orchestrator.vehicle.index.tracking import REACHED
+from orchestrator.vehicle.indices import Index
 
 #: Columns of runs.parquet, an array each; what a run does not have is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]
@@ -227,8 +228,8 @@ class Values:
 
 def members(factor: str, columns: Columns | Sequence[str]) -> list[str]:
     """The columns that a value without a product is made of; none if there is no such value."""
-    if norm := _NORM.fullmatch(factor):
-        names = [name.strip() for name in norm[1].split(",")]
+    if _NORM.fullmatch(factor):
+        names = names_of(factor)
         return names if all(name in columns for name in names) else []
     if factor in columns:
         return [factor]
@@ -238,6 +239,13 @@ def members(factor: str, columns: Columns | Sequence[str]) -> list[str]:
 def is_known(value: str, columns: Sequence[str]) -> bool:
     """Whether runs with some columns have a value."""
     return value in VERDICTS or all(members(factor, columns) for factor in _factors(value))
+
+
+def names_of(value: str) -> list[str]:
+    """The names that a value is made of."""
+    norms = ((factor, _NORM.fullmatch(factor)) for factor in _factors(value))
+    found = (norm[1].split(",") if norm else [factor] for factor, norm in norms)
+    return [name.strip() for names in found for name in names]
 
 
 def _factors(value: str) -> list[str]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from fmpy.model_description import ModelVariable
 
-from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY, Members
+from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.discovery import components
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
@@ -44,8 +44,9 @@ from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, items_of, named
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
+from orchestrator.vehicle.index.final_error import LAST as LAST_SECONDS
 from orchestrator.vehicle.indices import metrics
-from orchestrator.vehicle.reducers import LAST_SECONDS, SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
@@ -123,7 +124,7 @@ def page_data(opened: str) -> Plain:
     }
 
 
-def _printed(units: Members) -> dict[str, str]:
+def _printed(units: Mapping[Any, str]) -> dict[str, str]:
     return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 

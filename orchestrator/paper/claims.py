@@ -33,7 +33,7 @@ from orchestrator.paper.measures import (
 )
 from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.runs.request import Request
-from orchestrator.vehicle.indices import REACHED
+from orchestrator.vehicle.index.tracking import REACHED
 
 #: The runs of the figures, and what the claims change in them.
 FIVE, FIVE_PD = Request("fig5"), Request("fig5-pd")

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orchestrator.master.observers.table import Table
-from orchestrator.vehicle.indices import REACHED
-from orchestrator.vehicle.reducers import LAST_SECONDS
+from orchestrator.vehicle.index.final_error import LAST as LAST_SECONDS
+from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import STANDARD, applied, real_parameter
 
 #: Control efforts of section 4.2, in the order u, q, r.

@@ -35,7 +35,7 @@ from orchestrator.paper.variants import (
 )
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
-from orchestrator.vehicle.indices import REACHED
+from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 
 #: The files.

@@ -32,7 +32,7 @@ from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.sweep import check_installed
-from orchestrator.vehicle.indices import REACHED
+from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import AXES
 
 #: How far a start is moved along each axis, at most [m].

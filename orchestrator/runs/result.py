@@ -37,8 +37,8 @@ from orchestrator.runs.record import (
 from orchestrator.runs.scenario import Scenario
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics, of_vehicles
-from orchestrator.vehicle.reducers import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.signals import Loop
 
 if TYPE_CHECKING:

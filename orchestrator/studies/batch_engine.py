@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from importlib.metadata import version
 from itertools import compress
 from math import isnan
 from threading import local
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,8 +39,8 @@ from orchestrator.system.names import PortName, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, named
 from orchestrator.vehicle.cautions import Seen, cautions, cautions_seen, values_of
-from orchestrator.vehicle.indices import INDICES, Indices
-from orchestrator.vehicle.reducers import LAST_SECONDS
+from orchestrator.vehicle.index.final_error import LAST as LAST_SECONDS
+from orchestrator.vehicle.indices import INDICES, Index, Indices
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, with_lag
 
 #: What makes every system.
@@ -51,11 +51,29 @@ _ORDERS = (FEEDTHROUGH, JACOBI)
 
 _NO_ROWS = np.empty((0, 0))
 
+#: What the kernel accumulates, and how an index follows from it, the number of its terms and the
+#: length of the run [s].
+_FROM: Mapping[str, tuple[str, Callable[[np.ndarray, int, float], Any]]] = {
+    "l2_effort": ("square", lambda found, n, length: np.sqrt(found)),
+    "rms_effort": ("square", lambda found, n, length: np.sqrt(found / length)),
+    "peak_command": ("peak", lambda found, n, length: found),
+    "saturated_fraction": ("outside", lambda found, n, length: found / n),
+    "total_variation": ("variation", lambda found, n, length: found),
+    "final_error": ("final", lambda found, n, length: found),
+    "time_to_reach": ("reached", lambda found, n, length: found),
+    "late_error": ("late", lambda found, n, length: found),
+    "estimate_error": ("miss", lambda found, n, length: np.sqrt(sum(found.tolist()) / n)),
+    "theta_hat_half": ("half", lambda found, n, length: found),
+    "theta_hat_end": ("end", lambda found, n, length: found),
+    "largest_speed": ("speed", lambda found, n, length: found),
+    "largest_drift": ("drift", lambda found, n, length: found),
+}
+
 #: The indices that the kernel accumulates, and their columns. Each run asks for them.
-_ACCUMULATED = [(index, index.columns) for index in INDICES if index.accumulated]
+_ACCUMULATED = [(index, index.columns) for index in INDICES if index.name in _FROM]
 
 #: The others: reducers make them of the rows, as they do after a run of FMUs; it takes longer.
-_OF_ROWS = [index for index in INDICES if not index.accumulated]
+_OF_ROWS = [index for index in INDICES if index.name not in _FROM]
 
 
 class _Loop(NamedTuple):
@@ -86,10 +104,15 @@ def _loop(system: System) -> _Loop:
     without = frozenset(
         index.name
         for index in INDICES
-        for needed in index.needs(names)
-        if not all(system.has(port_name(name)) for name in needed)
+        if not all(system.has(port_name(name)) for name in _needs(index, names))
     )
     return _Loop(system, names, of_rows, there, without, {})
+
+
+def _needs(index: Index, loop: Loop) -> list[str]:
+    """The signals and parameters that an index cannot do without."""
+    of = index.reducer
+    return [loop.port(port.name) for port in of.ports if port.name not in of.defaults]
 
 
 class BatchEngine:
@@ -374,9 +397,10 @@ def _indices(job: _Job, end: np.void, found: np.void) -> dict[str, float]:
     steps, t = int(end["steps"]), job.experiment.time(int(end["steps"]))
     values: dict[str, float] = {}
     for index, names in _ACCUMULATED:
-        n = int(found["instants"]) if index.accumulated == "miss" else steps
+        kept, result = _FROM[index.name]
+        n = int(found["instants"]) if kept == "miss" else steps
         if n and index.name not in job.loop.without:
-            members = index.members_of(found[index.accumulated], n, t)
+            members = np.atleast_1d(result(found[kept], n, t)).tolist()
             values.update(zip(names, members, strict=True))
     # What was never reached is not a number.
     return {name: value for name, value in values.items() if not isnan(value)}
@@ -413,7 +437,11 @@ def _without_column(system: System) -> str:
     """An index of a system that the kernel has no columns for, in words; empty: there is none."""
     loop = _loop(system)
     for index in _OF_ROWS:
-        for name in index.needs(loop.names)[0]:
-            if name not in loop.columns and system.has(port_name(name)):
+        for name in _needs(index, loop.names):
+            port = port_name(name)
+            is_signal = system.has(port) and (
+                system.component(port.component).variable(port.port).causality != "parameter"
+            )
+            if name not in loop.columns and is_signal:
                 return f"its index {index.name} is of {name}"
     return ""

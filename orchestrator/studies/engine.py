@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -19,6 +20,7 @@ from orchestrator.master.experiment import Order
 from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
 from orchestrator.master.plan import code_of, make_plan
 from orchestrator.runs.preparation import Prepared
+from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
@@ -105,19 +107,25 @@ class Engine(Protocol):
 class FmuEngine:
     """Makes runs with FMUs in the process that it is called in; it takes them along."""
 
-    def __init__(self, prepared: Mapping[str, Prepared], loop: str = LOOPS[0]) -> None:
+    def __init__(
+        self,
+        prepared: Mapping[str, Prepared],
+        loop: str = LOOPS[0],
+        own: Sequence[OwnIndex] = (),
+    ) -> None:
         """Take what is run.
 
         Args:
             prepared: by the names that runs have for their scenarios.
             loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+            own: indices of the user's own.
 
         """
         # Compiled loops do not travel: each run takes one where it is made.
         self._prepared = {
             name: replace(one, stepping=PYTHON_LOOP) for name, one in prepared.items()
         }
-        self._loop = loop
+        self._loop, self._own = loop, own
 
     @property
     def digest(self) -> str:
@@ -146,7 +154,8 @@ class FmuEngine:
             prepared.experiment, stop_time=point.stop_time, step=point.step, order=point.order
         )
         loops = loops_of(system)
-        indices, watch = Indices(loops), Watch(loops)
+        own = [*chain(*(one.indices for one in self._own))]
+        indices, watch = Indices(loops, own=own), Watch(loops)
         plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
         ending = replace(prepared, plan=plan, stepping=stepping).run([indices, watch])
         if ending.interrupts:
@@ -154,7 +163,10 @@ class FmuEngine:
         wary = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
         if ending.failure is not None:
             return Outcome(point.number, {}, ending.failure, wary)
-        return Outcome(point.number, indices.values(), None, wary)
+        values = indices.values()
+        if failures := indices.failures:
+            return Outcome(point.number, {}, f"index {failures[0]}", wary)
+        return Outcome(point.number, values, None, wary)
 
     def __getstate__(self) -> dict[str, Any]:
         """With the FMUs, each once, by their digests.
@@ -168,12 +180,13 @@ class FmuEngine:
             for prepared in self._prepared.values()
             for part in prepared.system.components.values()
         }
-        return {"prepared": self._prepared, "loop": self._loop, "archives": archives}
+        kept = {"prepared": self._prepared, "loop": self._loop, "own": self._own}
+        return {**kept, "archives": archives}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
         """Put the FMUs where this process keeps what is temporary."""
         places = {digest: _place(digest, content) for digest, content in state["archives"].items()}
-        self._prepared, self._loop = {}, state["loop"]
+        self._prepared, self._loop, self._own = {}, state["loop"], state["own"]
         for name, prepared in state["prepared"].items():
             components = {
                 part.name: replace(part, fmu=places[part.digest])

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from hashlib import sha256
-from itertools import chain
+from itertools import chain, product
 from math import ceil, cos, floor, log2, pi, prod, sin, sqrt
 from typing import Any
 
@@ -39,7 +39,7 @@ from orchestrator.system.values import (
     typed,
     unit_of,
 )
-from orchestrator.vehicle.indices import index_columns
+from orchestrator.vehicle.indices import Index, index_columns, index_units
 from orchestrator.vehicle.signals import loops_of
 
 #: Types of values by the types of FMI's variables.
@@ -57,17 +57,24 @@ class Space:
         prepared: the shortest run of each scenario, by its name.
         indices: the columns of what comes out of the runs.
         has_scenarios: whether there are several.
-        units: of what varies, as the FMUs write them; empty where there is none.
+        units: of what varies, as the FMUs write them, and of indices of the user's own; empty
+            where there is none.
         logarithmic: whether what is sampled is drawn by its logarithm.
 
     """
 
-    def __init__(self, study: Study, systems: Mapping[str, tuple[Scenario, System]]) -> None:
+    def __init__(
+        self,
+        study: Study,
+        systems: Mapping[str, tuple[Scenario, System]],
+        own: Sequence[Index] = (),
+    ) -> None:
         """Check a study against the systems that it runs, and type its values.
 
         Args:
             study: whose runs they are.
             systems: of its scenarios, by the names that it has for them.
+            own: indices of the user's own.
 
         Raises:
             InputError: a name does not exist, or a value has the wrong type.
@@ -128,8 +135,11 @@ class Space:
             with findings.collecting():
                 self.prepared[name] = self._prepared(name, study, *system)
         findings.refuse()
-        columns = (index_columns(loops_of(system)) for _, system in systems.values())
+        every = [loops_of(system) for _, system in systems.values()]
+        columns = (index_columns(loops, own) for loops in every)
         self.indices = tuple(dict.fromkeys(chain.from_iterable(columns)))
+        for loops, index in product(every, own):
+            self.units |= index_units(index, loops)
 
     def _prepared(self, name: str, study: Study, scenario: Scenario, system: System) -> Prepared:
         """The shortest run of a scenario, which can be prepared like any run of it."""

@@ -100,6 +100,7 @@ class Study:
     Attributes:
         name: of the file, without its ending.
         vary: values by `component.parameter`, in the order of the file.
+        folder: of the file; None: there is none.
 
     """
 
@@ -115,6 +116,7 @@ class Study:
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     sample: Sample | None = None
     figures: Mapping[str, Any] = field(default_factory=dict)
+    folder: Path | None = None
 
     @property
     def stem(self) -> str:

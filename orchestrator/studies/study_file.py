@@ -125,7 +125,10 @@ class FigureTable(TomlTable):
         "for `influence` all numbers that vary",
     )
     y: Name = entry("Value along the vertical axis.")
-    show: Names = entry("Values to show, a row each.")
+    show: Names = entry(
+        "Values to show, a row each; also an index of your own, the name of its file beside this "
+        "one, without `.py`."
+    )
     by: Names = entry(
         "Columns that distinguish runs, by colours or in separate panels; `[]` for none.",
         "the scenario, if there are several",
@@ -246,7 +249,7 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         per = dict(flatten(end["per"])) if isinstance(end, Mapping) else {}
         entries["stop_time"] = StopTime(end["base"] if isinstance(end, Mapping) else end, per)
     findings.refuse()
-    study = Study(name, **entries)
+    study = Study(name, folder=path and path.parent, **entries)
     _check_names(where, study)
     return study
 
@@ -347,7 +350,7 @@ def read_figures(
     by = (SCENARIO,) if is_compared else ()
     findings, entries = Findings(), []
     for name, table in tables.items():
-        x = _listed(table.get("x", ())) or (numbers if table["kind"] == INFLUENCE else [])
+        x = listed(table.get("x", ())) or (numbers if table["kind"] == INFLUENCE else [])
         with findings.collecting():
             if not _NAME.fullmatch(name):
                 raise InputError(
@@ -362,8 +365,8 @@ def read_figures(
                 table["kind"],
                 x,
                 table.get("y", ""),
-                _listed(table.get("show", ())),
-                _listed(table.get("by", by)),
+                listed(table.get("show", ())),
+                listed(table.get("by", by)),
                 dict(flatten(table.get("where", {}))),
                 dict(flatten(table.get("limits", {}))),
                 labels,
@@ -392,14 +395,14 @@ def _check_figure(
 
     """
     for key in ("x", "y", "show", "limits"):
-        for value in _listed(table.get(key, ())):
+        for value in listed(table.get(key, ())):
             if not is_known(value, numbers):
-                raise InputError(
-                    f"{where}: {key}: the runs have no number "
-                    f"{value!r}{did_you_mean(value, numbers)}"
-                )
+                hint = did_you_mean(value, numbers)
+                if value.isidentifier():
+                    hint = hint or f", and there is no {value}.py beside the study"
+                raise InputError(f"{where}: {key}: the runs have no number {value!r}{hint}")
     for key in ("by", "where"):
-        for column in _listed(table.get(key, ())):
+        for column in listed(table.get(key, ())):
             if column not in columns:
                 raise InputError(
                     f"{where}: {key}: the runs have no column "
@@ -407,7 +410,8 @@ def _check_figure(
                 )
 
 
-def _listed(value: Any) -> list[str]:
+def listed(value: Any) -> list[str]:
+    """The names in an entry of a figure: one, several, or the keys of a table."""
     if isinstance(value, Mapping):
         return [name for name, _ in flatten(value)]
     return [value] if isinstance(value, str) else list(value)

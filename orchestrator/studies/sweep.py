@@ -10,6 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from importlib.util import find_spec
+from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -29,6 +30,7 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine, check_systems
 from orchestrator.studies.blocks import Making, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
+from orchestrator.studies.own_indices import OwnIndex, own_indices, with_fields
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, open_store
 from orchestrator.studies.study import BATCH, ENGINES, FMU, EngineName, Study
@@ -174,12 +176,13 @@ def complete_study(
 
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     kind = _kind_begun(folder) if means.kind == AUTO else means.kind
-    means, systems, space, entries, engine = prepare_study(study, replace(means, kind=kind))
-    record = _record(study, means, space, engine, [one for one, _ in systems.values()], command)
+    means, systems, space, entries, engine, own = prepare_study(study, replace(means, kind=kind))
+    scenarios = [scenario for scenario, _ in systems.values()]
+    record = _record(study, means, space, engine, scenarios, command, own)
     with open_store(folder, record, space.indices, means.force) as kept:
         kept.ledger.check(figure_files(entries))
         if not kept.is_done:
-            if not len(kept) and (hint := faster(space, engine, means)):
+            if not len(kept) and (hint := faster(space, engine, means, own)):
                 say(hint)
             name = study.name if progress else None
             _complete(kept, engine, space, means, name)
@@ -215,6 +218,7 @@ class Ready(NamedTuple):
         space: its runs.
         figures: that are drawn of them.
         engine: that makes them.
+        own: indices of the user's own.
 
     """
 
@@ -223,6 +227,7 @@ class Ready(NamedTuple):
     space: Space
     figures: Sequence[FigureEntry]
     engine: Engine
+    own: Sequence[OwnIndex]
 
 
 def prepare_study(study: Study, means: Means) -> Ready:
@@ -239,15 +244,17 @@ def prepare_study(study: Study, means: Means) -> Ready:
     findings.refuse()
     if any(scenario.digest for scenario, _ in systems.values()):
         means = replace(means, kind=_kind(settings_of(current_fmus(means.kind))["kind"]))
-    space = Space(study, systems)
+    own = own_indices(study, {name: system for name, (_, system) in systems.items()})
+    space = Space(study, systems, [*chain(*(one.indices for one in own))])
     with findings.collecting():
+        figures = with_fields(study.figures, own, space.indices)
         entries = read_figures(
-            study.name, study.figures, space.columns, space.has_scenarios, space.indices
+            study.name, figures, space.columns, space.has_scenarios, space.indices
         )
     with findings.collecting():
-        engine = _engine(means.engine or study.engine, space.prepared, means)
+        engine = _engine(means.engine or study.engine, space.prepared, means, own)
     findings.refuse()
-    return Ready(means, systems, space, entries, engine)
+    return Ready(means, systems, space, entries, engine, own)
 
 
 def _kind_begun(folder: Path) -> KindName:
@@ -276,7 +283,9 @@ def check_installed(needed: Sequence[str] = _NEEDED) -> None:
         raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
-def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
+def _check_engine(
+    name: str, prepared: Mapping[str, Prepared], own: Sequence[OwnIndex] = ()
+) -> None:
     """Check that there is such an engine, and that it does all that is asked of it in a run.
 
     Raises:
@@ -285,6 +294,10 @@ def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
     """
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
+    if name == BATCH and own:
+        raise InputError(
+            f"{own[0].name}.py: engine {BATCH!r} makes no indices of one's own; use --engine {FMU}"
+        )
     for scenario, one in prepared.items():
         if one.input_table is not None:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
@@ -296,10 +309,12 @@ def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
             )
 
 
-def _engine(name: str, prepared: Mapping[str, Prepared], means: Means) -> Engine:
-    _check_engine(name, prepared)
+def _engine(
+    name: str, prepared: Mapping[str, Prepared], means: Means, own: Sequence[OwnIndex]
+) -> Engine:
+    _check_engine(name, prepared, own)
     if name == FMU:
-        return FmuEngine(prepared, means.loop)
+        return FmuEngine(prepared, means.loop, own)
     return BatchEngine(_systems(prepared), means.kind)
 
 
@@ -307,7 +322,7 @@ def _systems(prepared: Mapping[str, Prepared]) -> dict[str, System]:
     return {scenario: one.system for scenario, one in prepared.items()}
 
 
-def faster(space: Space, engine: Engine, means: Means) -> str:
+def faster(space: Space, engine: Engine, means: Means, own: Sequence[OwnIndex] = ()) -> str:
     """What would make many runs sooner, with the same numbers, in words; empty: nothing."""
     option = ""
     if len(space) >= _MANY and isinstance(engine, FmuEngine):
@@ -315,7 +330,7 @@ def faster(space: Space, engine: Engine, means: Means) -> str:
         if means.kind == PYTHON and is_bundles and machines_compiler():
             option = "--kind native"
         with suppress(InputError):
-            _check_engine(BATCH, space.prepared)
+            _check_engine(BATCH, space.prepared, own)
             check_systems(_systems(space.prepared), means.kind)
             option = f"--engine {BATCH}"
     return option and (
@@ -340,6 +355,7 @@ def _record(
     engine: Engine,
     scenarios: Sequence[Scenario],
     command: Sequence[str],
+    own: Sequence[OwnIndex],
 ) -> dict[str, Any]:
     """What study.json says when a study begins."""
     stated = asdict(study)
@@ -354,6 +370,7 @@ def _record(
             "scenario": [scenario.name for scenario in scenarios],
             "engine": means.engine or study.engine,
             **{name: stated[name] for name in _STATED},
+            **({"indices": {one.name: one.digest for one in own}} if own else {}),
             "points": space.digest,
             "systems": [dict(prepared.identity) for prepared in space.prepared.values()],
             "version": engine.digest,

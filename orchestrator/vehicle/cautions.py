@@ -5,7 +5,7 @@ Among the former: which velocities reach a controller that is to do without.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from math import inf
 from typing import NamedTuple
@@ -15,12 +15,15 @@ import numpy as np
 from auv_fmu.paper.observer import Form, exact_gain
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
+from fmus.ports.reducer import read_reducer
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.graph import reaching
 from orchestrator.system.names import PortName, listed, port_name
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, literal, type_of, unit_of
+from orchestrator.vehicle.index import largest_bound, vertical_passed
+from orchestrator.vehicle.reduction import Reduction, reductions_of
 from orchestrator.vehicle.signals import (
     STANDARD,
     AllocatedLoop,
@@ -160,6 +163,10 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     return None if value is None else float(value)
 
 
+#: What cautions follow from.
+_WATCHED = (read_reducer(largest_bound), read_reducer(vertical_passed))
+
+
 class Watch:
     """An observer that keeps what cautions follow from."""
 
@@ -168,31 +175,15 @@ class Watch:
         self._loops = loops
 
     def begin(self, header: Header) -> None:
-        """Find the columns."""
-        self._header, self._n = header, 0
-        self._places = [
-            [header.place.get(name) for name in watched_columns(loop)] for loop in self._loops
-        ]
-        self._seen = [Seen() for _ in self._loops]
-        self._first = np.empty(0)
-        self._last = np.empty((0, 1 + len(header.columns)))
+        """Find out what can be seen."""
+        self._header = header
+        self._reductions = reductions_of(_WATCHED, self._loops, header)
 
     def take(self, rows: np.ndarray) -> None:
         """Look at some rows."""
-        if not self._n:
-            self._first = rows[0].copy()
-        self._n += len(rows)
-        steps = Table.of(self._header, np.vstack((self._last, rows)))
-        self._last = rows[-1:].copy()
-        for i, (loop, (estimate, pitch)) in enumerate(zip(self._loops, self._places, strict=True)):
-            rho_hat, vertical = self._seen[i]
-            if estimate is not None:
-                estimates = steps.step_values(loop.theta_hat[0])
-                rho_hat = max(rho_hat, float(estimates.max(initial=-inf)))
-            if pitch is not None and vertical == inf:
-                beyond = np.cos(rows[:, pitch]) * np.cos(self._first[pitch]) <= 0.0
-                vertical = float(rows[beyond.argmax(), 0]) if beyond.any() else inf
-            self._seen[i] = Seen(rho_hat, vertical)
+        for reductions in self._reductions.values():
+            for reduction in reductions.values():
+                reduction.take(rows)
 
     def end(self, ending: Ending) -> None:
         """Nothing more is seen."""
@@ -203,10 +194,15 @@ class Watch:
         step = self._header.experiment.step
         return [
             caution
-            for loop, seen in zip(self._loops, self._seen, strict=True)
+            for loop, reductions in self._reductions.items()
+            for seen in [_seen(reductions.values())]
             for caution in cautions_seen(seen, loop, partial(value_of, table), step)
-            if self._n > 1
         ]
+
+
+def _seen(reductions: Iterable[Reduction]) -> Seen:
+    found = {name: value for one in reductions for name, [value] in one.found().items()}
+    return Seen(found.get("largest_bound", -inf), found.get("vertical_passed", inf))
 
 
 def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[Caution]:

@@ -1,62 +1,57 @@
 """Indices of a run, (59) and others: each is declared once, in :data:`INDICES`.
 
 The table serves metrics.json, the terminal, the report, the columns of a study and the labels of
-its figures. What an index is of, it gets in blocks of rows while the run goes on; sums go on row by
-row, so that they do not depend on the blocks.
+its figures. What an index is, its module in :mod:`.index` says.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from math import inf
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.language.quantities import POSITION, TAU, THETA, Members, member_name
+from auv_fmu.language.quantities import member_of
+from fmus.ports.port import Port
+from fmus.ports.reducer import Reducer, read_reducer
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import named
 from orchestrator.vehicle.cautions import velocities_reaching
-from orchestrator.vehicle.reducers import (
-    BEFORE,
-    LAST_SECONDS,
+from orchestrator.vehicle.distances import (
     SMALLEST_DISTANCE,
-    Fold,
-    LargestOfTheEnd,
-    LoopRows,
-    first,
     for_distances,
-    largest,
-    last,
-    size,
     smallest_distances,
-    total,
 )
-from orchestrator.vehicle.signals import STANDARD, Loop, Needs
-
-#: An error of tracking that counts as having reached the reference [m].
-REACHED = 1.0
+from orchestrator.vehicle.index import (
+    effort,
+    estimate_error,
+    final_error,
+    largest_drift,
+    largest_speed,
+    parameter_estimates,
+    peak_command,
+    saturated_fraction,
+    tracking,
+)
+from orchestrator.vehicle.reduction import reductions_of
+from orchestrator.vehicle.signals import STANDARD, Loop
 
 #: Where metrics.json has the indices of each of several vehicles.
 VEHICLES = "vehicles"
 
 
 class Index(NamedTuple):
-    """An index: what it is called, what it is of, and what makes it.
+    """An index: what it is called, and what makes it.
 
     Attributes:
         name: in files; `name.member` in the columns of a study.
         label: in figures and tables.
-        units: of its members; a single number is a member without a name.
-        meaning: what the reference page says.
-        needs: what a run must have.
-        reducer: takes rows in, for what it is a function of.
-        accumulated: where the batch engine has the same; empty: it makes it of the rows.
-        result: that function, also of the number of terms and of the length of the run [s].
+        reducer: that has it among its results.
         symbol: in formulas, with its members as indices, before the label.
         is_metric: whether metrics.json holds it, or a study only.
 
@@ -64,29 +59,35 @@ class Index(NamedTuple):
 
     name: str
     label: str
-    units: Members
-    meaning: str
-    needs: Callable[[Loop], Needs]
-    reducer: Callable[[], Fold | LargestOfTheEnd]
-    accumulated: str = ""
-    result: Callable[[np.ndarray, int, float], Any] = lambda found, n, length: found
+    reducer: Reducer
     symbol: str = ""
     is_metric: bool = False
 
     @property
+    def _ports(self) -> tuple[Port, ...]:
+        return self.reducer.results[self.name]
+
+    @property
+    def meaning(self) -> str:
+        """What the reference page says."""
+        return self.reducer.meanings[self.name]
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of its members; a single number is a member without a name."""
+        names = ("" if port.name == self.name else member_of(port.name) for port in self._ports)
+        units = ("" if port.unit in (None, "1") else port.unit for port in self._ports)
+        return dict(zip(names, units, strict=True))
+
+    @property
     def columns(self) -> tuple[str, ...]:
         """The names of its numbers in the table of a study."""
-        return tuple(member_name(self.name, m) if m != "" else self.name for m in self.units)
-
-    def members_of(self, found: np.ndarray, n: int, length: float) -> list[float]:
-        """The values of its members, from what its terms come to."""
-        values: list[float] = np.atleast_1d(self.result(found, n, length)).tolist()
-        return values
+        return tuple(port.name for port in self._ports)
 
     @property
     def members(self) -> str:
         """Its members, with commas between them; empty: it is a single number."""
-        return ", ".join(map(str, self.units))
+        return ", ".join(self.units)
 
     @property
     def unit(self) -> str:
@@ -94,157 +95,46 @@ class Index(NamedTuple):
         return ", ".join(filter(None, dict.fromkeys(self.units.values())))
 
 
-def _root_mean(squares: np.ndarray, n: int, length: float) -> np.ndarray:
-    # One after the other, as the equations add.
-    x, y, z = squares
-    mean: np.ndarray = np.sqrt((x + y + z) / n)
-    return mean
+def _read(*modules: ModuleType) -> dict[str, Reducer]:
+    """The reducers of some modules, by the names of their indices."""
+    reducers = map(read_reducer, modules)
+    return {name: reducer for reducer in reducers for name in reducer.results}
 
 
-def _actuation(loop: Loop) -> Needs:
-    return loop.applied, ()
+_REDUCERS = _read(
+    effort,
+    peak_command,
+    saturated_fraction,
+    final_error,
+    tracking,
+    estimate_error,
+    parameter_estimates,
+    largest_speed,
+    largest_drift,
+)
 
 
-#: Two indices are made of it.
-_ENERGY = partial(Fold, LoopRows.energy, total)
+def _index(name: str, label: str, symbol: str = "", is_metric: bool = False) -> Index:
+    return Index(name, label, _REDUCERS[name], symbol, is_metric)
 
-#: Units of its root.
-_EFFORT = {member: f"{unit}.s^1/2" for member, unit in TAU.items()}
 
 #: All indices, in the order of the columns of a study; e is y - y_d with the true control point,
 #: efforts are of the applied signal. What a system has no ports for, and what is never reached, is
 #: not there.
 INDICES: tuple[Index, ...] = (
-    Index(
-        "l2_effort",
-        "L2 effort",
-        _EFFORT,
-        "root of the integral of the square of the applied signal, the quantity that the "
-        "paper prints (reading 6)",
-        _actuation,
-        _ENERGY,
-        "square",
-        lambda found, n, length: np.sqrt(found),
-        is_metric=True,
-    ),
-    Index(
-        "rms_effort",
-        "RMS effort",
-        TAU,
-        "root mean square of the applied signal (59)",
-        _actuation,
-        _ENERGY,
-        "square",
-        lambda found, n, length: np.sqrt(found / length),
-        is_metric=True,
-    ),
-    Index(
-        "peak_command",
-        "peak command",
-        TAU,
-        "largest absolute value of the commanded signal",
-        Loop.for_commands,
-        partial(Fold, lambda rows: np.abs(rows.acting(*rows.loop.commanded)), largest),
-        "peak",
-        is_metric=True,
-    ),
-    Index(
-        "saturated_fraction",
-        "share of saturated steps",
-        dict.fromkeys(TAU, ""),
-        "share of the steps whose command is outside the limits",
-        lambda loop: (loop.commanded, loop.limits),
-        partial(Fold, LoopRows.outside, total),
-        "outside",
-        lambda found, n, length: found / n,
-        is_metric=True,
-    ),
-    Index(
-        "total_variation",
-        "total variation",
-        TAU,
-        "sum of the absolute differences of the applied signal from step to step",
-        _actuation,
-        partial(Fold, LoopRows.change, total),
-        "variation",
-        is_metric=True,
-    ),
-    Index(
-        "final_error",
-        "final error",
-        POSITION,
-        f"e_f: largest absolute value of e in the last {LAST_SECONDS:g} s",
-        Loop.for_tracking,
-        LargestOfTheEnd,
-        "final",
-        is_metric=True,
-    ),
-    Index(
-        "time_to_reach",
-        "time to reach",
-        {"": "s"},
-        f"time from the start of the run until |e| is at most {REACHED:g} m",
-        Loop.for_tracking,
-        partial(Fold, lambda rows: rows.elapsed[rows.distance <= REACHED], first),
-        "reached",
-    ),
-    Index(
-        "late_error",
-        "largest late error",
-        {"": "m"},
-        "largest |e| in the second half of the run",
-        Loop.for_tracking,
-        partial(Fold, LoopRows.late_distance, largest),
-        "late",
-    ),
-    Index(
-        "estimate_error",
-        "error of the estimated velocity",
-        {"": "m/s"},
-        "root mean square of |dy_hat - dy| in the second half, both of the same instant",
-        Loop.for_velocity_estimates,
-        partial(Fold, LoopRows.miss, total),
-        "miss",
-        _root_mean,
-    ),
-    Index(
-        "theta_hat_half",
-        "estimate at half time",
-        THETA,
-        "theta_hat halfway through the run",
-        Loop.for_parameter_estimates,
-        partial(Fold, LoopRows.late_estimates, first),
-        "half",
-        symbol=r"\hat{\theta}",
-    ),
-    Index(
-        "theta_hat_end",
-        "estimate at the end",
-        THETA,
-        "theta_hat at the end of the run",
-        Loop.for_parameter_estimates,
-        partial(Fold, lambda rows: rows.acting(*rows.loop.theta_hat), last),
-        "end",
-        symbol=r"\hat{\theta}",
-    ),
-    Index(
-        "largest_speed",
-        "largest speed",
-        {"": "m/s"},
-        "largest speed of the control point, |dy|",
-        lambda loop: (loop.dy, ()),
-        partial(Fold, lambda rows: size(rows.at(*rows.loop.dy)), largest),
-        "speed",
-    ),
-    Index(
-        "largest_drift",
-        "largest drift",
-        {"": "m/s"},
-        "largest speed of sway and heave, |(v, w)| (Assumption 1)",
-        lambda loop: (loop.drift, ()),
-        partial(Fold, lambda rows: size(rows.at(*rows.loop.drift)), largest),
-        "drift",
-    ),
+    _index("l2_effort", "L2 effort", is_metric=True),
+    _index("rms_effort", "RMS effort", is_metric=True),
+    _index("peak_command", "peak command", is_metric=True),
+    _index("saturated_fraction", "share of saturated steps", is_metric=True),
+    _index("total_variation", "total variation", is_metric=True),
+    _index("final_error", "final error", is_metric=True),
+    _index("time_to_reach", "time to reach"),
+    _index("late_error", "largest late error"),
+    _index("estimate_error", "error of the estimated velocity"),
+    _index("theta_hat_half", "estimate at half time", r"\hat{\theta}"),
+    _index("theta_hat_end", "estimate at the end", r"\hat{\theta}"),
+    _index("largest_speed", "largest speed"),
+    _index("largest_drift", "largest drift"),
 )
 
 
@@ -253,15 +143,33 @@ def metrics() -> tuple[Index, ...]:
     return tuple(index for index in INDICES if index.is_metric)
 
 
-def index_columns(loops: Sequence[Loop] = (STANDARD,)) -> tuple[str, ...]:
-    """The columns of all indices in a study; of several loops, after the names of the vehicles."""
+def index_columns(
+    loops: Sequence[Loop] = (STANDARD,), own: Sequence[Index] = ()
+) -> tuple[str, ...]:
+    """The columns of all indices in a study; of several loops, after the names of the vehicles.
+
+    Args:
+        loops: of the vehicles.
+        own: the user's, after the others.
+
+    """
     of_each = (
         f"{prefix}{column}"
         for _, prefix in _prefixed(loops)
-        for index in INDICES
+        for index in (*INDICES, *own)
         for column in index.columns
     )
     return (*of_each, *([SMALLEST_DISTANCE] if len(loops) > 1 else []))
+
+
+def index_units(index: Index, loops: Sequence[Loop] = (STANDARD,)) -> dict[str, str]:
+    """Units of the columns of an index, and of all of it if they have one."""
+    units = dict(zip(index.columns, index.units.values(), strict=True))
+    if len({*units.values()}) == 1:
+        units[index.name] = index.unit
+    return {
+        f"{prefix}{name}": unit for _, prefix in _prefixed(loops) for name, unit in units.items()
+    }
 
 
 def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
@@ -270,65 +178,64 @@ def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
 
 
 class Indices:
-    """An observer that computes the indices there are columns for; it keeps the last seconds."""
+    """An observer that computes the indices that a run has columns and parameters for."""
 
     def __init__(
-        self, loops: Sequence[Loop] = (STANDARD,), chosen: Sequence[Index] | None = None
+        self,
+        loops: Sequence[Loop] = (STANDARD,),
+        chosen: Sequence[Index] | None = None,
+        own: Sequence[Index] = (),
     ) -> None:
         """Take what is measured.
 
         Args:
             loops: of the vehicles.
             chosen: out of :data:`INDICES`; None: all.
+            own: indices of the user's own.
 
         """
-        self._loops, self._chosen = loops, INDICES if chosen is None else chosen
+        self._loops, self._chosen = loops, (*(INDICES if chosen is None else chosen), *own)
 
     def begin(self, header: Header) -> None:
         """Find out which indices there will be."""
-        self._header, self._end, self._n = header, header.experiment.start_time, 0
+        self._header, self._end = header, header.experiment.start_time
         self._failure: str | None = None
-        self._last = np.empty((0, 1 + len(header.columns)))
-        none = Table.of(header, self._last)
-        self._measured = {
-            loop: [index for index in self._chosen if not none.missing(*index.needs(loop))]
-            for loop in self._loops
-        }
+        self._reductions = reductions_of(
+            dict.fromkeys(index.reducer for index in self._chosen), self._loops, header
+        )
+        none = Table.of(header, np.empty((0, 1 + len(header.columns))))
         has_distances = len(self._loops) > 1 and not none.missing(*for_distances(self._loops))
         #: What there is of several vehicles together.
         self.together = {SMALLEST_DISTANCE: inf} if has_distances else {}
-        # Those that are made of the same share it.
-        self._reducers = {
-            loop: {index.reducer: index.reducer() for index in found}
-            for loop, found in self._measured.items()
-        }
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account."""
-        table = Table.of(self._header, np.vstack((self._last, rows)))
-        for loop, reducers in self._reducers.items():
-            seen = LoopRows(loop, self._n, table, len(self._last))
-            for reducer in reducers.values():
-                reducer.take(seen)
+        for reductions in self._reductions.values():
+            for reduction in reductions.values():
+                reduction.take(rows)
         for name, before in self.together.items():
             apart = smallest_distances(Table.of(self._header, rows), self._loops)
             self.together[name] = min(before, float(apart.min()))
-        self._last, self._end = table.rows[-BEFORE:].copy(), float(rows[-1, 0])
-        self._n += len(rows)
+        self._end = float(rows[-1, 0])
 
     def end(self, ending: Ending) -> None:
         """Remember how the run has ended."""
         self._failure = ending.failure
 
-    @np.errstate(all="ignore")
     def found(self, loop: Loop = STANDARD) -> dict[str, list[float]]:
         """The members of the indices of a loop, by their names."""
-        length = self._end - self._header.experiment.start_time
+        of = {reducer: one.found() for reducer, one in self._reductions[loop].items()}
         return {
-            index.name: index.members_of(reducer.found(self._end), reducer.n, length)
-            for index in self._measured[loop]
-            if (reducer := self._reducers[loop][index.reducer]).n
+            index.name: of[index.reducer][index.name]
+            for index in self._chosen
+            if index.name in of.get(index.reducer, ())
         }
+
+    @property
+    def failures(self) -> list[str]:
+        """What indices have raised."""
+        every = (one for reductions in self._reductions.values() for one in reductions.values())
+        return [one.failure for one in every if one.failure]
 
     def values(self) -> dict[str, float]:
         """The numbers of all loops, by their columns in a study."""

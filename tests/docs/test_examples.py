@@ -181,11 +181,26 @@ def test_pages_of_studies_name_all_columns_options_and_ready_studies():
 
 @needs_studies
 def test_study_has_as_many_runs_as_the_page_says():
-    [example] = blocks(STUDIES, "toml")
+    example, _ = blocks(STUDIES, "toml")
     study = study_of("mine", tomllib.loads(example.text))
     space = Space(study, {name: load_scenario(name) for name in study.scenario})
     assert len(space) == 8 * 2 * 64 * 2
     assert read_figures("mine", study.figures, space.columns, space.has_scenarios)
+
+
+@needs_studies
+def test_an_index_of_ones_own_is_a_column(workplace):
+    """The last time at which the depth is away, of the rows of each run."""
+    Path("settling_time.py").write_text(blocks(STUDIES, "python")[1].text)
+    Path("settling.toml").write_text(blocks(STUDIES, "toml")[1].text)
+    assert main(["check", "settling.toml"]) == 0
+    assert main(["check", "settling_time.py"]) == 0
+    result = sweep("settling.toml", kind="native", out="made")
+    assert Path("made", "settling.png").is_file()
+    for z, settled in zip(result["plant.eta0.z"], result["settling_time"], strict=True):
+        run = simulate("fig4", {"plant.eta0.z": z}, stop_time=20.0, kind="native")
+        away = np.abs(run["plant.eta.z"] - run["planner.y_d.z"]) > 0.5
+        assert settled == run.time[away][-1] > 5.0
 
 
 @needs_studies

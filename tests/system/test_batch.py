@@ -326,7 +326,10 @@ def test_an_index_that_is_not_accumulated_is_made_of_the_rows(monkeypatch, name)
 
 
 def test_an_index_of_what_is_not_computed_is_refused(monkeypatch):
-    of_z = INDICES[0]._replace(name="size_of_z", needs=lambda loop: (loop.z, ()))
+    first = INDICES[0]
+    ports = (replace(first.reducer.ports[0], name="controller.z.x"),)
+    reducer = replace(first.reducer, ports=ports)
+    of_z = first._replace(name="size_of_z", reducer=reducer)
     monkeypatch.setattr(batch_engine, "_OF_ROWS", [of_z])
     with pytest.raises(InputError) as refused:
         engines("fig4")

@@ -20,7 +20,7 @@ from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.attitude import rotation_from_euler
 from auv_fmu.paper.control_point import control_point
 from auv_fmu.paper.euler import LARGEST_STATE
-from orchestrator.vehicle.indices import REACHED
+from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import AXES, DIRECTIONS, Loop
 
 #: What stands in the loop; `.compilation` puts other blocks here before it compiles.

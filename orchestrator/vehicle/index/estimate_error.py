@@ -51,14 +51,13 @@ def update(
     state: State, before: Inputs, acting: Inputs, t: float, begin: float, end: float
 ) -> State:
     """One more step."""
-    squares, steps = state.squares, state.steps
-    if state.is_late:
-        s_x, s_y, s_z = squares
-        x, y, z = acting.dy_hat
-        d_x, d_y, d_z = before.dy
-        x, y, z = x - d_x, y - d_y, z - d_z
-        squares, steps = (s_x + x * x, s_y + y * y, s_z + z * z), steps + 1
-    return State(squares, steps, is_late(t, begin, end))
+    if not state.is_late:
+        return state._replace(is_late=True) if is_late(t, begin, end) else state
+    s_x, s_y, s_z = state.squares
+    x, y, z = acting.dy_hat
+    d_x, d_y, d_z = before.dy
+    x, y, z = x - d_x, y - d_y, z - d_z
+    return State((s_x + x * x, s_y + y * y, s_z + z * z), state.steps + 1, True)
 
 
 def outputs(state: State) -> Outputs:

@@ -33,7 +33,7 @@ def start() -> State:
 
 def update(state: State, acting: Inputs) -> State:
     """One more step."""
-    return State(max(state.largest, acting.rho_hat))
+    return state if acting.rho_hat <= state.largest else State(acting.rho_hat)
 
 
 def outputs(state: State) -> Outputs:

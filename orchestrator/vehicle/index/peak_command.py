@@ -19,8 +19,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Of all steps so far."""
 
-    peak: Vector3
-    steps: int
+    peak: Vector3  #: below zero: there was none
 
 
 class Outputs(NamedTuple):
@@ -33,16 +32,19 @@ class Outputs(NamedTuple):
 
 def start() -> State:
     """No step yet."""
-    return State((0.0, 0.0, 0.0), 0)
+    return State((-1.0, -1.0, -1.0))
 
 
 def update(state: State, acting: Inputs) -> State:
     """One more step."""
     p_u, p_q, p_r = state.peak
     u, q, r = acting.command
-    return State((max(p_u, abs(u)), max(p_q, abs(q)), max(p_r, abs(r))), state.steps + 1)
+    u, q, r = abs(u), abs(q), abs(r)
+    if u <= p_u and q <= p_q and r <= p_r:
+        return state
+    return State((max(p_u, u), max(p_q, q), max(p_r, r)))
 
 
 def outputs(state: State) -> Outputs:
     """The peak, if there was a step."""
-    return Outputs(state.peak if state.steps > 0 else (nan, nan, nan))
+    return Outputs(state.peak if state.peak[0] >= 0.0 else (nan, nan, nan))

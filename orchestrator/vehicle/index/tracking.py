@@ -56,9 +56,11 @@ def start(inputs: Inputs, t: float, begin: float, end: float) -> State:
 def update(state: State, inputs: Inputs, t: float, begin: float, end: float) -> State:
     """One more row."""
     distance = norm(error(inputs))
-    reached = t - begin if isnan(state.reached) and distance <= REACHED else state.reached
-    is_late = t >= begin + 0.5 * (end - begin)
-    return State(reached, max(state.late, distance) if is_late else state.late)
+    if isnan(state.reached) and distance <= REACHED:
+        state = state._replace(reached=t - begin)
+    if distance > state.late and t >= begin + 0.5 * (end - begin):
+        state = state._replace(late=distance)
+    return state
 
 
 def outputs(state: State) -> Outputs:

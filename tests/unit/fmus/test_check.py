@@ -84,6 +84,47 @@ def test_a_module_that_cannot_be_imported_is_told(tmp_path, monkeypatch):
     ]
 
 
+INDEX = """\
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+
+
+class Inputs(NamedTuple):
+    x: Annotated[float, Variable("m", "A signal", name="plant.x")]
+
+
+class Outputs(NamedTuple):
+    last: Annotated[float, Variable("m", "Its last value")]
+
+
+def start(inputs: Inputs) -> Inputs:
+    return inputs
+
+
+def update(acting: Inputs) -> Inputs:
+    return acting
+
+
+def outputs(state: Inputs, h: float) -> Outputs:
+    return Outputs(state.x ** 0.5)
+"""
+
+
+@pytest.mark.parametrize("option", [(), ("--index",)])
+def test_an_index_is_checked_as_such(tmp_path, monkeypatch, option):
+    (tmp_path / "own_index.py").write_text(INDEX)
+    monkeypatch.chdir(tmp_path)
+    status, lines = mistakes("own_index.py", *option)
+    assert status == 0
+    assert [line.partition(";")[0] for line in lines] == [
+        "own_index.py:24: own_index.outputs takes h, which is not one of state, t, begin, end",
+        "own_index.py:25: ** with other than a whole constant is not in the language of equations",
+    ]
+
+
 def test_what_is_no_component_is_refused(tmp_path):
     path = tmp_path / "own.py"
     path.write_text("x = 1\n")

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
+from importlib import import_module
 from math import exp, log, pi, sqrt
+from pkgutil import iter_modules
 
 import numpy as np
 import pytest
 
+from fmus.language.build import Program
+from fmus.ports.reducer import read_reducer
 from orchestrator import simulate as run
 from orchestrator.figures.study_values import Values
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
@@ -24,10 +27,11 @@ from orchestrator.studies.store import open_store
 from orchestrator.studies.study_file import study_of
 from orchestrator.studies.study_result import StudyResult
 from orchestrator.system.names import PortName, port_name
+from orchestrator.vehicle import index
 from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of
-from orchestrator.vehicle.reducers import Fold, largest
-from orchestrator.vehicle.signals import AXES, EULER, STANDARD, Loop
+from orchestrator.vehicle.signals import AXES, EULER, STANDARD
+from support import largest_depth
 from support.tables import at_its_time
 
 T, H, ELL = 10.0, 0.02, 0.35
@@ -162,18 +166,16 @@ def test_closed_loop_has_all_of_them():
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 
 
+@pytest.mark.parametrize("module", [*iter_modules(index.__path__)], ids=lambda one: one.name)
+def test_an_index_is_in_the_language_of_equations(module):
+    of = read_reducer(import_module(f"{index.__name__}.{module.name}"))
+    assert Program(*of.hooks.values()).mistakes == []
+
+
 def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
     """It is in metrics.json, in the table of a study, and in the labels of its figures."""
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    depth = Index(
-        "largest_depth",
-        "largest depth",
-        {"": "m"},
-        "largest z of the centre of mass",
-        Loop.for_control_point,
-        partial(Fold, lambda rows: rows.at(rows.loop.position[2]), largest),
-        is_metric=True,
-    )
+    depth = Index("largest_depth", "largest depth", read_reducer(largest_depth), is_metric=True)
     monkeypatch.setattr(table_of_indices, "INDICES", (*table_of_indices.INDICES, depth))
     result = run("fig4", {"plant.nu0.w": 1.0}, stop_time=1.0, kind="native")
     deepest = result["plant.eta.z"].max()

@@ -1,0 +1,248 @@
+"""Indices of the user's own: a figure of a study names a file beside it."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, cached_property
+from importlib.util import module_from_spec, spec_from_file_location
+from itertools import chain
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from fmpy.model_description import ModelVariable
+
+from fmus.ports.reducer import Reducer, read_reducer
+from orchestrator.figures.study_values import is_known, names_of
+from orchestrator.machine.children import run_module
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import Findings, InputError, did_you_mean, last_line, reason
+from orchestrator.studies.study import Study
+from orchestrator.studies.study_file import LABELS, listed
+from orchestrator.system.structure import System
+from orchestrator.system.values import type_of
+from orchestrator.vehicle.indices import INDICES, Index, index_columns
+from orchestrator.vehicle.reduction import sources_of
+from orchestrator.vehicle.signals import Loop, loops_of
+
+#: What a name begins with that may be that of a file.
+_STEM = re.compile(r"[A-Za-z_]\w*", re.ASCII)
+
+#: What is beside an index of one's own.
+_ALONE = "an index is one file, which imports what is installed"
+
+
+@dataclass(frozen=True)
+class OwnIndex:
+    """An index of the user's own, or several in one file.
+
+    It travels as its text; what is made of it is made where it is needed.
+
+    Attributes:
+        name: of the file, without its ending.
+        text: that the file holds.
+
+    """
+
+    name: str
+    text: bytes
+
+    @property
+    def digest(self) -> str:
+        """Of the text."""
+        return hashlib.sha256(self.text).hexdigest()
+
+    @cached_property
+    def reducer(self) -> Reducer:
+        """What its hooks say."""
+        return read_reducer(_module(self))
+
+    @property
+    def indices(self) -> tuple[Index, ...]:
+        """What it gives."""
+        return tuple(
+            Index(name, name.replace("_", " "), self.reducer) for name in self.reducer.results
+        )
+
+    def __getstate__(self) -> Mapping[str, object]:
+        """Without what was made of the text."""
+        return {"name": self.name, "text": self.text}
+
+
+@cache
+def _module(own: OwnIndex) -> ModuleType:
+    """The module of an index, in this process."""
+    file = process_folder() / own.digest[:16] / f"{own.name}.py"
+    file.parent.mkdir(exist_ok=True)
+    file.write_bytes(own.text)
+    # Another study in this process may have another index of this name.
+    name = f"index_{own.digest[:16]}.{own.name}"
+    specification = spec_from_file_location(name, file)
+    assert specification is not None and specification.loader is not None
+    module = module_from_spec(specification)
+    sys.modules[name] = module
+    specification.loader.exec_module(module)
+    return module
+
+
+def read_own_index(path: Path) -> OwnIndex:
+    """An index of the user's own.
+
+    Args:
+        path: of its file.
+
+    Raises:
+        Refused: it is none; with all that is wrong with it.
+
+    """
+    # It is imported by a separate process first, because it may be any Python.
+    process = run_module("fmus.check", "--index", str(path))
+    findings = Findings()
+    for text in process.stdout.splitlines():
+        findings.problem(text)
+    if process.returncode != 0:
+        findings.problem(last_line(process.stderr))
+    findings.refuse()
+    try:
+        own = OwnIndex(path.stem, path.read_bytes())
+        own.reducer  # noqa: B018
+    except Exception as error:
+        raise InputError(f"{path}: {type(error).__name__}: {reason(error)}; {_ALONE}") from None
+    return own
+
+
+def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, ...]:
+    """The indices of the user's own that the figures of a study show.
+
+    Args:
+        study: whose file they stand beside.
+        systems: that it runs, by the names that it has for them.
+
+    Raises:
+        Refused: a file is no index, has the name of another, or takes what no system has.
+
+    """
+    if study.folder is None:
+        return ()
+    loops = {name: loops_of(system) for name, system in systems.items()}
+    known = [*study.varied, *chain(*map(index_columns, loops.values()))]
+    wanted = (value for value in _shown(study) if not is_known(value, known))
+    names = [name for value in wanted for name in names_of(value) if not is_known(name, known)]
+    prefixes = {"": None} | {f"{loop.name}.": None for loop in chain(*loops.values())}
+    components = {name.partition(".")[0] for one in systems.values() for name in one.components}
+    stems = {
+        found[0]: None
+        for name in names
+        for prefix in prefixes
+        if name.startswith(prefix) and (found := _STEM.match(name, len(prefix)))
+    }
+    findings, every = Findings(), list[OwnIndex]()
+    for stem in stems:
+        path = study.folder / f"{stem}.py"
+        # A component may have a file here, too.
+        if stem not in components and path.is_file():
+            with findings.collecting():
+                own = read_own_index(path)
+                _check_names(path, own, every)
+                _check_inputs(path, own, systems, loops)
+                every.append(own)
+    findings.refuse()
+    return tuple(every)
+
+
+def _check_names(path: Path, own: OwnIndex, others: Sequence[OwnIndex]) -> None:
+    """Hold the names of indices apart.
+
+    Raises:
+        InputError: another index has the name of one.
+
+    """
+    taken = {index.name: "auv-fmu" for index in INDICES}
+    taken |= {index.name: f"{one.name}.py" for one in others for index in one.indices}
+    for index in own.indices:
+        if index.name in taken:
+            raise InputError(f"{path}: {taken[index.name]} has an index {index.name}; rename it")
+
+
+def _check_inputs(
+    path: Path,
+    own: OwnIndex,
+    systems: Mapping[str, System],
+    loops: Mapping[str, Sequence[Loop]],
+) -> None:
+    """Check that a system of the study has what an index takes.
+
+    Raises:
+        InputError: none has, or it is of another type.
+
+    """
+    without = ""
+    for name, system in systems.items():
+        variables = dict(_variables(system))
+        for loop in loops[name]:
+            places = dict.fromkeys(variables, 0)
+            sources = sources_of(own.reducer, loop, places, {})
+            for port in own.reducer.ports:
+                variable = variables.get(loop.port(port.name))
+                if variable is not None and type_of(variable) != port.type:
+                    why = f"{port.name} is of the type {type_of(variable)}, not {port.type}"
+                    raise InputError(f"{path}: {why}")
+            if not sources.missing:
+                return
+            lacking = sources.missing[0]
+            without = f"{name} has no {lacking}{did_you_mean(lacking, variables)}"
+    raise InputError(f"{path}: {without}")
+
+
+def _variables(system: System) -> Iterator[tuple[str, ModelVariable]]:
+    """What rows and parameters of a run are of, by their names."""
+    for component in system.components.values():
+        for causality in ("output", "input", "parameter"):
+            for variable in component.having(causality):
+                yield f"{component.name}.{variable.name}", variable
+
+
+def _shown(study: Study) -> Iterator[str]:
+    """The values that the figures of a study show."""
+    for name, table in study.figures.items():
+        if name != LABELS:
+            for key in ("x", "y", "show", "limits"):
+                yield from listed(table.get(key, ()))
+
+
+def with_fields(
+    figures: Mapping[str, Any], own: Sequence[OwnIndex], columns: Sequence[str]
+) -> dict[str, Any]:
+    """The figures of a study with the indices of a file, of all vehicles, where they name the file.
+
+    Args:
+        figures: that the study file has.
+        own: the indices of the user's own.
+        columns: of what comes out of a run.
+
+    """
+    of = {
+        one.name: [
+            name
+            for index in one.indices
+            for name in dict.fromkeys(_group(column, index.name) for column in columns)
+            if name
+        ]
+        for one in own
+    }
+    return {
+        name: {**table, "show": [*chain(*(of.get(one, [one]) for one in listed(table["show"])))]}
+        if name != LABELS and "show" in table
+        else table
+        for name, table in figures.items()
+    }
+
+
+def _group(column: str, index: str) -> str:
+    """The index, with its vehicle, that a column is of; empty: it is of another."""
+    found = re.fullmatch(rf"((?:.+\.)?{index})(?:\.\w+|\[[\d,]+\])?", column)
+    return found[1] if found else ""

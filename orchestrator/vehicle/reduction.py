@@ -1,0 +1,251 @@
+"""Reducers of a run in progress: what they keep of its rows, and what that comes to.
+
+Rows come in blocks; what is made of them does not depend on the blocks.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import cache
+from itertools import product
+from math import isnan
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmus.ports.groups import SCOPE, compiled, gathered
+from fmus.ports.port import Port
+from fmus.ports.reducer import Reducer
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import Experiment
+from orchestrator.master.observers.observer import Header
+from orchestrator.system.values import Value
+from orchestrator.vehicle.signals import Loop
+
+#: How a double of a row becomes a value of a port, by its type.
+_MADE, _WHOLE = {"Real": "{}", "Boolean": "bool({})"}, "int({})"
+
+
+class Sources(NamedTuple):
+    """Where the inputs of a reducer come from in a run.
+
+    Attributes:
+        places: in a row, time first, of those that change, by the names of their ports.
+        constants: values of the others.
+        missing: what they are called in the run that it lacks.
+
+    """
+
+    places: dict[str, int]
+    constants: dict[str, Value]
+    missing: list[str]
+
+
+def sources_of(
+    reducer: Reducer, loop: Loop, places: Mapping[str, int], values: Mapping[str, Any]
+) -> Sources:
+    """Where the inputs of a reducer come from.
+
+    Args:
+        reducer: that takes them.
+        loop: whose names they have.
+        places: of the columns of the run in a row, time first.
+        values: of its parameters.
+
+    Raises:
+        InputError: a parameter is no number.
+
+    """
+    found = Sources({}, {}, [])
+    for port in reducer.ports:
+        name = loop.port(port.name)
+        if port.name in loop.implied:
+            found.constants[port.name] = loop.implied[port.name]
+        elif name in places:
+            found.places[port.name] = places[name]
+        elif name in values:
+            found.constants[port.name] = _number(port, name, values[name])
+        elif port.name in reducer.defaults:
+            found.constants[port.name] = reducer.defaults[port.name]
+        else:
+            found.missing.append(name)
+    return found
+
+
+def _number(port: Port, name: str, value: Any) -> Value:
+    """The value of a parameter in the type of a port.
+
+    Raises:
+        InputError: it is of another one.
+
+    """
+    if isinstance(value, str) and value in port.choices:
+        return port.choices[value]
+    if not isinstance(value, int | float) or port.choices:
+        raise InputError(f"{name} is {value!r}, not a number")
+    return float(value) if port.type == "Real" else value
+
+
+class Kept(NamedTuple):
+    """What a reducer keeps of the rows so far.
+
+    Attributes:
+        state: that its hooks made.
+        before: the last row, as they take it.
+        time: of that row [s].
+
+    """
+
+    state: Any
+    before: Any
+    time: float
+
+
+class _Functions(NamedTuple):
+    """A reducer over rows, from the row of the start and from what is kept."""
+
+    start: Callable[..., Any]
+    go_on: Callable[..., Any]
+
+
+@cache
+def _functions(reducer: Reducer, places: tuple[str, ...], acting_row: int) -> _Functions:
+    """The hooks of a reducer over rows, compiled: a loop over groups takes several times as long.
+
+    Args:
+        reducer: whose hooks they are.
+        places: the names of ports whose values stand in rows, in their order there.
+        acting_row: as :attr:`.Experiment.acting_row` says.
+
+    """
+    names = {port.name: f"x{i}" for i, port in enumerate(reducer.ports)}
+    types = {port.name: port.type for port in reducer.ports}
+    texts = dict(names) | {one: _MADE.get(types[one], _WHOLE).format(names[one]) for one in places}
+    scope: dict[str, Any] = {**SCOPE, **reducer.hooks}
+    inputs = gathered(reducer.inputs, iter(texts.values()), scope)
+    row = "".join(f"{names[one]}, " for one in places)
+    constants = "".join(f"{name}, " for one, name in names.items() if one not in places)
+    given = {"acting": "inputs" if acting_row else "before", "h": "t - time"}
+    start, update = (
+        f"{hook}({', '.join(given.get(one, one) for one in reducer.arguments(hook))})"
+        for hook in ("start", "update")
+    )
+    head = "rows, constants, begin, end, state=None, before=None, time=None"
+    loop = f"({constants}) = constants\n " if constants else ""
+    loop += f"for (t, {row}) in rows:\n  inputs = {inputs}\n  "
+    go_on = f"state = {update}\n  before = inputs\n  time = t\n return state, before, time"
+    return _Functions(
+        compiled(head, f"{loop}return {start}, inputs, t", {**scope}),
+        compiled(head, f"{loop}{go_on}", {**scope}),
+    )
+
+
+def reduce_block(
+    reducer: Reducer, sources: Sources, run: Experiment, rows: np.ndarray, kept: Kept | None = None
+) -> Kept:
+    """What a reducer keeps after some more rows.
+
+    Args:
+        reducer: that takes them.
+        sources: of its inputs.
+        run: that the rows are of.
+        rows: in the order of the places, time first; at least one.
+        kept: before; None: the first of the rows is the one of the start.
+
+    """
+    functions = _functions(reducer, tuple(sources.places), run.acting_row)
+    rest, constants = rows.tolist(), tuple(sources.constants.values())
+    given = constants, run.start_time, run.stop_time
+    if kept is None:
+        kept = Kept(*functions.start(rest[:1], *given))
+        rest = rest[1:]
+    return Kept(*functions.go_on(rest, *given, *kept))
+
+
+def reductions_of(
+    reducers: Iterable[Reducer], loops: Sequence[Loop], header: Header
+) -> dict[Loop, dict[Reducer, Reduction]]:
+    """Reducers of each vehicle in a run that is about to begin: those that it has all inputs for.
+
+    Raises:
+        InputError: a parameter that they take is no number.
+
+    """
+    values = {str(name): value for name, value in header.parameters.items()}
+    found: dict[Loop, dict[Reducer, Reduction]] = {loop: {} for loop in loops}
+    for loop, reducer in product(loops, reducers):
+        sources = sources_of(reducer, loop, header.place, values)
+        if not sources.missing:
+            found[loop][reducer] = Reduction(reducer, sources, header.experiment)
+    return found
+
+
+class Reduction:
+    """A reducer of a run in progress.
+
+    Attributes:
+        failure: what a hook has raised, and when; after that it reduces nothing; empty: nothing.
+
+    """
+
+    def __init__(self, reducer: Reducer, sources: Sources, run: Experiment) -> None:
+        """Start with no rows."""
+        self._reducer, self._sources, self._run = reducer, sources, run
+        self._columns = [0, *sources.places.values()]
+        self._recent: deque[np.ndarray] = deque()
+        self._kept: Kept | None = None
+        self.failure = ""
+
+    def take(self, rows: np.ndarray) -> None:
+        """Take some rows of the run into account."""
+        rows = rows[:, self._columns]
+        if self._reducer.last is None:
+            self._reduce(rows)
+            return
+        self._recent.append(rows)
+        while self._recent[0][-1, 0] < rows[-1, 0] - self._reducer.last:
+            self._recent.popleft()
+
+    def _reduce(self, rows: np.ndarray) -> None:
+        if self.failure:
+            return
+        try:
+            self._kept = reduce_block(self._reducer, self._sources, self._run, rows, self._kept)
+        except Exception as error:
+            # One by one, to say when.
+            for row in rows if len(rows) > 1 else ():
+                self._reduce(row[np.newaxis])
+            self._fail(error, rows[0, 0])
+
+    def _fail(self, error: Exception, t: float) -> None:
+        said = f"at t = {t:g} s: {type(error).__name__}: {error}"
+        self.failure = self.failure or f"{self._reducer.name}: {said}"
+
+    def found(self) -> dict[str, list[float]]:
+        """The members of its indices by their names; what is not a number is not there."""
+        if self._recent and self._reducer.last is not None:
+            rows = np.vstack(self._recent)
+            self._kept = None
+            self._reduce(rows[rows[:, 0] >= rows[-1, 0] - self._reducer.last])
+        if self.failure or self._kept is None:
+            return {}
+        of = {"state": self._kept.state, "t": self._kept.time}
+        of |= {"begin": self._run.start_time, "end": self._run.stop_time}
+        given = [of[one] for one in self._reducer.arguments("outputs")]
+        try:
+            outputs = self._reducer.hooks["outputs"](*given)
+        except Exception as error:
+            self._fail(error, self._kept.time)
+            return {}
+        values = {name: list(_flat(getattr(outputs, name))) for name in self._reducer.results}
+        return {name: found for name, found in values.items() if not all(map(isnan, found))}
+
+
+def _flat(value: Any) -> Iterator[float]:
+    """The numbers in a value, in their order."""
+    if not isinstance(value, tuple):
+        yield float(value)
+        return
+    for part in value:
+        yield from _flat(part)

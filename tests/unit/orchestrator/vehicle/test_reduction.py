@@ -1,0 +1,174 @@
+"""Reducers over rows that were never made."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from math import inf, nan
+from types import ModuleType
+from typing import Annotated, NamedTuple
+
+import numpy as np
+import pytest
+
+from auv_fmu import Variable
+from fmus.ports.reducer import read_reducer
+from orchestrator.machine.errors import InputError
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment, Order
+from orchestrator.master.observers.observer import Header
+from orchestrator.system.names import port_name
+from orchestrator.vehicle.reduction import Reduction, reductions_of, sources_of
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
+
+N = 21
+
+
+class Mode(IntEnum):
+    """Two modes."""
+
+    OFF = 0
+    ON = 3
+
+
+class Inputs(NamedTuple):
+    """Of every type, and what a run may lack."""
+
+    x: Annotated[float, Variable("m", "A signal", name="plant.x")]
+    n: Annotated[int, Variable(description="A whole number", name="plant.n")]
+    is_on: Annotated[bool, Variable(description="A truth", name="plant.is_on")]
+    mode: Annotated[Mode, Variable(description="A mode", name="plant.mode")]
+    k: Annotated[float, Variable("m", "A gain", name="controller.k")]
+    lag: Annotated[float, Variable("s", "A lag", name="plant.actuator.T.u")] = 7.0
+
+
+class State(NamedTuple):
+    """All that was told."""
+
+    rows: tuple[float, ...]
+    seen: tuple[object, ...] = ()
+
+
+class Outputs(NamedTuple):
+    """Two numbers."""
+
+    total: Annotated[float, Variable("m", "A sum")]
+    rest: Annotated[tuple[float, float], Variable("1", "Others")]
+
+
+class Told(NamedTuple):
+    """What a step tells."""
+
+    inputs: Inputs
+    before: float
+    acting: float
+    t: float
+    h: float
+
+
+def start(inputs: Inputs, t: float, begin: float, end: float) -> State:
+    """The first row."""
+    return State((inputs.x,), ((t, begin, end),))
+
+
+def update(
+    state: State, inputs: Inputs, before: Inputs, acting: Inputs, t: float, h: float
+) -> State:
+    """One more row."""
+    if inputs.x == 13.0 and inputs.k == 13.0:
+        raise ValueError("thirteen")
+    told = Told(inputs, before.x, acting.x, t, h)
+    return State((*state.rows, inputs.x), (*state.seen, told))
+
+
+def outputs(state: State, t: float) -> Outputs:
+    """What came of it."""
+    return Outputs(sum(state.rows), (t, nan))
+
+
+def reducer_with(last: float | None = None):
+    module = ModuleType("own")
+    vars(module).update(
+        start=start, update=update, outputs=outputs, **({} if last is None else {"LAST": last})
+    )
+    # The language has no tuples of any length, and these hooks are not translated.
+    State.__annotations__.update(rows="tuple[float, float]", seen="tuple[float, float]")
+    return read_reducer(module)
+
+
+def header(order: Order = FEEDTHROUGH, k: float = 1.0, loop: Loop = STANDARD) -> Header:
+    columns = tuple(loop.port(f"plant.{name}") for name in ("n", "x", "is_on"))
+    values = {loop.port("plant.mode"): "on", loop.port("controller.k"): k}
+    parameters = {port_name(name): value for name, value in values.items()}
+    return Header(columns, Experiment(10.0, 0.5, order, -1.0), parameters)
+
+
+def rows() -> np.ndarray:
+    k = np.arange(N)
+    return np.column_stack((0.5 * k - 1.0, k % 4, 1.0 * k, k % 2))
+
+
+def reduced(of: Header, blocks: int = 1, last: float | None = None) -> Reduction:
+    [one] = reductions_of([reducer_with(last)], [STANDARD], of)[STANDARD].values()
+    for block in np.array_split(rows(), blocks):
+        one.take(block)
+    return one
+
+
+def state(one: Reduction) -> State:
+    assert one._kept is not None
+    return one._kept.state
+
+
+@pytest.mark.parametrize("blocks", [1, 4, N])
+@pytest.mark.parametrize("order", [FEEDTHROUGH, GAUSS_SEIDEL])
+def test_hooks_are_told_what_a_row_holds(order, blocks):
+    first, *steps = state(reduced(header(order), blocks)).seen
+    assert first == (-1.0, -1.0, 10.0)
+    assert len(steps) == N - 1
+    for k, told in enumerate(steps, start=1):
+        assert told.inputs == Inputs(float(k), k % 4, bool(k % 2), Mode.ON, 1.0, 7.0)
+        assert type(told.inputs.n) is int and type(told.inputs.is_on) is bool
+        assert told.inputs.mode is Mode.ON
+        assert (told.before, told.acting) == (k - 1.0, k - 1.0 if order == FEEDTHROUGH else k)
+        assert (told.t, told.h) == (0.5 * k - 1.0, 0.5)
+
+
+def test_what_is_not_a_number_is_there_only_beside_numbers():
+    found = reduced(header()).found()
+    assert found["total"] == [N * (N - 1) / 2]
+    assert found["rest"][0] == 9.0 and np.isnan(found["rest"][1])
+
+
+@pytest.mark.parametrize("blocks", [1, 4, N])
+def test_only_the_last_seconds_count(blocks):
+    """Before the end at 9 s: the rows of 7.5, 8, 8.5 and 9 s."""
+    assert reduced(header(), blocks, 1.5).found()["total"] == [17.0 + 18.0 + 19.0 + 20.0]
+
+
+@pytest.mark.parametrize("blocks", [1, 4, N])
+@pytest.mark.parametrize("last", [None, 100.0])
+def test_what_a_hook_raises_is_told_with_its_time(blocks, last):
+    one = reduced(header(k=13.0), blocks, last)
+    assert one.found() == {}
+    assert one.failure == "own: at t = 5.5 s: ValueError: thirteen"
+
+
+def test_names_are_those_of_the_loop():
+    fleet = AllocatedLoop("a.plant", "a.law", "a.planner", allocation="a.fins")
+    of = header(loop=fleet)
+    values = {str(name): value for name, value in of.parameters.items()}
+    found = sources_of(reducer_with(), fleet, of.place, values)
+    assert found.places == {"plant.x": 2, "plant.n": 1, "plant.is_on": 3}
+    # What gives tau has a state.
+    assert found.constants == {"plant.mode": 3, "controller.k": 1.0, "plant.actuator.T.u": inf}
+    assert fleet.port("plant.tau.u") == "a.fins.tau.u"
+    assert fleet.port("sea.depth") == "sea.depth"
+    found = sources_of(reducer_with(), STANDARD, of.place, values)
+    assert found.missing == [
+        "plant.x", "plant.n", "plant.is_on", "plant.mode", "controller.k"
+    ]  # fmt: skip
+    assert reductions_of([reducer_with()], [STANDARD], of) == {STANDARD: {}}
+
+
+def test_a_parameter_that_is_no_number_is_refused():
+    with pytest.raises(InputError, match=r"controller\.k is 'soft', not a number"):
+        reduced(header(k="soft"))  # type: ignore[arg-type]
