@@ -197,7 +197,8 @@ class _Kind:
         yield self._start()
         yield self._advance()
 
-    def _call(self, hook: str, **given: str) -> str:
+    def call(self, hook: str, **given: str) -> str:
+        """The call of a hook, with other arguments than those of the component if they are given."""
         function = self.functions[hook]
         known = {
             "parameters": "it->parameters", "inputs": "it->inputs", "state": "it->state",
@@ -239,14 +240,14 @@ class _Kind:
     def _derive(self, state: str = "it->state", time: str = "it->time") -> list[str]:
         if not self.said.derived:
             return []
-        derived = f"it->derived = {self._call('derive', state=state, t=time)};"
+        derived = f"it->derived = {self.call('derive', state=state, t=time)};"
         return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
 
     def _guarded(self, state: str) -> list[str]:
         if not self.said.hooks["credible"]:
             return []
-        test = self._call("credible", state=state)
-        return [f"if (!{test}) {state} = {self._call('restarted', state=state)};"]
+        test = self.call("credible", state=state)
+        return [f"if (!{test}) {state} = {self.call('restarted', state=state)};"]
 
     def _evaluate(self) -> str:
         state, body = "it->state", []
@@ -256,7 +257,7 @@ class _Kind:
             body += self._guarded(state)
         if self.said.takes("outputs", "derived"):
             body += self._derive(state)
-        body.append(f"it->outputs = {self._call('outputs', state=state)};")
+        body.append(f"it->outputs = {self.call('outputs', state=state)};")
         if self.said.draws:
             group = f"it->outputs.{in_c(self.said.noisy)}"
             body.append(f"{group} = {self._measured('it->draws', group)};")
@@ -267,7 +268,7 @@ class _Kind:
         type_ = self.functions["measured"].arguments["n"]
         places = iter(f"{draws}[{i}]" for i in range(self.said.draws))
         n = next(places) if isinstance(type_, Scalar) else self._made(type_, places)
-        return self._call("measured", **{"n": n, self.said.noisy: group})
+        return self.call("measured", **{"n": n, self.said.noisy: group})
 
     def _made(self, type_: Type, places: Iterator[str]) -> str:
         return f"({self.emitter.type(type_)}){self._initial(type_, places)}"
@@ -298,16 +299,16 @@ class _Kind:
     def _start(self) -> str:
         body = []
         if self.said.hooks["check"]:
-            body.append(f"{self._call('check')};")
+            body.append(f"{self.call('check')};")
         if self.is_timed:
             body.append("it->time = t;")
         if self.said.derived:
             body.append("it->underived = 1;")
         if self.said.draws:
-            body.append(f"seed_generator(&it->noise, (uint32_t){self._call('seed')});")
+            body.append(f"seed_generator(&it->noise, (uint32_t){self.call('seed')});")
             body.append(f"draw_normals(&it->noise, it->draws, {self.said.draws});")
         if self.said.hooks["start"]:
-            body.append(f"it->state = {self._call('start', t='t')};")
+            body.append(f"it->state = {self.call('start', t='t')};")
             body.append(f"if (!({self._sound('it->state')})) {_UNSOUND}")
         body.append(f"{self.name}_evaluate(it, error);")
         if self.said.draws:
@@ -352,7 +353,7 @@ class _Kind:
             time = "t + i * step"
             if said.takes("update", "derived"):
                 body += [f"    {line}" for line in self._derive("state", time)]
-            body.append(f"    state = {self._call('update', state='state', t=time, h='step')};")
+            body.append(f"    state = {self.call('update', state='state', t=time, h='step')};")
             if said.takes("derive", "state") or said.takes("derive", "t"):
                 body.append("    it->underived = 1;")
             body += [
@@ -886,7 +887,7 @@ class Text:
         for visit in visits:
             kind = self.kind(visit.component)
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
-            if is_stale and self._reads(visit):
+            if is_stale and self.reads(visit):
                 yield from self._evaluated(visit.component)
 
     def _visited(self, visit: Visit, every: int) -> Iterator[str]:
@@ -919,7 +920,7 @@ class Text:
         yield f"{kind.name}_evaluate(&it->{self.members[name]}, error);"
         yield f"if (error->raised) return refused(it, {i}, {OUTPUTS}, 0);"
 
-    def _reads(self, visit: Visit) -> bool:
+    def reads(self, visit: Visit) -> bool:
         """Whether one of the outputs is read that the component computes."""
         component = self.plan.system.components[visit.component]
         computed = {port.name for port in self.kind(visit.component).ports("output")}
