@@ -69,6 +69,16 @@ def add_fmi(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_platforms(parser: argparse.ArgumentParser, what: str) -> None:
+    """Which platforms there are libraries for; `what` names the option that makes some."""
+    parser.add_argument(
+        "--platforms",
+        metavar="NAME,...|all",
+        help=f"platforms to compile for with {what}, by their FMI names, or all; those other than "
+        "this machine's need auv-fmu[native]; default: this machine",
+    )
+
+
 def add_kind(parser: argparse.ArgumentParser) -> None:
     """Which kind of FMU goes to other tools: one that does not depend on the compiler here."""
     parser.add_argument(
@@ -98,10 +108,13 @@ def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
     parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
 
 
-def read_system(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
+def read_system(
+    options: argparse.Namespace, kind: str | None = None, fmi: str = FMI_VERSIONS[0]
+) -> tuple[Scenario, System]:
     """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
-    found = load_scenario(options.scenario, options.kind, fmi, options.variant, findings)
+    kind = options.kind if kind is None else kind
+    found = load_scenario(options.scenario, kind, fmi, options.variant, findings)
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")

@@ -705,6 +705,8 @@ def write_fmu(
     try:
         wanted = platforms_of(fmi, platforms)
         entries = entries_of(model.parts(fmi), fmi, wanted, compiler_for(wanted), tell)
+    except InputError:
+        raise
     except (OSError, ValueError) as error:
         raise InputError(f"the FMU cannot be built: {reason(error)}") from error
     write_archive(path, entries)
