@@ -664,21 +664,17 @@ class Text:
                 *[line.replace("return refused", "return -refused") for line in started],
                 "    changed = settle(it, 1, error);",
                 f"    while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
-                *[
-                    f"    it->{self.members[name]}_shown = it->{self.members[name]}.outputs;"
-                    for name in self.components
-                    if name in self.slow
-                ],
                 "    return changed;",
                 "}",
             ]
         )
 
     def _started(self, name: str) -> list[str]:
-        i, kind = self.components.index(name), self.kind(name)
+        i, kind, member = self.components.index(name), self.kind(name), self.members[name]
         return [
-            f"{kind.name}_start(&it->{self.members[name]}, t, error);",
+            f"{kind.name}_start(&it->{member}, t, error);",
             f"if (error->raised) return refused(it, {i}, {START}, 0);",
+            *([f"it->{member}_shown = it->{member}.outputs;"] if name in self.slow else []),
         ]
 
     def _port(self, name: PortName) -> Port:
