@@ -84,7 +84,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     )
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
-    add_fmi(parser)
+    add_fmi(parser, f"--format {FMU}")
     add_platforms(parser, f"--format {FMU}")
     add_set(parser)
     add_out(parser, "exports/SCENARIO/")

@@ -59,13 +59,14 @@ def request(options: argparse.Namespace) -> Request:
     return replace(from_options(Request, options), parameters=assignments(options))
 
 
-def add_fmi(parser: argparse.ArgumentParser) -> None:
-    """Which version of FMI."""
+def add_fmi(parser: argparse.ArgumentParser, *others: str) -> None:
+    """Which version of FMI; `others` are further options that can have the last one."""
+    needs = " or ".join((f"--kind {NATIVE}", *others))
     parser.add_argument(
         "--fmi",
         choices=FMI_VERSIONS,
         default=FMI_VERSIONS[0],
-        help=f"FMI version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
+        help=f"FMI version of the FMUs; 3 needs {needs}; default: {FMI_VERSIONS[0]}",
     )
 
 

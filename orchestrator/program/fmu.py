@@ -68,7 +68,7 @@ static void model_take_noise(generator *noise, const double from[]) {
 _NOISE_TYPES = (*[int] * 625, bool, float)
 
 _TOLD = """\
-/* Says of which component an error is. */
+/* Says whose an error is. */
 static void model_ascribe(Error *error, string component) {
     const message why = error->why;
     if (!error->raised) return;
