@@ -25,7 +25,7 @@ import fmpy
 import measuring
 
 from fmus.kinds import NATIVE
-from orchestrator.formats.osp_and_container import write_osp
+from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError

@@ -26,7 +26,7 @@ from zipfile import ZipFile
 
 import measuring
 
-from orchestrator.formats.osp_and_container import write_osp
+from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table

@@ -9,7 +9,7 @@ room                what it is for
 ==================  ==========================================================
 :mod:`.machine`     the operating system: errors, files, processes
 :mod:`.system`      what is simulated
-:mod:`.formats`     how it is written down: SSP, OSP, container, tables, TOML
+:mod:`.formats`     how it is written down: SSP, OSP, tables, TOML
 :mod:`.master`      how it is stepped
 :mod:`.vehicle`     this vehicle's signals, indices and certificates
 :mod:`.figures`     figures of runs and of studies

@@ -8,7 +8,7 @@ functions that are written here go over it number by number: ints of 32 bits are
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from operator import itemgetter
@@ -56,7 +56,7 @@ _P, _S, _I = (
     "const model_inputs *inputs",
 )
 _D, _O, _E = "const model_derived *derived", "model_outputs *outputs", "Error *error"
-_NEXT = "model_state *state"
+_NEXT, _SCRATCH = "model_state *state", "model_derived *derived"
 
 
 #: What the runtime asks of hooks: whether they take an argument.
@@ -70,6 +70,24 @@ _TAKES = {
     "DERIVE_TAKES_INPUTS": ("derive", "inputs"),
     "DERIVE_TAKES_TIME": ("derive", "t"),
 }
+
+#: All that the runtime asks: besides, how many numbers noise takes, whether outputs are held,
+#: whether a state may be given up, and whether an update finds out itself what cannot be a state.
+_ASKED = ("DRAWS", "SAMPLED", "HAS_GUARD", "CHECKS_STATES", *_TAKES)
+
+#: What the runtime calls: what each returns and takes, and what it does where nothing is to do.
+_CALLED = {
+    "check": ("void", f"{_P}, {_E}", ()),
+    "check_state": ("void", f"{_P}, {_S}, {_E}", ()),
+    "seed": ("unsigned long", f"{_P}, {_E}", ("return (unsigned int)0;",)),
+    "start": ("void", f"{_P}, {_I}, double t, {_NEXT}, {_E}", ()),
+    "credible": ("int", f"{_P}, {_S}, {_I}, {_E}", ("return 1;",)),
+    "restart": ("void", f"{_P}, {_NEXT}, {_I}, {_E}", ()),
+    "derive": ("void", f"{_P}, {_S}, {_I}, double t, {_SCRATCH}, {_E}", ()),
+    "evaluate": ("void", f"{_P}, {_S}, {_D}, {_I}, double t, {_O}, {_E}", ()),
+    "update": ("void", f"{_P}, {_NEXT}, {_SCRATCH}, {_I}, double t, double h, {_E}", ()),
+    "measure": ("void", f"{_P}, const double draws[], {_O}, {_E}", ()),
+}  # fmt: skip
 
 
 @cache
@@ -129,34 +147,22 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
         """What hands the result of a hook over."""
         return [passages[what].put(what, calls[hook])] if hook in calls else []
 
-    # A negative seed is the number 2^32 above it.
-    seed = [f"return (unsigned int){calls.get('seed', 0)};"]
-    credible = [f"return {calls.get('credible', 1)};"]
-    derive = [f"*derived = {calls['derive']};"] if said.derived else []
-    measure = (
-        _measured(emitter, said, passages["outputs"], functions["measured"]) if said.noisy else []
-    )
-    parts = [
-        _constants(said),
-        _defined("void check", f"{_P}, {_E}", alone.get("check", [])),
-        _defined("void check_state", f"{_P}, {_S}, {_E}", alone.get("check_state", [])),
-        _defined("unsigned long seed", f"{_P}, {_E}", seed),
-        _defined("void start", f"{_P}, {_I}, double t, {_NEXT}, {_E}", put("state", "start")),
-        _defined("int credible", f"{_P}, {_S}, {_I}, {_E}", credible),
-        _defined("void restart", f"{_P}, {_NEXT}, {_I}, {_E}", put("state", "restarted")),
-        _defined(
-            "void derive", f"{_P}, {_S}, {_I}, double t, model_derived *derived, {_E}", derive
-        ),
-        _defined(
-            "void evaluate", f"{_P}, {_S}, {_D}, {_I}, double t, {_O}, {_E}",
-            put("outputs", "outputs"),
-        ),
-        _defined(
-            "void update", f"{_P}, {_NEXT}, {_D}, {_I}, double t, double h, {_E}",
-            put("state", "update"),
-        ),
-        _defined("void measure", f"{_P}, const double draws[], {_O}, {_E}", measure),
-    ]  # fmt: skip
+    bodies = {
+        **{name: alone.get(name, []) for name in ("check", "check_state")},
+        "start": put("state", "start"),
+        "restart": put("state", "restarted"),
+        "derive": [f"*derived = {calls['derive']};"] if said.derived else [],
+        "evaluate": put("outputs", "outputs"),
+        "update": put("state", "update"),
+    }
+    if "seed" in calls:
+        # A negative seed is the number 2^32 above it.
+        bodies["seed"] = [f"return (unsigned int){calls['seed']};"]
+    if "credible" in calls:
+        bodies["credible"] = [f"return {calls['credible']};"]
+    if said.noisy:
+        bodies["measure"] = _measured(emitter, said, passages["outputs"], functions["measured"])
+    parts = [_constants(said), *defined(bodies)]
     text = "\n\n".join(parts)
     # One that nothing calls would be a warning.
     moving = [
@@ -171,14 +177,25 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
 
 def _constants(said: Behaviour) -> str:
     """What follows from the hooks before any of them is called."""
-    constants = {
+    found = {
         "DRAWS": said.draws,
         "SAMPLED": said.is_sampled,
         "HAS_GUARD": said.hooks["credible"] is not None,
         **{name: said.takes(*question) for name, question in _TAKES.items()},
     }
-    rows = "".join(f"    MODEL_{name} = {int(value)},\n" for name, value in constants.items())
-    return f"enum {{\n{rows}}};\n#define MODEL_RESTARTED {quoted(_directives(said.restarted))}"
+    return constants(found, _directives(said.restarted))
+
+
+def constants(found: Mapping[str, int], restarted: str = "") -> str:
+    """What the runtime asks before it calls anything.
+
+    Args:
+        found: the answers, by their names; those that are missing are 0.
+        restarted: what is logged when a state is given up, as `compose` takes it.
+
+    """
+    rows = "".join(f"    MODEL_{name} = {int(found.get(name, 0))},\n" for name in _ASKED)
+    return f"enum {{\n{rows}}};\n#define MODEL_RESTARTED {quoted(restarted)}"
 
 
 def _directives(text: str) -> str:
@@ -230,9 +247,16 @@ def _drawn(type_: Type, draws: Iterator[str]) -> str:
     return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
 
 
-def _defined(name: str, arguments: str, body: list[str]) -> str:
-    """A function with what it returns before its name; arguments it does not use are marked so."""
-    returns, _, name = name.rpartition(" ")
+def defined(bodies: Mapping[str, Sequence[str]]) -> list[str]:
+    """The functions that the runtime calls, with what they do."""
+    return [
+        _defined(returns, name, arguments, bodies.get(name) or idle)
+        for name, (returns, arguments, idle) in _CALLED.items()
+    ]
+
+
+def _defined(returns: str, name: str, arguments: str, body: Sequence[str]) -> str:
+    """A function; arguments that it does not use are marked so."""
     text = " ".join(body)
     names = [argument.rstrip("[]").split()[-1].lstrip("*") for argument in arguments.split(", ")]
     unused = [f"(void){n};" for n in names if not re.search(rf"\b{n}\b", text)]

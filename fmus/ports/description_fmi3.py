@@ -194,35 +194,52 @@ def terminals_and_icons(ports: Sequence[Port], arrays: bool = False) -> bytes:
         arrays: whether ports of one array are one variable.
 
     """
-    ports = [variable.port for variable in variables_of(ports, arrays)]
+    return terminals_of({"": [variable.port for variable in variables_of(ports, arrays)]})
+
+
+def terminals_of(parts: Mapping[str, Sequence[Port]]) -> bytes:
+    """terminalsAndIcons.xml of what has several parts.
+
+    Args:
+        parts: the ports of each, by what stands before their names, and before those of terminals.
+
+    """
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = SubElement(root, "GraphicalRepresentation")
     SubElement(graphics, "CoordinateSystem", _ICON, suggestedScalingFactorTo_mm=_SCALE)
     SubElement(graphics, "Icon", _ICON)
     terminals = SubElement(root, "Terminals")
     for causality in _MATCHING_RULE:
-        terminals.extend(_terminals([port for port in ports if port.causality == causality]))
+        of_one = {
+            part: [port for port in ports if port.causality == causality]
+            for part, ports in parts.items()
+        }
+        terminals.extend(_terminals(of_one))
     return text(root)
 
 
-def _terminals(ports: Sequence[Port]) -> list[Element]:
+def _terminals(parts: Mapping[str, Sequence[Port]]) -> list[Element]:
     """The terminals of all inputs, or of all outputs, one below the other."""
-    groups = {name: ports[place] for name, place in slices(ports).items()}
+    groups = [
+        (part, name, ports[place])
+        for part, ports in parts.items()
+        for name, place in slices(ports).items()
+    ]
     return [
-        _terminal(name, members, 100 - round(200 * (i + 0.5) / len(groups)))
-        for i, (name, members) in enumerate(groups.items())
+        _terminal(part, name, members, 100 - round(200 * (i + 0.5) / len(groups)))
+        for i, (part, name, members) in enumerate(groups)
     ]
 
 
-def _terminal(name: str, members: Sequence[Port], centre: int) -> Element:
+def _terminal(part: str, name: str, members: Sequence[Port], centre: int) -> Element:
     causality = members[0].causality
     name = _TAKES.get(name, name) if causality == "input" else name
-    terminal = Element("Terminal", name=name, matchingRule=_MATCHING_RULE[causality])
+    terminal = Element("Terminal", name=part + name, matchingRule=_MATCHING_RULE[causality])
     for port in members:
         SubElement(
             terminal,
             "TerminalMemberVariable",
-            variableName=port.name,
+            variableName=part + port.name,
             memberName=member_of(port.name),
             variableKind="signal",
         )

@@ -14,6 +14,7 @@ from orchestrator.commands.options import (
     add_kind,
     add_options,
     add_out,
+    add_platforms,
     add_set,
     assignments,
 )
@@ -43,12 +44,7 @@ def add_build(parser: argparse.ArgumentParser) -> None:
     )
     add_kind(parser)
     add_fmi(parser)
-    parser.add_argument(
-        "--platforms",
-        metavar="NAME,...|all",
-        help=f"platforms to compile for with --kind {NATIVE}, by their FMI names, or all; those "
-        "other than this machine's need auv-fmu[native]; default: this machine",
-    )
+    add_platforms(parser, f"--kind {NATIVE}")
     parser.add_argument(
         "script",
         nargs="?",

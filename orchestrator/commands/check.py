@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
-from orchestrator.formats.osp_and_container import OSP_STRUCTURE
+from orchestrator.formats.osp import OSP_STRUCTURE
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack

@@ -8,11 +8,13 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+from fmus.kinds import AUTO, FMI_VERSIONS
 from orchestrator.commands.options import (
     add_fmi,
     add_kind,
     add_options,
     add_out,
+    add_platforms,
     add_set,
     add_system,
     assignments,
@@ -24,10 +26,12 @@ from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
-from orchestrator.formats.osp_and_container import write_container, write_osp
+from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import INITIAL, ORDERS, read_order
+from orchestrator.program.components import definitions_of
+from orchestrator.program.fmu import SystemModel, write_fmu
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
@@ -35,15 +39,12 @@ from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.scenario_events import read_events
 from orchestrator.system.names import listed
-from orchestrator.system.structure import System
 
-#: Writers by the names of their formats.
-EXPORT_FORMATS: dict[str, Callable[[System, Path], list[Path]]] = {
-    "ssp": write_ssp,
-    "osp": write_osp,
-    "container": write_container,
-}
+#: What a scenario can be exported as.
+EXPORT_FORMATS = SSP, OSP, FMU = "ssp", "osp", "fmu"
 
+#: Options of `export` that are for one format only.
+_OF_FORMAT = {"flat": SSP, "connectors": SSP, "platforms": FMU}
 
 #: Tools that do not set parameters of a type.
 _LEAVING = {"Enumeration": "libcosim and ecos", "String": "OMSimulator and others"}
@@ -56,16 +57,17 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu export`."""
     describe(
         parser,
-        "Write a scenario for other tools: its FMUs, connections and parameters.",
+        "Write a scenario for other tools: its FMUs, connections and parameters, or all of it as "
+        "one FMU.",
         "export fig4 --format osp --out exports/fig4",
     )
     add_system(parser)
     parser.add_argument(
         "--format",
-        choices=tuple(EXPORT_FORMATS),
-        default="ssp",
-        help="output format: ssp (SSP archive), osp (folder for libcosim) or container (one FMU, "
-        "needs auv-fmu[hosts]); default: ssp",
+        choices=EXPORT_FORMATS,
+        default=SSP,
+        help="output format: ssp (SSP archive), osp (folder for libcosim) or fmu (one FMU in C, "
+        "without Python); default: ssp",
     )
     parser.add_argument(
         "--flat",
@@ -82,7 +84,8 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     )
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
-    add_fmi(parser)
+    add_fmi(parser, f"--format {FMU}")
+    add_platforms(parser, f"--format {FMU}")
     add_set(parser)
     add_out(parser, "exports/SCENARIO/")
     add_options(parser, Files, "force")
@@ -192,7 +195,12 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    scenario, system = read_system(options, options.fmi)
+    for name, wanted in _OF_FORMAT.items():
+        if getattr(options, name) and options.format != wanted:
+            raise InputError(f"--{name} applies only to --format {wanted}: leave it out")
+    # One FMU is made of what the components' authors wrote, whatever their own FMUs are.
+    chosen = (AUTO, FMI_VERSIONS[0]) if options.format == FMU else (options.kind, options.fmi)
+    scenario, system = read_system(options, *chosen)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
         # What names no end is written without one.
@@ -212,20 +220,25 @@ def _export(options: argparse.Namespace) -> int:
     if left := left_behind(prepared.scenario):
         say(f"warning: {left}")
     for family, tools in _LEAVING.items():
-        if options.format == "ssp" and (names := [*map(str, system.changed(family))]):
+        if options.format == SSP and (names := [*map(str, system.changed(family))]):
             say(
                 f"warning: {listed(names)}: parameters of type {family}, which {tools} "
                 "leave as they are in the FMU"
             )
     folder = options.out or Path("exports", prepared.scenario.stem)
-    write = EXPORT_FORMATS[options.format]
-    of_ssp = {name: getattr(options, name) for name in ("flat", "connectors")}
-    if options.format == "ssp":
-        write = partial(write_ssp, **of_ssp)
-    elif given := next((name for name, value in of_ssp.items() if value), None):
-        raise InputError(f"--{given} applies only to --format ssp: leave it out")
     with replace_files(folder, force=options.force) as unfinished:
-        written = write(system, unfinished)
+        if options.format == FMU:
+            definitions = definitions_of(system)
+            model = SystemModel(
+                prepared.plan, definitions, system.name, prepared.scenario.title or system.name
+            )
+            written = write_fmu(model, unfinished, options.fmi, options.platforms, say)
+        elif options.format == OSP:
+            written = write_osp(system, unfinished)
+        else:
+            written = write_ssp(
+                system, unfinished, flat=options.flat, connectors=options.connectors
+            )
     for path in written:
         show(folder / path.relative_to(unfinished))
     return OK

@@ -59,13 +59,24 @@ def request(options: argparse.Namespace) -> Request:
     return replace(from_options(Request, options), parameters=assignments(options))
 
 
-def add_fmi(parser: argparse.ArgumentParser) -> None:
-    """Which version of FMI."""
+def add_fmi(parser: argparse.ArgumentParser, *others: str) -> None:
+    """Which version of FMI; `others` are further options that can have the last one."""
+    needs = " or ".join((f"--kind {NATIVE}", *others))
     parser.add_argument(
         "--fmi",
         choices=FMI_VERSIONS,
         default=FMI_VERSIONS[0],
-        help=f"FMI version of the FMUs; 3 needs --kind {NATIVE}; default: {FMI_VERSIONS[0]}",
+        help=f"FMI version of the FMUs; 3 needs {needs}; default: {FMI_VERSIONS[0]}",
+    )
+
+
+def add_platforms(parser: argparse.ArgumentParser, what: str) -> None:
+    """Which platforms there are libraries for; `what` names the option that makes some."""
+    parser.add_argument(
+        "--platforms",
+        metavar="NAME,...|all",
+        help=f"platforms to compile for with {what}, by their FMI names, or all; those other than "
+        "this machine's need auv-fmu[native]; default: this machine",
     )
 
 
@@ -98,10 +109,13 @@ def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
     parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
 
 
-def read_system(options: argparse.Namespace, fmi: str = FMI_VERSIONS[0]) -> tuple[Scenario, System]:
+def read_system(
+    options: argparse.Namespace, kind: str | None = None, fmi: str = FMI_VERSIONS[0]
+) -> tuple[Scenario, System]:
     """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
-    found = load_scenario(options.scenario, options.kind, fmi, options.variant, findings)
+    kind = options.kind if kind is None else kind
+    found = load_scenario(options.scenario, kind, fmi, options.variant, findings)
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")

@@ -1,1 +1,1 @@
-"""How systems, runs and settings are written down: SSP, OSP, a container; tables; TOML schemas."""
+"""How systems, runs and settings are written down: SSP, OSP; tables; TOML schemas."""

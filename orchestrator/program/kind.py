@@ -113,6 +113,7 @@ class Kind:
         }
         self.is_timed = said.takes("outputs", "t") or said.takes("derive", "t")
         self.follows_inputs = said.takes("outputs", "inputs")
+        self.derives_anew = any(said.takes("derive", one) for one in ("state", "inputs", "t"))
         self.steps = said.hooks["update"] is not None
         self.has_h_max = said.h_max is not None
 
@@ -154,7 +155,8 @@ class Kind:
     def _type(self, group: str) -> str:
         return self.emitter.type(self.types[group])
 
-    def _call(self, hook: str, **given: str) -> str:
+    def call(self, hook: str, **given: str) -> str:
+        """The call of a hook, with other arguments than the component's own if they are given."""
         called = self.functions[hook]
         known = {
             "parameters": "it->parameters", "inputs": "it->inputs", "state": "it->state",
@@ -187,15 +189,15 @@ class Kind:
     def _derive(self, state: str, time: str) -> list[str]:
         if not self.said.derived:
             return []
-        derived = f"it->derived = {self._call('derive', state=state, t=time)};"
+        derived = f"it->derived = {self.call('derive', state=state, t=time)};"
         return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
 
     def _guarded(self) -> list[str]:
         """A copy of the state, which a guard may start over."""
         lines = [f"{self._type('state')} state = it->state;"]
         if self.said.hooks["credible"]:
-            test = self._call("credible", state="state")
-            lines.append(f"if (!{test}) state = {self._call('restarted', state='state')};")
+            test = self.call("credible", state="state")
+            lines.append(f"if (!{test}) state = {self.call('restarted', state='state')};")
         return lines
 
     def _computed(self) -> list[str]:
@@ -204,7 +206,7 @@ class Kind:
         lines, state = self._guarded() * is_guarded, "state" if is_guarded else "it->state"
         if self.said.takes("outputs", "derived"):
             lines += self._derive(state, "it->time")
-        lines.append(f"{self._type('outputs')} outputs = {self._call('outputs', state=state)};")
+        lines.append(f"{self._type('outputs')} outputs = {self.call('outputs', state=state)};")
         if self.said.draws:
             group = f"outputs.{in_c(self.said.noisy)}"
             lines.append(f"{group} = {self._measured('it->draws', group)};")
@@ -229,12 +231,12 @@ class Kind:
         type_ = self.functions["measured"].arguments["n"]
         n = initializer(type_, (f"{draws}[{i}]" for i in range(self.said.draws)))
         n = n if isinstance(type_, Scalar) else f"({self.emitter.type(type_)}){n}"
-        return self._call("measured", **{"n": n, self.said.noisy: group})
+        return self.call("measured", **{"n": n, self.said.noisy: group})
 
     def _start(self) -> str:
         said, lines = self.said, list[str]()
         if said.hooks["check"]:
-            lines.append(f"{self._call('check')};")
+            lines.append(f"{self.call('check')};")
         if self.is_timed:
             lines.append("it->time = t;")
         if said.derived:
@@ -242,7 +244,7 @@ class Kind:
         if said.draws:
             lines += ["if (!it->is_seeded) {", *(f"    {line}" for line in self._seed()), "}"]
         if said.hooks["start"]:
-            lines.append(f"it->state = {self._call('start', t='t')};")
+            lines.append(f"it->state = {self.call('start', t='t')};")
             if sound := self.is_sound("it->state"):
                 lines.append(f"if (!({sound})) {_UNSOUND}")
         lines.append(f"{self.name}_evaluate(it, error);")
@@ -265,7 +267,7 @@ class Kind:
             # Parameters that change may let it count.
             *(["it->is_noisy = 1;"] if self.is_tuned else noisy),
             "if (it->is_noisy) {",
-            f"    seed_generator(&it->noise, (uint32_t){self._call('seed')});",
+            f"    seed_generator(&it->noise, (uint32_t){self.call('seed')});",
             f"    draw_normals(&it->noise, it->draws, {n});",
             "}",
         ]
@@ -293,7 +295,7 @@ class Kind:
             time = "t + i * step"
             if said.takes("update", "derived"):
                 lines += [f"    {line}" for line in self._derive("state", time)]
-            lines.append(f"    state = {self._call('update', state='state', t=time, h='step')};")
+            lines.append(f"    state = {self.call('update', state='state', t=time, h='step')};")
             if said.takes("derive", "state") or said.takes("derive", "t"):
                 lines.append("    it->underived = 1;")
             lines.append("}")
@@ -312,7 +314,7 @@ class Kind:
 
     def _adopt(self) -> str:
         """What follows from parameters that have changed."""
-        lines = [f"{self._call('check')};"] if self.said.hooks["check"] else []
+        lines = [f"{self.call('check')};"] if self.said.hooks["check"] else []
         lines += ["it->underived = 1;"] * bool(self.said.derived)
         return self._function("adopt", "", lines)
 

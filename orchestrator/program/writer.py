@@ -213,7 +213,8 @@ class Text:
             )
         order: Order = self.plan.experiment.order or FEEDTHROUGH
         self.plan = replace(self.plan, experiment=replace(self.plan.experiment, order=order))
-        self.stages: Stages = stages_of(self.plan, stages(system, order))
+        self.sequence = stages(system, order)
+        self.stages: Stages = stages_of(self.plan, self.sequence)
         self.passes = self.stages.passing is not None
         self.is_tuned = self.is_tuned or self.alters
         self.components = [*system.components]
@@ -475,7 +476,6 @@ class Text:
             *(line for name in self.components if name in early for line in self._started(name)),
             "changed = settle(it, 1, error);",
             f"while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
-            *(f"it->{self.members[one]}_shown = it->{self.members[one]}.outputs;" for one in self.slow),
             "return changed;",
         ]  # fmt: skip
         return "\n\n".join(
@@ -497,9 +497,11 @@ class Text:
         )
 
     def _started(self, name: str) -> list[str]:
+        member = self.members[name]
         return [
-            f"{self.kind(name).name}_start(&it->{self.members[name]}, t, error);",
+            f"{self.kind(name).name}_start(&it->{member}, t, error);",
             self._refusal(name, START),
+            *([f"it->{member}_shown = it->{member}.outputs;"] if name in self.slow else []),
         ]
 
     def _refusal(self, name: str, call: str) -> str:
@@ -736,7 +738,7 @@ class Text:
         for visit in visits:
             kind = self.kind(visit.component)
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
-            if is_stale and self._reads(visit):
+            if is_stale and self.reads(visit):
                 is_early = bool(kind.foreseen) and visit.steps and not visit.takes
                 yield from self.evaluated(visit.component, "foresee" if is_early else "evaluate")
 
@@ -782,7 +784,7 @@ class Text:
         if not self.is_quick:
             yield self._refusal(name, OUTPUTS)
 
-    def _reads(self, visit: Visit) -> bool:
+    def reads(self, visit: Visit) -> bool:
         """Whether one of the outputs is read that the component computes."""
         component = self.plan.system.components[visit.component]
         # Whether those of each type have feedthrough.

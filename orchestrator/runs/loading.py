@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
 from orchestrator.figures.run_figures import check_figure
-from orchestrator.formats.osp_and_container import OSP_STRUCTURE, read_osp
+from orchestrator.formats.osp import OSP_STRUCTURE, read_osp
 from orchestrator.formats.ssp import STRUCTURE
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError

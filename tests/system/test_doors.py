@@ -14,7 +14,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.osp_and_container import OSP_STRUCTURE, write_osp
+from orchestrator.formats.osp import OSP_STRUCTURE, write_osp
 from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable

@@ -138,7 +138,7 @@ def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
 
 
 @pytest.mark.parametrize(
-    "host", ["libcosim-ssp", "ecos", "fmpy-ssp", *slow("libcosim-osp", "container", "c-program")]
+    "host", ["libcosim-ssp", "ecos", "fmpy-ssp", *slow("libcosim-osp", "c-program")]
 )
 def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: str):
     """Some are given a flat archive: what they read of a nested one is not all of it."""
@@ -150,19 +150,15 @@ def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: s
 
 @pytest.mark.slow
 @pytest.mark.parametrize("scenario", ["formation-v", "sea"])
-@pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos", "container"])
+@pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos"])
 def test_formations_and_seas_have_our_numbers_in_other_hosts(native: Path, host: str, scenario):
     system = closed_loop(native, read_scenario(scenario))
-    if host != "container":
-        # They leave the other shape as it is in the FMU.
-        own = {
-            name: system.component(name.component).start(name.port)
-            for name in system.changed("Enumeration")
-        }
-        system = system.with_parameters(own)
-    if (scenario, host) == ("sea", "container"):
-        # It passes initial values on once: friction has not heard of the water by then.
-        system = system.with_parameters({PortName("disturbance", "A_f"): 0.0})
+    # They leave the other shape as it is in the FMU.
+    own = {
+        name: system.component(name.component).start(name.port)
+        for name in system.changed("Enumeration")
+    }
+    system = system.with_parameters(own)
     check(system, host, 500)
 
 
@@ -199,9 +195,8 @@ def chosen(dist: Path) -> System:
     return closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
 
 
-@pytest.mark.parametrize("host", ["c-program", *slow("container")])
-def test_a_choice_reaches_its_component(dist: Path, host: str):
-    check(chosen(dist), host, 300)
+def test_a_choice_reaches_its_component(dist: Path):
+    check(chosen(dist), "c-program", 300)
 
 
 @pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos"])
@@ -218,9 +213,7 @@ def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str)
     check(system, host, 300)
 
 
-@pytest.mark.parametrize(
-    "host", ["c-program", *slow("libcosim-ssp", "libcosim-osp", "container", "fmpy-ssp")]
-)
+@pytest.mark.parametrize("host", ["c-program", *slow("libcosim-ssp", "libcosim-osp", "fmpy-ssp")])
 def test_a_start_time_reaches_the_host(dist: Path, host: str):
     """The disturbance (56) is a function of the time."""
     check(replace(closed_loop(dist), start_time=10.0), host, 300)
@@ -282,7 +275,7 @@ def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
         ("", BESIDE),
         ("--all", [*HOSTS]),
         ("sofirpy ecos", ["sofirpy", "ecos"]),
-        ("--kind native --fmi 3", ["ecos", "container", "fmpy"]),
+        ("--kind native --fmi 3", ["ecos", "fmpy"]),
     ],
 )
 def test_hosts_apart_are_run_where_they_are_asked_for(

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.kinds import FMI_VERSIONS, KINDS
+from fmus.kinds import KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from support.machine import contents
@@ -163,19 +163,6 @@ def test_ssp_2_runs_as_ssp_1_does_bit_for_bit(workplace: Path):
         assert main([*run, "--stop-time", "5", "--columns", "all", "--strict"]) == 0
     tables = [Path(f"run{fmi}/result.csv").read_bytes() for fmi in "23"]
     assert tables[0] == tables[1] and tables[0].count(b"\n") == 252
-
-
-@pytest.mark.skipif(
-    find_spec("fmu_manipulation_toolbox") is None,
-    reason="fmu_manipulation_toolbox is not installed",
-)
-def test_container_takes_fmus_of_either_version(workplace: Path):
-    for fmi in FMI_VERSIONS:
-        options = ["--kind", "native", "--fmi", fmi, "--format", "container", "--out", fmi]
-        assert main(["export", "fig4", *options]) == 0
-        with zipfile.ZipFile(workplace / fmi / "fig4.fmu") as archive:
-            root = ElementTree.fromstring(archive.read("modelDescription.xml"))
-        assert root.get("fmiVersion") == f"{fmi}.0"
 
 
 @pytest.mark.parametrize("run", [lambda: load("fig4", "c"), lambda: simulate("fig4", kind="c")])

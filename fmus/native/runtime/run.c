@@ -66,7 +66,7 @@ static int check_members(const double values[], message *why) {
 static int check_computed(const state_values *state, const Error *error, message *why) {
     if (error->raised) return compose(why, "%s", error->why.text);
     return check_members(state->values, why) &&
-           (is_bounded(state) ||
+           (MODEL_CHECKS_STATES || is_bounded(state) ||
             compose(why, "the state is not finite, or exceeds %g", LARGEST_STATE));
 }
 

@@ -107,7 +107,6 @@ HOSTS: dict[str, Host] = {
     "libcosim-ssp": Host("libcosimpy", here.libcosim_ssp),
     "libcosim-osp": Host("libcosimpy", here.libcosim_osp),
     "ecos": Host("ecospy", here.ecos, _BOTH, turned=True),
-    "container": Host("fmu_manipulation_toolbox", here.container, _BOTH),
     "fmpy": Host("fmpy", drivers.fmpy_slaves, _BOTH),
     "fmpy-ssp": Host("fmpy", here.fmpy_ssp, initial=ZERO),
     "c-program": Host("auv_fmu", here.c_program),

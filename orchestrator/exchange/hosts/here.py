@@ -16,13 +16,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any, NamedTuple
 
-import fmpy
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts.drivers import write_rows
-from orchestrator.formats.osp_and_container import write_container, write_osp
+from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
@@ -191,20 +190,6 @@ def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
     # Its row at a time has the outputs of the step that begins there.
     rows = np.column_stack([table[name] for name in _names(system)])
     return Ran(rows[: experiment.rows - 1], seconds)
-
-
-def container(system: System, experiment: Experiment, folder: Path) -> Ran:
-    [path] = write_container(system, folder)
-    start = perf_counter()
-    table = fmpy.simulate_fmu(
-        str(path),
-        start_time=experiment.start_time,
-        stop_time=experiment.stop_time,
-        step_size=experiment.step,
-        output_interval=experiment.step,
-    )
-    seconds = perf_counter() - start
-    return Ran(np.column_stack([table[name] for name in _names(system)])[1:], seconds)
 
 
 def c_program(system: System, experiment: Experiment, folder: Path) -> Ran:

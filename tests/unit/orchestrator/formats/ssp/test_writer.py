@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from lxml import etree
 
-from orchestrator.formats.osp_and_container import write_container, write_osp
+from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp import OMS
 from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.formats.ssp.writer import write_ssp
@@ -178,10 +178,9 @@ def test_omsimulator_is_told_the_step_where_it_looks_for_it(
     assert read_ssp(archive(tmp_path / "other.ssp", other, files)).step == step
 
 
-def test_formats_without_words_for_a_transformation_refuse_it(found: System, tmp_path: Path):
-    for write in (write_osp, write_container):
-        with pytest.raises(InputError, match="write an SSP"):
-            write(found, tmp_path)
+def test_a_format_without_words_for_a_transformation_refuses_it(found: System, tmp_path: Path):
+    with pytest.raises(InputError, match="write an SSP"):
+        write_osp(found, tmp_path)
 
 
 def test_fmus_of_one_name_stay_apart(tmp_path: Path):
@@ -367,20 +366,7 @@ def test_an_array_with_a_start_that_is_not_finite_is_refused_by_name(tmp_path: P
     assert mentions(str(error.value), "lag.M[1,3] finite")
 
 
-@pytest.mark.parametrize(
-    "write",
-    [
-        write_ssp,
-        write_osp,
-        pytest.param(
-            write_container,
-            marks=pytest.mark.skipif(
-                find_spec("fmu_manipulation_toolbox") is None,
-                reason="fmu_manipulation_toolbox is not installed",
-            ),
-        ),
-    ],
-)
+@pytest.mark.parametrize("write", [write_ssp, write_osp])
 def test_an_fmu_that_has_changed_since_it_was_read_is_refused(tmp_path: Path, write):
     """As by every other command that takes it along."""
     path = fmu(tmp_path / "a.fmu", variable("u", "input"), variable("y", "output"))

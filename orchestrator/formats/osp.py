@@ -1,27 +1,20 @@
-"""Formats of single tools: libcosim's configuration, and a container FMU, which is only written."""
+"""The configuration of libcosim, which is read and written."""
 
 from __future__ import annotations
 
-import json
-import shutil
 from collections.abc import Iterator, Mapping
-from importlib.util import find_spec
 from math import isclose
 from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
 from orchestrator.formats.ssp.archive import Archive
 from orchestrator.formats.ssp.writer import serialised
-from orchestrator.machine.children import run_module
-from orchestrator.machine.disk import process_folder
-from orchestrator.machine.errors import Findings, InputError, last_line, reason
+from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import check_file, is_folder, read_archive
 from orchestrator.system.component import Component, read_component
 from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, file_name, listed, plain_file_names
+from orchestrator.system.names import PortName, listed
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, conversion, unit_of_port
 from orchestrator.system.values import Value, literal, type_of, typed
@@ -37,11 +30,6 @@ _STEP, _ALGORITHM = 0.1, "fixedStep"
 _ROUNDING = 1e-9
 
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
-
-_TOOLBOX = "fmu_manipulation_toolbox"
-
-#: The file that lists the contents of a container.
-_CONTENT = "system.json"
 
 
 def write_osp(system: System, folder: Path) -> list[Path]:
@@ -287,59 +275,3 @@ def _parameters(
                 )
             parameters[port] = value
     return parameters
-
-
-def write_container(system: System, folder: Path) -> list[Path]:
-    """Write `NAME.fmu`, one FMU that contains the whole system and shows all its outputs.
-
-    Raises:
-        InputError: the FMU manipulation toolbox is not installed, or fails, or the system has what
-            a container has not.
-
-    """
-    if any(connection.transformation for connection in system.connections) or system.steps:
-        raise InputError("a container has no transformations and one step; write an SSP")
-    if find_spec(_TOOLBOX) is None:
-        raise InputError(
-            "a container needs the FMU manipulation toolbox: pip install 'auv-fmu[hosts]'"
-        )
-    container = f"{file_name(system.name)}.fmu"
-    # It knows instances by the names of their files, so each has a copy of its own; and it names
-    # links after them in small letters, as a component of ours may be called.
-    files = [f"fmu_{component.fmu.name}" for component in system.components.values()]
-    names = plain_file_names(files, container, _CONTENT)
-    fmus = dict(zip(system.components, names, strict=True))
-    content: dict[str, Any] = {
-        "name": container,
-        "step_size": system.step,
-        **dict.fromkeys(("auto_link", "auto_input", "auto_output", "auto_parameter"), False),
-        "fmu": list(fmus.values()),
-        "link": [
-            [fmus[c.source.component], c.source.port, fmus[c.target.component], c.target.port]
-            for c in system.connections
-        ],
-        "output": [
-            [fmus[component.name], variable.name, f"{component.name}.{variable.name}"]
-            for component in system.components.values()
-            for variable in component.having("output")
-        ],
-        "start": [
-            [fmus[name], port, value]
-            for name in system.components
-            for port, value in system.parameters_of(name).items()
-        ],
-    }
-    with TemporaryDirectory(dir=process_folder()) as work:
-        for name, component in system.components.items():
-            fmu = read_archive(component.fmu, component.digest)
-            Path(work, fmus[name]).write_bytes(fmu)
-        Path(work, _CONTENT).write_text(json.dumps(content), encoding="utf-8")
-        versions = {component.description.fmiVersion for component in system.components.values()}
-        fmi = max(versions).partition(".")[0]
-        options = ["-container", _CONTENT, "-fmu-directory", work, "-fmi", fmi]
-        process = run_module(f"{_TOOLBOX}.cli.fmucontainer", *options, folder=Path(work))
-        built = Path(work, container)
-        if process.returncode != 0 or not built.is_file():
-            said = last_line(process.stderr + process.stdout)
-            raise InputError(f"the container was not built: {said}")
-        return [Path(shutil.copyfile(built, folder / container))]

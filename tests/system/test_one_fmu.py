@@ -1,0 +1,324 @@
+"""A whole system as one FMU: it has the numbers of a run, in fmpy and in our master."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from math import sin
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi3 import FMU3Slave
+from fmpy.util import fmu_info
+from fmpy.validation import validate_fmu
+
+from orchestrator import load, simulate
+from orchestrator.commands.main import main
+from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI
+from orchestrator.runs.result import Result
+from orchestrator.system.names import PortName
+from orchestrator.system.values import typed
+from support.texts import mentions
+
+#: Communication step of the scenarios [s], and how many steps are compared.
+H, STEPS = 0.02, 300
+
+SCENARIOS = ("fig4", "path", "formation-v", "remus", "sea")
+
+#: What is open in all of these, and what a host drives it with.
+WAVE = "time,plant.water.x\n" + "".join(f"{H * k!r},{0.3 * sin(k)!r}\n" for k in range(STEPS))
+
+
+def exported(name: str, *options: str, out: str = "one") -> Path:
+    """The FMU of a scenario in the current folder."""
+    assert main(["export", name, "--format", "fmu", "--out", out, "--force", *options]) == 0
+    [path] = Path(out).glob("*.fmu")
+    return path
+
+
+def expected(name: str, **said: Any) -> Result:
+    return simulate(name, **{"stop_time": STEPS * H, "kind": "native", **said})
+
+
+def outputs(path: Path) -> list[str]:
+    found = fmpy.read_model_description(str(path)).modelVariables
+    return [one.name for one in found if one.causality == "output" and one.name != "fault"]
+
+
+def check(found: Any, result: Result, names: list[str]) -> None:
+    """Hold columns against those of a run, bit for bit."""
+    assert len(names) > 50
+    assert len(result) == STEPS + 1
+    for name in names:
+        assert np.array_equal(np.asarray(found[name], dtype=float), result[name]), name
+
+
+def play(path: Path, step: float = H) -> Any:
+    return fmpy.simulate_fmu(
+        str(path),
+        stop_time=STEPS * H,
+        step_size=step,
+        output_interval=step,
+        output=outputs(path),
+    )
+
+
+def alone(path: Path, **said: Any) -> dict[str, np.ndarray]:
+    """The columns of our master, with the FMU as its only component, by the names of its ports."""
+    found = simulate(path, stop_time=STEPS * H, step=H, **said)
+    head = f"{path.stem.replace('-', '_')}."
+    return {name.removeprefix(head): found[name] for name in found.columns if name != "time"}
+
+
+def slave(path: Path) -> FMU2Slave | FMU3Slave:
+    """A new instance, initialised."""
+    description = fmpy.read_model_description(str(path))
+    made = FMU3Slave if description.fmiMajorVersion == 3 else FMU2Slave
+    it = made(
+        guid=description.guid,
+        unzipDirectory=fmpy.extract(str(path)),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+        instanceName="one",
+    )
+    it.instantiate()
+    if description.fmiMajorVersion == 2:
+        it.setupExperiment(startTime=0.0)
+    it.enterInitializationMode()
+    it.exitInitializationMode()
+    return it
+
+
+@contextmanager
+def slaves(path: Path, n: int) -> Iterator[list[Any]]:
+    found = [slave(path) for _ in range(n)]
+    yield found
+    for it in found:
+        it.terminate()
+    for it in found:
+        it.freeInstance()
+
+
+def real_outputs(path: Path) -> list[int]:
+    found = fmpy.read_model_description(str(path)).modelVariables
+    return [
+        one.valueReference
+        for one in found
+        if one.causality == "output" and one.type in ("Real", "Float64")
+    ]
+
+
+def rows(it: Any, references: list[int], steps: range) -> list[list[float]]:
+    """The outputs after each of some steps."""
+    get = it.getFloat64 if isinstance(it, FMU3Slave) else it.getReal
+    found = []
+    for k in steps:
+        it.doStep(currentCommunicationPoint=k * H, communicationStepSize=H)
+        found.append([*get(references)])
+    return found
+
+
+@pytest.mark.parametrize("name", SCENARIOS)
+def test_outputs_are_the_columns_of_a_run_bit_for_bit(workplace: Path, name: str):
+    path = exported(name)
+    assert validate_fmu(str(path)) == []
+    check(play(path), expected(name), outputs(path))
+
+
+def test_of_fmi_3_it_gives_the_same_bits(workplace: Path):
+    path = exported("sea", "--fmi", "3")
+    assert validate_fmu(str(path)) == []
+    check(play(path), expected("sea"), outputs(path))
+
+
+def test_in_our_master_it_is_a_component_with_the_same_bits(workplace: Path):
+    path = exported("fig4")
+    check(alone(path), expected("fig4"), outputs(path))
+
+
+@pytest.mark.parametrize("order", [JACOBI, GAUSS_SEIDEL, "feedthrough"])
+def test_orders_and_longer_steps_are_those_of_the_scenario(workplace: Path, order: str):
+    Path("slow.toml").write_text(
+        f'title = "Slow"\nstop_time = {STEPS * H}\norder = "{order}"\n[steps]\ncontroller = 0.04\n'
+        "disturbance = 0.06\n"
+    )
+    path = exported("slow.toml")
+    check(play(path), expected("slow.toml"), outputs(path))
+    description = fmpy.read_model_description(str(path))
+    assert not description.coSimulation.canHandleVariableCommunicationStepSize
+    with slaves(path, 1) as [it], pytest.raises(FMICallException):
+        it.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.03)
+
+
+def test_a_longer_step_is_split_into_those_of_the_scenario(workplace: Path):
+    path = exported("fig4")
+    long, short = play(path, 4 * H), play(path)
+    for name in outputs(path):
+        # The time is not that of a host that counts steps.
+        np.testing.assert_allclose(long[name], short[name][::4], 1e-9, 1e-9, err_msg=name)
+
+
+def test_a_shorter_step_is_made_as_it_is(workplace: Path):
+    path = exported("fig4", "--set", "plant.noise.std=0")
+    fine = expected("fig4", step=H / 2, parameters={"plant.noise.std": 0.0})
+    found = play(path, H / 2)
+    for name in outputs(path):
+        # fmpy takes differences of times for steps.
+        np.testing.assert_allclose(found[name], fine[name], 1e-9, 1e-9, err_msg=name)
+
+
+def test_open_inputs_are_driven(workplace: Path):
+    path = exported("fig4")
+    Path("wave.csv").write_text(WAVE)
+    Path("wave_of_one.csv").write_text(WAVE.replace("plant.", "fig4.plant."))
+    driven = expected("fig4", inputs="wave.csv")
+    check(alone(path, inputs="wave_of_one.csv"), driven, outputs(path))
+    assert not np.array_equal(driven["plant.nu_r.u"], expected("fig4")["plant.nu_r.u"])
+
+
+def test_tuned_parameters_act_as_they_do_in_a_run(workplace: Path):
+    path = exported("sea")
+    values = {
+        "plant.current.x": 0.3, "disturbance.A_f": 0.8, "controller.k_d": 40.0,
+        "plant.noise.std": 0.5, "sea.H_s": 2.0,
+    }  # fmt: skip
+    values = {name: value for name, value in values.items() if is_tunable(path, name)}
+    assert len(values) > 2
+    tuned = expected("sea", events=[{"at": 2.0, "set": values}])
+    own = {f"sea.{name}": value for name, value in values.items()}
+    check(alone(path, events=[{"at": 2.0, "set": own}]), tuned, outputs(path))
+    assert not np.array_equal(tuned["plant.eta.x"], expected("sea")["plant.eta.x"])
+
+
+def is_tunable(path: Path, name: str) -> bool:
+    found = fmpy.read_model_description(str(path)).modelVariables
+    return any(one.name == name and one.variability == "tunable" for one in found)
+
+
+@pytest.mark.parametrize(("name", "fmi"), [("fig4", "2"), ("formation-v", "3")])
+def test_a_state_is_all_that_the_rest_depends_on(workplace: Path, name: str, fmi: str):
+    path = exported(name, "--fmi", fmi)
+    references = real_outputs(path)
+    with slaves(path, 2) as [one, other]:
+        rows(one, references, range(41))
+        state = one.getFMUState()
+        content = one.serializeFMUState(state)
+        rest = rows(one, references, range(41, 120))
+        one.setFMUState(state)
+        assert rows(one, references, range(41, 120)) == rest
+        read = other.deserializeFMUState(content)
+        other.setFMUState(read)
+        assert rows(other, references, range(41, 120)) == rest
+
+
+def test_instances_do_not_know_of_each_other(workplace: Path):
+    path = exported("fig4")
+    references = real_outputs(path)
+    with slaves(path, 3) as [one, other, both]:
+        apart = rows(one, references, range(60))
+        turns = [
+            (rows(other, references, range(k, k + 1)), rows(both, references, range(k, k + 1)))
+            for k in range(60)
+        ]
+    assert [row for [row], _ in turns] == apart == [row for _, [row] in turns]
+
+
+def test_a_component_of_ones_own_goes_with_it(workplace: Path):
+    assert main(["new", "component", "damper", "--like", "controller"]) == 0
+    assert main(["build", "damper", "--kind", "native"]) == 0
+    scenario = Path("damper", "damper.toml")
+    path = exported(str(scenario), "--step", str(H), out="with_damper")
+    result = expected(str(scenario), events=[], step=H)
+    found = play(path)
+    own = [name for name in outputs(path) if name.startswith("damper.")]
+    assert own
+    for name in outputs(path):
+        assert np.array_equal(found[name], result[name]), name
+
+
+def test_its_variables_are_those_of_the_components(workplace: Path):
+    path = exported("fig4", "--set", "plant.noise.std=0.25")
+    system = load("fig4").with_parameters({"plant.noise.std": 0.25})
+    found = {one.name: one for one in fmpy.read_model_description(str(path)).modelVariables}
+    open_ones = {f"{name}.{port}" for name in system.components for port in inputs(system, name)}
+    assert {name for name, one in found.items() if one.causality == "input"} == open_ones
+    for name, component in system.components.items():
+        for own in component.variables.values():
+            if own.causality not in ("output", "parameter") or own.name == "fault":
+                continue
+            one = found[f"{name}.{own.name}"]
+            kept = ("causality", "variability", "unit", "description", "type", "min", "max")
+            assert {what: getattr(one, what) for what in kept} == {
+                what: getattr(own, what) for what in kept
+            }
+            if own.causality == "parameter":
+                assert start_of(one) == system.value(PortName(name, own.name))
+    said = fmpy.read_model_description(str(path)).defaultExperiment
+    assert (float(said.stopTime), float(said.stepSize)) == (100.0, H)
+    assert "plant.nu_r.u" in fmu_info(str(path))
+
+
+def start_of(variable: Any) -> Any:
+    """A start value as a system has it."""
+    return typed(variable.name, variable, variable.start)
+
+
+def inputs(system: Any, name: str) -> list[str]:
+    fed = {one.target.port for one in system.feeding[name]}
+    return [one.name for one in system.components[name].having("input") if one.name not in fed]
+
+
+def dependencies(path: Path) -> Mapping[str, set[str]]:
+    description = fmpy.read_model_description(str(path))
+    return {
+        one.variable.name: {other.name for other in one.dependencies} for one in description.outputs
+    }
+
+
+def test_feedthrough_goes_along_the_connections(workplace: Path):
+    """Water is felt in the velocity through it at once, in the position a step later."""
+    found = dependencies(exported("fig4"))
+    assert found["plant.eta.x"] == set()
+    given = {one.rpartition(".")[0] for one in found["plant.nu_r.u"]}
+    assert given <= {"plant.water", "plant.dwater"}
+
+
+def test_what_is_wrong_says_which_component_and_why(workplace: Path):
+    path = exported("fig4")
+    result = simulate(path, {"fig4.disturbance.A_f": 1e200}, stop_time=1.0)
+    assert mentions(str(result.failure), "plant: state finite")
+
+
+def test_terminals_are_those_of_the_components(workplace: Path):
+    path = exported("fig4", "--fmi", "3")
+    with zipfile.ZipFile(path) as archive:
+        root = ElementTree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
+    found = {
+        one.get("name"): [member.get("variableName") for member in one]
+        for one in root.iter("Terminal")
+    }
+    axes = ("x", "y", "z", "phi", "theta", "psi")
+    members = [name for name in found["plant.eta"] if name is not None]
+    assert members == [f"plant.eta.{axis}" for axis in axes]
+
+
+def test_its_bytes_depend_on_nothing_else(workplace: Path):
+    assert exported("fig4").read_bytes() == exported("fig4", out="again").read_bytes()
+
+
+def test_what_cannot_be_one_fmu_is_refused_by_name(workplace: Path, refused):
+    assert main(["new", "controller", "my_law"]) == 0
+    said = refused("export", "my_law/my_law.toml", "--format", "fmu", "--out", "none")
+    assert mentions(said, "controller language")
+    said = refused("export", "fig4", "--platforms", "all", "--out", "none")
+    assert mentions(said, "--platforms --format fmu")
+    said = refused("export", "fig4", "--format", "fmu", "--flat", "--out", "none")
+    assert mentions(said, "--flat --format ssp")
+    said = refused("export", "fig4", "--format", "fmu", "--platforms", "amiga", "--out", "none")
+    assert mentions(said, "amiga linux64")
