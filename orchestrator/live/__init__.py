@@ -1,1 +1,1 @@
-"""The closed loop in a web page: components in WebAssembly, stepped by a master in TypeScript."""
+"""The closed loop in a web page: its program in WebAssembly, and what shows its rows."""

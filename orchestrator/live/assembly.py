@@ -1,4 +1,4 @@
-"""One page in which a loop runs: script, module and data in one file that needs no other.
+"""One page in which a loop runs: script, modules and data in one file that needs no other.
 
 Script and style are bundled by esbuild, which npm installs, and cached like the module.
 """
@@ -64,10 +64,10 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
         InputError: there is no such scenario, the page cannot run it, or a part cannot be made.
 
     """
-    data = page_data(opened)
+    data, programs = page_data(opened)
     parts = {name: path.read_text(encoding="utf-8") for name, path in live_script(hear).items()}
-    module = live_module(hear)
-    linked = module[MODULE_LICENCES].read_text(encoding="utf-8")
+    modules = [live_module(one, hear) for one in programs]
+    linked = modules[0][MODULE_LICENCES].read_text(encoding="utf-8")
     titles = {one["name"]: one["title"] for one in data["presets"]}
     fields = {
         "title": html.escape(titles[data["opened"]]),
@@ -77,7 +77,7 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
         "script-hash": hash_source(parts[SCRIPT]),
         "licences": html.escape("\n\n".join((licences(NATIVE), linked, parts[LICENCES]))),
         "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
-        "module": packed(module[MODULE].read_bytes()),
+        "modules": " ".join(packed(module[MODULE].read_bytes()) for module in modules),
     }
     before, *rest = _PAGE.read_text(encoding="utf-8").split("{{")
     return before + "".join(

@@ -1,32 +1,31 @@
-"""The module of the live page: the native FMUs of the bundle, compiled to WebAssembly.
+"""The modules of the live page: programs of systems, compiled to WebAssembly.
 
-All of them are in one module with one C library. The sources are the ones in the FMUs; FMI 2.0 has
-a prefix for the names of their functions, and there it is the name of the component.
+A module has several programs, each with a number before the names of its functions.
 """
 
 from __future__ import annotations
 
+import os
 import sys
-import zipfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fmus.compilers import LIMIT_OF_ZIG, run_compiler
-from fmus.discovery import components, package_folder
-from fmus.kinds import NATIVE
+from fmus.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
+from fmus.discovery import package_folder
+from orchestrator.live.programs import EQUATIONS, Programs
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.runs.bundle import current_fmus
 
 #: Category in the cache.
 CATEGORY = "live-module"
 
 #: The module, and the licences of what the compiler links into it.
-MODULE, LICENCES = FILES = "loop.wasm", "licences.txt"
+MODULE, LICENCES = FILES = "programs.wasm", "licences.txt"
 
 #: Texts of these licences in the package of ziglang. Much of the C library is Zig's own code; the
 #: rest is wasi-libc, with parts of cloudlibc and musl.
@@ -38,29 +37,30 @@ _NOTICES = {
     "musl": "lib/libc/musl/COPYRIGHT",
 }
 
-_HOST = Path(__file__).with_name("host.c")
-
-#: Flags of the native FMUs, but for another machine.
 _TARGET = ("-target", "wasm32-wasi")
-_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
+_FLAGS = ("-std=c99", "-O2", "-fno-math-errno", *SAME_NUMBERS, "-fvisibility=hidden")
+
+#: Equations are functions that programs share.
+_SHARED = ("-DAPART=",)
+
+#: The page has to know where memory is free.
 _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
+_FREE = "__heap_base"
 
-#: The source file that includes the others of an FMU.
-_MAIN = "fmi2.c"
+#: Functions of a program that the page calls.
+_FUNCTIONS = ("size_of_simulation", "begin", "run_with_events", "rows_shown", "failure")
 
-#: Functions that the page calls; the linker drops what they do not need.
-_FUNCTIONS = (
-    "Instantiate", "FreeInstance", "SetupExperiment", "EnterInitializationMode",
-    "ExitInitializationMode", "Reset", "DoStep",
-    *(f"{way}{of}" for way in ("Get", "Set") for of in ("Real", "Integer", "Boolean")),
-)  # fmt: skip
-_HOST_FUNCTIONS = ("malloc", "free", "host_callbacks")
+#: Others that each program has.
+_OTHERS = ("run", "set")
 
 
-def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Path]:
+def live_module(
+    programs: Programs, hear: Callable[[str], None] = lambda line: None
+) -> dict[str, Path]:
     """The files by their names, compiled unless they are in the cache.
 
     Args:
+        programs: that the module has.
         hear: called with a line before the module is compiled.
 
     Raises:
@@ -68,29 +68,30 @@ def live_module(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
 
     """
     try:
-        return made_once(CATEGORY, key_of(), lambda: compiled(hear))
+        return made_once(CATEGORY, key_of(programs), lambda: compiled(programs, hear))
     except OSError as error:
         raise InputError(
             f"the module of the live page cannot be compiled: {reason(error)}"
         ) from error
 
 
-def key_of() -> str:
+def key_of(programs: Programs) -> str:
     """Key in the cache: digest of the sources and the flags."""
-    made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *_TARGET, *_FLAGS, *_LINKED, *_exports())
+    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(len(programs)))
+    made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *flags)
     digest = sha256("\0".join(made_of).encode())
-    digest.update(_HOST.read_bytes())
-    for name, files in _sources().items():
-        for file, content in files.items():
-            digest.update(f"{name}/{file}\0".encode())
-            digest.update(content)
+    for name, text in programs.sources.items():
+        digest.update(f"\0{name}\0{text}".encode())
     return digest.hexdigest()[:16]
 
 
-def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
+def compiled(
+    programs: Programs, hear: Callable[[str], None] = lambda line: None
+) -> dict[str, bytes]:
     """The contents of the files by their names, compiled now.
 
     Args:
+        programs: that the module has.
         hear: called with a line before the module is compiled.
 
     Raises:
@@ -103,20 +104,23 @@ def compiled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes
             "the live page needs ziglang, which compiles C to WebAssembly: "
             "pip install 'auv-fmu[native]'"
         )
-    hear("compiling the FMUs to WebAssembly (only once): this may take a few minutes")
+    hear("compiling the page's programs to WebAssembly (only once): this may take a minute")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
         folder = Path(temporary)
-        objects = []
-        for name, files in _sources().items():
-            (folder / name).mkdir()
-            for file, content in files.items():
-                (folder / name / file).write_bytes(content)
-            prefix = f"-DFMI2_FUNCTION_PREFIX={name}_"
-            _zig(folder, *_FLAGS, prefix, "-c", f"{name}/{_MAIN}", "-o", f"{name}.o")
-            objects.append(f"{name}.o")
-        _zig(folder, *_FLAGS, "-c", str(_HOST), "-o", "host.o")
-        exports = [f"-Wl,--export={name}" for name in _exports()]
-        _zig(folder, *_LINKED, *exports, "host.o", *objects, "-o", MODULE)
+
+        def compile_source(name: str) -> str:
+            made, number = f"{name}.o", Path(name).stem
+            functions = () if name == EQUATIONS else (*_FUNCTIONS, *_OTHERS)
+            names = (f"-D{one}={_name(number, one)}" for one in functions)
+            _zig(folder, *_FLAGS, *_SHARED, *names, "-c", name, "-o", made)
+            return made
+
+        for name, text in programs.sources.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            objects = list(pool.map(compile_source, programs.sources))
+        exports = [f"-Wl,--export={name}" for name in _exports(len(programs))]
+        _zig(folder, *_LINKED, *exports, *objects, "-o", MODULE)
         return {MODULE: (folder / MODULE).read_bytes(), LICENCES: _licences().encode()}
 
 
@@ -137,18 +141,12 @@ def _zig(folder: Path, *arguments: str) -> None:
         raise OSError(f"ziglang: {(errors or [last_line(process.stderr)])[0]}")
 
 
-def _exports() -> Iterator[str]:
-    yield from _HOST_FUNCTIONS
-    for name in components():
-        for function in _FUNCTIONS:
-            yield f"{name}_fmi2{function}"
+def _exports(programs: int) -> Iterator[str]:
+    yield _FREE
+    for number in range(programs):
+        yield from (_name(number, one) for one in _FUNCTIONS)
 
 
-def _sources() -> Mapping[str, Mapping[str, bytes]]:
-    """The sources in each FMU by their names, by the names of the components."""
-    folder, found = current_fmus(NATIVE), {}
-    for name in components():
-        with zipfile.ZipFile(folder / f"{name}.fmu") as archive:
-            files = [path for path in archive.namelist() if path.startswith("sources/")]
-            found[name] = {Path(path).name: archive.read(path) for path in sorted(files)}
-    return found
+def _name(number: object, function: str) -> str:
+    """The name of a program's function in the module."""
+    return f"p{number}_{function}"

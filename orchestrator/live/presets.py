@@ -1,25 +1,23 @@
-"""What the page of a loop holds as plain data: FMUs, scenarios beside their comparisons, events.
+"""What the page of a loop holds as plain data: scenarios beside their comparisons, and events.
 
 Names and meanings are the ones of `web/src/types.ts`. What a plan decides is decided here: which
-stages a step has, which parameters a comparison shares, and to which inputs an event gets.
+program makes its steps, which parameters a comparison shares, and to which inputs an event gets.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cache
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from fmpy.model_description import ModelVariable
-
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
-from fmus.discovery import components
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
+from orchestrator.live.programs import Programs
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
+from orchestrator.master.experiment import LINEAR
 from orchestrator.master.hooks.events import (
     Action,
     Alter,
@@ -30,16 +28,14 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.master.plan import gathered_connections, stages
-from orchestrator.runs.bundle import current_fmus
+from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.connection import Connection
+from orchestrator.system.component import Component
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
@@ -92,8 +88,8 @@ _TOGETHER: Plain = {
 }
 
 
-def page_data(opened: str) -> Plain:
-    """All presets, the opened one among them.
+def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
+    """All presets, the opened one among them, and the programs that run them.
 
     Args:
         opened: a scenario of the bundle, or the path of a file.
@@ -103,17 +99,19 @@ def page_data(opened: str) -> Plain:
 
     """
     both = runs_of(opened)
-    first = _preset(opened, both)
+    modules = [bundled()]
+    if not all(map(modules[0].find, both)):
+        modules.append(Programs(both))
+    first = _preset(opened, both, modules)
     for run in both:
         # What an FMU refuses is refused here, before there is a page.
         run.run([])
     others = [preset(name) for name in names() if name != first["name"]]
-    return {
+    data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
         "lastSeconds": LAST_SECONDS,
         "units": {group: _printed(units) for group, units in _CHARTS.items()},
-        "fmus": {name: _fmu(component) for name, component in bundle().items()},
         "presets": sorted([first, *others], key=itemgetter("name")),
         "indices": [
             {"name": one.name, "label": one.label, "meaning": one.meaning}
@@ -122,6 +120,13 @@ def page_data(opened: str) -> Plain:
         ]
         + [_TOGETHER],
     }
+    return data, modules
+
+
+@cache
+def bundled() -> Programs:
+    """The programs of all scenarios of the bundle, and of what they are compared with."""
+    return Programs([run for name in names() for run in runs_of(name)])
 
 
 def _printed(units: Mapping[Any, str]) -> dict[str, str]:
@@ -135,12 +140,12 @@ def preset(name: str) -> Plain:
         InputError: there is no such scenario, or the page cannot run it.
 
     """
-    return _preset(name, runs_of(name))
+    return _preset(name, runs_of(name), [bundled()])
 
 
-def _preset(name: str, both: Sequence[Prepared]) -> Plain:
+def _preset(name: str, both: Sequence[Prepared], modules: Sequence[Programs]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
-    loops = [_loop(one, scenario) for one in both]
+    loops = [_loop(one, scenario, modules) for one in both]
     fleet = both[0].loops if len(both[0].loops) > 1 else ()
     loops[0]["scenario"] = name
     if len({loop["label"] for loop in loops}) < len(loops):
@@ -219,14 +224,9 @@ def _check(prepared: Prepared) -> None:
     plan = prepared.plan
     system, experiment, loops = plan.system, plan.experiment, prepared.loops
     most_steps = _MOST_STEPS // len(loops)
-    ours = {part.digest for part in bundle().values()}
-    foreign = [name for name, part in system.components.items() if part.digest not in ours]
     lacking = {
-        f"third-party FMUs ({', '.join(foreign)})": foreign,
         "rings of direct feedthroughs": rings(system),
         "linear inputs": experiment.coupling == LINEAR,
-        "components with longer steps": any(n > 1 for n in plan.decimations.values()),
-        "transformations of values": any(c.transformation for c in system.connections),
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,
         f"a system without the {loops[0].vehicle}": loops[0].vehicle not in system.components,
@@ -238,10 +238,13 @@ def _check(prepared: Prepared) -> None:
             raise InputError(f"{prepared.scenario.name}: the live page cannot run {what}")
 
 
-def _loop(prepared: Prepared, owner: Scenario) -> Plain:
+def _loop(prepared: Prepared, owner: Scenario, modules: Sequence[Programs]) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
-    system, order = plan.system, plan.experiment.order or FEEDTHROUGH
+    system = plan.system
     controller = _controller(system)
+    [(module, number, text)] = [
+        (i, *found) for i, one in enumerate(modules) if (found := one.find(prepared))
+    ][:1]
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
         "vehicles": list(map(_vehicle, prepared.loops)),
@@ -253,44 +256,12 @@ def _loop(prepared: Prepared, owner: Scenario) -> Plain:
             "only": [*scenario.only],
             "wires": {**scenario.wires},
         },
-        "initial": [
-            _stage([name], system.feeding[name])
-            for names in stages(system, GAUSS_SEIDEL)
-            for name in names
-        ],
-        **_step(system, order),
-        "actingRow": replace(plan.experiment, order=order).acting_row,
-        "parameters": list(_parameters(system)),
+        "program": [module, number],
+        "ports": {name: _ports(text, name) for name in system.components},
+        "actingRow": text.plan.experiment.acting_row,
+        "parameters": list(_parameters(text)),
+        **({"fixedStep": plan.experiment.step} if text.slow else {}),
         "events": _events(prepared, owner),
-    }
-
-
-def _step(system: System, order: Order) -> Plain:
-    """What passes before a row shows it, what is stepped, and what of that is read at once."""
-    sequence = stages(system, order)
-    gathered = gathered_connections(system, sequence, order=order)
-    if order != FEEDTHROUGH:
-        made = list(map(_stage, sequence, gathered))
-        return {"passing": [], "stages": made, "read": [*system.components]}
-    direct = {
-        name
-        for name, part in system.components.items()
-        if any(part.has_feedthrough(output.name) for output in part.having("output"))
-    }
-    place = {name: i for i, names in enumerate(sequence) for name in names}
-    # What passes is read there, and before only where something takes it before.
-    early = {
-        one.source.component
-        for one in system.connections
-        if place[one.source.component] >= place[one.target.component]
-    }
-    return {
-        "passing": [
-            _stage([name for name in names if name in direct], connections)
-            for names, connections in zip(sequence, gathered, strict=True)
-        ],
-        "stages": [_stage([*place], [])],
-        "read": [name for name in place if name not in direct or name in early],
     }
 
 
@@ -298,65 +269,34 @@ def _vehicle(loop: Loop) -> dict[str, str]:
     return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
-def _stage(names: Sequence[str], connections: Iterable[Connection]) -> Plain:
-    return {
-        "connections": [[str(one.target), str(one.source)] for one in connections],
-        "components": list(names),
-    }
+def _ports(text: Text, name: str) -> dict[str, list[str]]:
+    """The inputs and outputs of a component, in the order of a program's rows."""
+    kind = text.kind(name)
+    return {group: [one.name for one in kind.ports[group]] for group in ("input", "output")}
 
 
-def _parameters(system: System) -> Iterator[Plain]:
+def _parameters(text: Text) -> Iterator[Plain]:
     """What a user may change: parameters, and inputs that nothing feeds."""
-    for name, component in system.components.items():
-        fed = {connection.target.port for connection in system.feeding[name]}
-        for variable in component.variables.values():
-            is_input = variable.causality == "input" and variable.name not in fed
-            if variable.causality != "parameter" and not is_input:
-                continue
-            start = component.start(variable.name)
-            value = system.parameters.get(PortName(name, variable.name), start)
-            found: Plain = {
-                "name": f"{name}.{variable.name}",
-                "type": variable.type,
-                "description": variable.description or "",
-                "default": named(variable, start),
-                "value": named(variable, value),
-            }
-            if variable.unit and variable.unit != "1":
-                found["unit"] = printed_unit(variable.unit)
-            for end in ("min", "max"):
-                if (text := getattr(variable, end)) is not None:
-                    found[end] = float(text)
-            if choices := items_of(variable):
-                found["choices"] = list(choices)
-            yield found
-
-
-def _fmu(component: Component) -> Plain:
-    return {
-        "guid": component.description.guid,
-        "variables": [_variable(component, one) for one in component.variables.values()],
-    }
-
-
-def _variable(component: Component, variable: ModelVariable) -> Plain:
-    start = component.start(variable.name)
-    choices = {name: int(number) for name, number in items_of(variable).items()}
-    return {
-        "name": variable.name,
-        "type": variable.type,
-        "reference": variable.valueReference,
-        "causality": variable.causality,
-        **({} if start is None else {"start": start}),
-        **({"choices": choices} if choices else {}),
-    }
-
-
-@cache
-def bundle() -> Mapping[str, Component]:
-    """The FMUs that the module is made of, by their names."""
-    folder = current_fmus(NATIVE)
-    return {name: read_component(name, folder / f"{name}.fmu") for name in components()}
+    system = text.plan.system
+    for name in text.parameters:
+        component = system.components[name.component]
+        variable, start = component.variables[name.port], component.start(name.port)
+        value = system.parameters.get(name, start)
+        found: Plain = {
+            "name": str(name),
+            "type": variable.type,
+            "description": variable.description or "",
+            "default": named(variable, start),
+            "value": named(variable, value),
+        }
+        if variable.unit and variable.unit != "1":
+            found["unit"] = printed_unit(variable.unit)
+        for end in ("min", "max"):
+            if (limit := getattr(variable, end)) is not None:
+                found[end] = float(limit)
+        if choices := items_of(variable):
+            found["choices"] = {choice: int(number) for choice, number in choices.items()}
+        yield found
 
 
 def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:

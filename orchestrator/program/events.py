@@ -31,7 +31,6 @@ from orchestrator.master.observers.observer import Occurrence
 from orchestrator.master.row import FACTOR, OFFSET
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear
-from orchestrator.system.values import Value, items_of
 
 if TYPE_CHECKING:
     from orchestrator.program.kind import Place
@@ -232,14 +231,14 @@ def _actions(text: Text, action: Action) -> Iterator[tuple[float, float, float, 
         case Alter(effect, values):
             kind = _BIAS if effect == "bias" else _OVERRIDE
             for target, value in values:
-                yield kind, text.inputs[target], _number_of(text, target, value), 0.0
+                yield kind, text.inputs[target], float(value), 0.0
         case Freeze(targets):
             yield from ((_FREEZE, text.inputs[target], 0.0, 0.0) for target in targets)
         case Release(targets):
             yield from ((_RELEASE, text.inputs[target], 0.0, 0.0) for target in targets)
         case Set(tuned, supplied):
             for target, value in (*tuned, *supplied):
-                yield _SET, parameters[target], _number_of(text, target, value), 0.0
+                yield _SET, parameters[target], float(value), 0.0
         case Reset(components):
             for name in components:
                 yield _RESET, text.components.index(name), 0.0, 0.0
@@ -247,11 +246,6 @@ def _actions(text: Text, action: Action) -> Iterator[tuple[float, float, float, 
             yield _END, 0.0, 0.0, 0.0
         case _:
             raise TypeError(f"a program does not know the event {action!r}")
-
-
-def _number_of(text: Text, target: PortName, value: Value) -> float:
-    variable = text.plan.system.components[target.component].variables[target.port]
-    return float(items_of(variable).get(value, value) if isinstance(value, str) else value)
 
 
 def occurrences(

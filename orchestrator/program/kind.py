@@ -127,8 +127,7 @@ class Kind:
         return found
 
     def text(self) -> Iterator[str]:
-        """Its structure and its functions."""
-        yield self._structure()
+        """Its functions."""
         yield self._evaluate()
         if self.foreseen:
             yield self._foresee()
@@ -169,7 +168,8 @@ class Kind:
         names = re.findall(r"(\w+)(?=,|$)", arguments)
         return function(head, lines, ["error", *filter(None, names)])
 
-    def _structure(self) -> str:
+    def structure(self) -> str:
+        """Its structure."""
         rows = [f"{self._type(what)} {what};" for what in ("parameters", "inputs", "state")]
         rows.append(f"{self._type('outputs')} outputs;")
         if self.said.derived:

@@ -49,13 +49,17 @@ class ReducerText:
     emitter: Emitter
     name: str
 
-    def text(self) -> Iterator[str]:
-        """Its structure, what takes a row, and what gives its numbers."""
+    def structure(self) -> str:
+        """Its structure."""
         state, row = map(self._type, (self.reducer.state, self.reducer.inputs))
-        yield (
+        return (
             f"typedef struct {{\n    int begun; /* -1: it has raised */\n    {state} state;\n"
             f"    {row} before; /* the last row */\n}} {self.name};"
         )
+
+    def text(self) -> Iterator[str]:
+        """What takes a row, and what gives its numbers."""
+        row = self._type(self.reducer.inputs)
         start = self._call("start")
         update = self._call("update", state="it->state", before="it->before")
         lines = [
@@ -72,7 +76,7 @@ class ReducerText:
             "it->before = inputs;",
         ]  # fmt: skip
         head = (
-            f"static void {self.name}_look({self.name} *it, {row} inputs, int acts_at_end, double t,"
+            f"APART void {self.name}_look({self.name} *it, {row} inputs, int acts_at_end, double t,"
             "\n                 double h, double begin, double end) {"
         )
         yield "\n".join([head, *(part for line in lines for part in lines_of(line, "    ")), "}"])
@@ -88,7 +92,7 @@ class ReducerText:
             *(f"found[{i}] = {text};" for i, text in enumerate(self._numbers())),
         ]  # fmt: skip
         head = (
-            f"static void {self.name}_give(const {self.name} *it, double t, double begin, double end,"
+            f"APART void {self.name}_give(const {self.name} *it, double t, double begin, double end,"
             "\n                 double found[]) {"
         )
         yield "\n".join([head, *(part for line in lines for part in lines_of(line, "    ")), "}"])

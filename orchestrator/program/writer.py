@@ -10,7 +10,7 @@ allocated, printed or shared.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -22,6 +22,7 @@ from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
+from fmus.ports.reducer import Reducer
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Order
 from orchestrator.master.plan import Plan, stages
@@ -51,7 +52,7 @@ _INCLUDES = """\
 
 #: How functions are called: those of components lie apart, and equations within them.
 _HEADS = {
-    False: "#define APART static",
+    False: "#ifndef APART\n#define APART static\n#endif",
     True: (
         "#if defined(__GNUC__)\n"
         "#define APART static __attribute__((noinline))\n"
@@ -173,6 +174,129 @@ class Unsupported(InputError):
     """A system that cannot be one program; the text says why."""
 
 
+class Equations:
+    """The equations of components, and of indices: what programs of several systems can share.
+
+    Attributes:
+        emitter: of all of them.
+        kinds: of components, by their definitions.
+        reducers: that make indices, by their identities.
+        is_quick: whether what is computed is checked by the program.
+
+    """
+
+    def __init__(
+        self,
+        definitions: Iterable[Definition],
+        reducers: Iterable[Reducer],
+        is_tuned: bool,
+        is_quick: bool = False,
+        foreseen: Callable[[Definition], Sequence[str]] = lambda _: (),
+    ) -> None:
+        """Translate all of them together.
+
+        Args:
+            definitions: of the components.
+            reducers: that make indices.
+            is_tuned: whether parameters may change after the start.
+            is_quick: whether what is computed is checked by the program, if it can wait for that.
+            foreseen: outputs that others take before their inputs are known.
+
+        """
+        distinct = [*dict.fromkeys(definitions)]
+        hooks = {one: one.behaviour.hooks for one in distinct}
+        by_identity = {id(one): one for one in reducers}
+        program = Program(
+            *(hook for one in distinct for hook in hooks[one].values() if hook),
+            *EULER,
+            *(hook for one in by_identity.values() for hook in one.hooks.values()),
+        )
+        program.check()
+        functions = program.functions.values()
+        self._is_inlined = is_quick
+        # What waits for a number would wait for ever for one that is none.
+        self.is_quick = is_quick and not any(map(_waits, functions))
+        self.emitter = Emitter(functions)
+        self._euler = {one.__name__: program.function(one) for one in EULER}
+        self.kinds = {
+            one: Kind(
+                one,
+                {name: program.function(hook) for name, hook in hooks[one].items() if hook},
+                self.emitter,
+                self.emitter.unused(f"{_lower(one.name)}_component"),
+                self._euler,
+                is_tuned,
+                not self.is_quick,
+                foreseen(one) if self.is_quick else (),
+            )
+            for one in distinct
+        }
+        self.reducers = {
+            key: ReducerText(
+                one, program, self.emitter, self.emitter.unused(f"{_lower(one.name)}_index")
+            )
+            for key, one in by_identity.items()
+        }
+
+    @property
+    def is_noisy(self) -> bool:
+        """Whether random numbers are drawn."""
+        return any(kind.said.draws for kind in self.kinds.values())
+
+    def text(self) -> list[str]:
+        """All of it."""
+        # Writing these adds to the structures.
+        structures, functions = self._structures, self._functions
+        equations = self.emitter.text()
+        if self._is_inlined:
+            equations = re.sub(r"^static (?=[\w ]+[ *]\w+\()", "WITHIN ", equations, flags=re.M)
+        return [
+            _HEADS[self._is_inlined],
+            equations,
+            _CHECKS,
+            *([_DRAWING] if self.is_noisy else []),
+            *structures,
+            *functions,
+        ]
+
+    def apart(self) -> str:
+        """All of it as a source of its own."""
+        return "\n\n".join([head_of(self), *self.text()]) + "\n"
+
+    def header(self) -> str:
+        """What a program has to know of what is compiled apart."""
+        structures, functions = self._structures, "\n".join(self._functions)
+        heads = re.findall(r"^APART ([^{]+?) \{$", functions, re.MULTILINE)
+        return "\n\n".join(
+            [
+                head_of(self),
+                *self.emitter.structures.values(),
+                Emitter(self._euler.values()).text(),
+                _CHECKS,
+                *structures,
+                *(f"{one};" for one in heads),
+            ]
+        )
+
+    @cached_property
+    def _structures(self) -> list[str]:
+        return [one.structure() for one in (*self.kinds.values(), *self.reducers.values())]
+
+    @cached_property
+    def _functions(self) -> list[str]:
+        all_ = (*self.kinds.values(), *self.reducers.values())
+        return [part for one in all_ for part in one.text()]
+
+
+def head_of(equations: Equations) -> str:
+    """What a source with equations begins with."""
+    arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
+    noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
+    arithmetic = arithmetic.replace('#include "error.h"\n', _FAILURE)
+    parts = [_INCLUDES, arithmetic, *([noise] if equations.is_noisy else [])]
+    return "\n\n".join(part.strip() for part in parts)
+
+
 @dataclass
 class Text:
     """The program of a system.
@@ -185,6 +309,7 @@ class Text:
         alters: whether events can happen in it.
         is_quick: whether all that has been computed is checked at once, when a row is shown; that
             does not tell which component has refused.
+        equations: of its components, which several programs may share.
 
     """
 
@@ -194,6 +319,7 @@ class Text:
     is_tuned: bool = False
     alters: bool = False
     is_quick: bool = False
+    equations: Equations | None = None
     #: Functions of connections that map values, by what follows their names.
     mappings: dict[str, str] = field(default_factory=dict)
 
@@ -220,39 +346,17 @@ class Text:
         self.components = [*system.components]
         self.members = dict(zip(self.components, _distinct(self.components), strict=True))
         self.slow = [name for name, n in self.plan.decimations.items() if n > 1]
-        definitions = [*dict.fromkeys(self.definitions[name] for name in self.components)]
-        hooks = {one: one.behaviour.hooks for one in definitions}
-        reducers = {id(one.reducer): one.reducer for one in self.indices}
-        program = Program(
-            *(hook for one in definitions for hook in hooks[one].values() if hook),
-            *EULER,
-            *(hook for one in reducers.values() for hook in one.hooks.values()),
-        )
-        program.check()
-        functions = program.functions.values()
-        # What waits for a number would wait for ever for one that is none.
-        self.is_fast = self.is_quick
-        self.is_quick = self.is_quick and not any(map(_waits, functions))
-        self.emitter = Emitter(functions)
-        self.kinds = {
-            one: Kind(
-                one,
-                {name: program.function(hook) for name, hook in hooks[one].items() if hook},
-                self.emitter,
-                self.emitter.unused(f"{_lower(one.name)}_component"),
-                {one.__name__: program.function(one) for one in EULER},
+        if self.equations is None:
+            self.equations = Equations(
+                (self.definitions[name] for name in self.components),
+                [one.reducer for one in self.indices],
                 self.is_tuned,
-                not self.is_quick,
-                self._foreseen(one),
+                self.is_quick,
+                self._foreseen,
             )
-            for one in definitions
-        }
-        self.reducers = {
-            key: ReducerText(
-                one, program, self.emitter, self.emitter.unused(f"{_lower(one.name)}_index")
-            )
-            for key, one in reducers.items()
-        }
+        self.is_quick = self.equations.is_quick
+        self.emitter, self.kinds = self.equations.emitter, self.equations.kinds
+        self.reducers = self.equations.reducers
 
     # What there is
 
@@ -289,11 +393,6 @@ class Text:
             found |= {port: place for port, place in inputs if port not in fed}
         return found
 
-    @property
-    def is_noisy(self) -> bool:
-        """Whether random numbers are drawn."""
-        return any(kind.said.draws for kind in self.kinds.values())
-
     def _inputs(self, name: str) -> dict[PortName, Place]:
         return self._named(name, "input", "inputs", f"it->{self.members[name]}.inputs")
 
@@ -322,7 +421,7 @@ class Text:
 
     def _foreseen(self, definition: Definition) -> list[str]:
         """The outputs that others take before they pass, in a program that computes only these."""
-        if not (self.is_quick and self.passes):
+        if not self.passes:
             return []
         sources = dict.fromkeys(one.source for one in self.plan.system.connections)
         return [
@@ -338,43 +437,33 @@ class Text:
 
     def text(self) -> str:
         """All of it."""
-        arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
-        noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
         title = closed(f"{self.plan.system.name}: {listed(self.components)} as one program.")
-        parts = [
-            f"/* {title} */\n{_INCLUDES}",
-            arithmetic.replace('#include "error.h"\n', _FAILURE).strip(),
-            *([noise.strip()] if self.is_noisy else []),
-            *self.core(),
+        parts = [f"/* {title} */", head_of(self.equations), *self.core(), *self.calls()]
+        return "\n\n".join(parts) + "\n"
+
+    def apart(self) -> str:
+        """All but the equations, of which it has the header."""
+        return "\n\n".join([self.equations.header(), *self._own(), *self.calls()]) + "\n"
+
+    def core(self) -> list[str]:
+        """What it is, whoever calls it: equations, components, the start, and a step."""
+        return [*self.equations.text(), *self._own()]
+
+    def _own(self) -> list[str]:
+        # Writing these adds to the mappings.
+        simulation, rest, steps = self._simulation(), self._rest(), self._steps()
+        mappings = (head + body for body, head in self.mappings.items())
+        return [simulation, _TIMES, *mappings, rest, *steps]
+
+    def calls(self) -> list[str]:
+        """What a host calls."""
+        return [
             self._begin(),
             self._show(),
             *self._look(),
             *self._run(),
             _ACCESS,
             *([text_of_events(self)] if self.alters else []),
-        ]
-        return "\n\n".join(parts) + "\n"
-
-    def core(self) -> list[str]:
-        """What it is, whoever calls it: equations, components, the start, and a step."""
-        # Writing these adds to the structures and the mappings.
-        parts = [part for kind in self.kinds.values() for part in kind.text()]
-        parts += [part for one in self.reducers.values() for part in one.text()]
-        simulation, rest, steps = self._simulation(), self._rest(), self._steps()
-        equations = self.emitter.text()
-        if self.is_fast:
-            equations = re.sub(r"^static (?=[\w ]+[ *]\w+\()", "WITHIN ", equations, flags=re.M)
-        return [
-            _HEADS[self.is_fast],
-            equations,
-            _CHECKS,
-            *([_DRAWING] if self.is_noisy else []),
-            *parts,
-            simulation,
-            _TIMES,
-            *(head + body for body, head in self.mappings.items()),
-            rest,
-            *steps,
         ]
 
     def _simulation(self) -> str:

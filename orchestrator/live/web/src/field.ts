@@ -13,7 +13,7 @@ export function explained(parameter: Parameter): string {
   const range = [
     min === undefined ? "" : `at least ${min}`,
     max === undefined ? "" : `at most ${max}`,
-    choices ? `one of ${choices.join(", ")}` : "",
+    choices ? `one of ${Object.keys(choices).join(", ")}` : "",
   ].filter(Boolean);
   const lines = [
     name,
@@ -37,7 +37,7 @@ export class Field {
     const { name, type, choices } = parameter;
     if (choices) {
       const select = document.createElement("select");
-      select.append(...choices.map((choice) => new Option(choice, choice)));
+      select.append(...Object.keys(choices).map((choice) => new Option(choice, choice)));
       this.element = select;
     } else {
       const input = document.createElement("input");

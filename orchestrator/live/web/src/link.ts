@@ -105,7 +105,7 @@ function editOf(event: EventData, kind: string, text: string): Edit | undefined 
 
 /** A text in the type of a parameter; undefined: it is not of this type. */
 export function parsed(parameter: Parameter, text: string): Value | undefined {
-  if (parameter.choices) return parameter.choices.includes(text) ? text : undefined;
+  if (parameter.choices) return Object.hasOwn(parameter.choices, text) ? text : undefined;
   if (parameter.type === "Boolean") {
     return text === "true" ? true : text === "false" ? false : undefined;
   }

@@ -4,18 +4,22 @@ import { type Api, Engine, makeApi } from "./engine";
 import { Page } from "./page";
 import type { Data } from "./types";
 
-/** What an element holds: gzip, in base64. */
-async function unpacked(id: string): Promise<ArrayBuffer> {
-  const text = atob(document.getElementById(id)?.textContent?.trim() ?? "");
-  const bytes = Uint8Array.from(text, (letter) => letter.charCodeAt(0));
+/** What an element holds, one after the other: gzip, in base64. */
+function unpacked(id: string): Promise<ArrayBuffer[]> {
+  const words = document.getElementById(id)?.textContent?.trim().split(/\s+/) ?? [];
+  return Promise.all(words.map(unpackedWord));
+}
+
+async function unpackedWord(word: string): Promise<ArrayBuffer> {
+  const bytes = Uint8Array.from(atob(word), (letter) => letter.charCodeAt(0));
   const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }
 
 async function start(): Promise<Api> {
-  const [data, module] = await Promise.all([unpacked("data"), unpacked("module")]);
+  const [[data], modules] = await Promise.all([unpacked("data"), unpacked("modules")]);
   const found: Data = JSON.parse(new TextDecoder().decode(data));
-  const engine = await Engine.load(module, found);
+  const engine = await Engine.load(modules, found);
   return makeApi(found, engine, new Page(found, engine));
 }
 

@@ -279,7 +279,10 @@ export class Page {
       return;
     }
     const failures = this.#each(({ failure }) => (failure === undefined ? [] : [failure]));
-    this.#refuse(failures.join("; "), this.#each(messagesOf).join("\n"));
+    this.#refuse(
+      failures.join("; "),
+      this.#each(({ remark }) => (remark === undefined ? [] : [remark])).join("\n"),
+    );
     this.#draw();
   }
 
@@ -477,12 +480,6 @@ export class Page {
       said.textContent = "";
     }, SAID);
   }
-}
-
-/** What is worth a word of a run that can be looked at; what its failure says is said already. */
-function messagesOf({ failure = "", remark, messages }: Result): string[] {
-  const others = messages.filter((text) => !failure.endsWith(`: ${text}`));
-  return remark === undefined ? others : [remark, ...others];
 }
 
 function trackOf(result: Result, vehicle: VehicleData): Track {

@@ -30,10 +30,16 @@ function written(value: number): string {
 /** A run as the lines of result.csv: the same columns, numbers that read back exactly. */
 export function csvLines(result: Result): string[] {
   const width = 1 + result.columns.length;
-  const lines = [["time", ...result.columns].join(",")];
+  // From the last on: those before it stay where they are.
+  const faults = [...result.faults].reverse();
+  const line = (cells: string[], of: (fault: string) => string) => {
+    for (const [place, fault] of faults) cells.splice(1 + place, 0, of(fault));
+    return cells.join(",");
+  };
+  const lines = [line(["time", ...result.columns], (fault) => fault)];
   for (let k = 0; k < result.rows; k++) {
     const row = result.table.subarray(k * width, (k + 1) * width);
-    lines.push(Array.from(row, written).join(","));
+    lines.push(line(Array.from(row, written), () => "0"));
   }
   return lines.map((line) => `${line}\n`);
 }

@@ -8,23 +8,6 @@ export type Values = Readonly<Record<string, Value>>;
 
 export type FmiType = "Real" | "Integer" | "Boolean" | "Enumeration";
 
-/** A variable of an FMU, as its modelDescription.xml has it. */
-export interface Variable {
-  readonly name: string;
-  readonly reference: number;
-  readonly type: FmiType;
-  readonly causality: "input" | "output" | "parameter";
-  readonly start?: Value;
-  /** Of an Enumeration: its numbers, by their names. */
-  readonly choices?: Readonly<Record<string, number>>;
-}
-
-/** A component type; its functions in the module have its name as their prefix. */
-export interface Fmu {
-  readonly guid: string;
-  readonly variables: readonly Variable[];
-}
-
 /** A parameter that a user may change. */
 export interface Parameter {
   /** `component.parameter` */
@@ -34,8 +17,8 @@ export interface Parameter {
   readonly unit?: string;
   readonly min?: number;
   readonly max?: number;
-  /** The names that an Enumeration has, and its value is one of. */
-  readonly choices?: readonly string[];
+  /** Of an Enumeration: the numbers of its names, of which its value is one. */
+  readonly choices?: Readonly<Record<string, number>>;
   /** The FMU's own value. */
   readonly default: Value;
   /** The value in this preset. */
@@ -82,13 +65,6 @@ export interface EventData {
   readonly canEnd: boolean;
 }
 
-/** Components that act after their inputs have been gathered. */
-export interface Stage {
-  /** `[target, source]`, names of ports. */
-  readonly connections: readonly (readonly [string, string])[];
-  readonly components: readonly string[];
-}
-
 /** A vehicle: its components by their roles; what it lacks has a name that no component has. */
 export interface VehicleData {
   readonly name: string;
@@ -108,7 +84,7 @@ export interface LoopData {
   readonly scenario?: string;
   /** At least one. */
   readonly vehicles: readonly VehicleData[];
-  /** FMUs by the names of the components, in the order of the table's columns. */
+  /** FMUs by the names of the components. */
   readonly components: Readonly<Record<string, string>>;
   /** Entries of a scenario file with this loop. */
   readonly head: {
@@ -121,17 +97,17 @@ export interface LoopData {
     readonly only: readonly string[];
     readonly wires: Readonly<Record<string, string | boolean>>;
   };
-  /** In the order in which they hand on values before the first step. */
-  readonly initial: readonly Stage[];
-  /** In which values pass through components before a row shows them. */
-  readonly passing: readonly Stage[];
-  /** In which components are stepped: those that no value passes through take their inputs here. */
-  readonly stages: readonly Stage[];
-  /** Components that are read after their step. */
-  readonly read: readonly string[];
+  /** The place of its program: a module, and a number there. */
+  readonly program: readonly [number, number];
+  /** Inputs and outputs of the components, in the order of the table's columns. */
+  readonly ports: Readonly<
+    Record<string, { readonly input: readonly string[]; readonly output: readonly string[] }>
+  >;
+  /** The only step that its program can make [s]; absent: any. */
+  readonly fixedStep?: number;
   /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
   readonly actingRow: number;
-  /** All parameters, and inputs that nothing feeds. */
+  /** All parameters, and inputs that nothing feeds, in the order in which the program takes them. */
   readonly parameters: readonly Parameter[];
   /** Events by the name of the scenario that has them; `""`: none. */
   readonly events: Readonly<Record<string, readonly EventData[]>>;
@@ -171,7 +147,7 @@ export interface IndexData {
   readonly meaning: string;
 }
 
-/** All that Python writes into the page, besides script and module. */
+/** All that Python writes into the page, besides script and modules. */
 export interface Data {
   /** The preset that is shown first. */
   readonly opened: string;
@@ -181,7 +157,6 @@ export interface Data {
   readonly lastSeconds: number;
   /** Of the groups of signals that have charts. */
   readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
-  readonly fmus: Readonly<Record<string, Fmu>>;
   readonly presets: readonly Preset[];
   readonly indices: readonly IndexData[];
 }
@@ -201,8 +176,10 @@ export interface Occurrence {
 export interface Result {
   /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
   readonly actingRow: number;
-  /** Names of all ports, as in result.csv after `time`. */
+  /** Names of all ports, as in result.csv after `time`, but for `faults`. */
   readonly columns: readonly string[];
+  /** Outputs that are 0 in every row, and stand in result.csv after so many columns. */
+  readonly faults: ReadonlyMap<number, string>;
   /** How many rows there are. */
   readonly rows: number;
   /** Row by row: the time, then the columns. */
@@ -214,8 +191,6 @@ export interface Result {
   /** Values of all parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
-  /** The first messages of the FMUs, `plant: ...`, and the number of the others. */
-  readonly messages: readonly string[];
   /** Why the run has not come to its end; the rows before that are there. */
   readonly failure?: string;
   /** Why it has ended early without a failure. */

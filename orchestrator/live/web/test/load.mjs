@@ -31,7 +31,7 @@ const gains = [
 const ofPlant = [
   parameter("plant.noise.std", 0.001),
   parameter("plant.roll", true, { type: "Boolean" }),
-  parameter("plant.integrator", "euler", { type: "Enumeration", choices: ["euler", "rk4"] }),
+  parameter("plant.integrator", "euler", { type: "Enumeration", choices: { euler: 1, rk4: 2 } }),
 ];
 const events = {
   fault: [
@@ -73,17 +73,15 @@ const loop = (label, controller, more) => ({
   vehicles: [vehicle("")],
   components: components(controller),
   head: { order: null, vehicles: null, absent: [], only: [], wires: {} },
-  initial: [],
-  passing: [],
-  stages: [],
-  read: [],
+  program: [0, 0],
+  ports: {},
   actingRow: 0,
   parameters: [...gains, ...ofPlant],
   events,
   ...more,
 });
 
-/** A page's data with one preset, without FMUs. */
+/** A page's data with one preset, without programs. */
 export const preset = {
   name: "fault",
   title: "",
@@ -147,7 +145,6 @@ export const data = {
   mostSteps: 200_000,
   lastSeconds: 5,
   units: { e: {}, tau: {}, dy: {}, theta_hat: {} },
-  fmus: {},
   presets: [preset, fleet],
   indices: [],
 };

@@ -1,24 +1,26 @@
-// Writes the rows of presets: `node rows.mjs ENGINE MODULE DATA FOLDER`, a file of doubles for each
-// loop, and what else there is to say of the runs on the output.
+// Writes the rows of presets: `node rows.mjs ENGINE MODULES DATA FOLDER`, with commas between the
+// modules; a file of doubles for each loop, and what else there is to say of the runs on the output.
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
-const [engine, module, data, folder] = process.argv.slice(2);
+const [engine, modules, data, folder] = process.argv.slice(2);
 const { Engine, metrics } = await import(pathToFileURL(engine).href);
 const content = JSON.parse(readFileSync(data, "utf8"));
-const made = await Engine.load(readFileSync(module), content);
+const made = await Engine.load(
+  modules.split(",").map((module) => readFileSync(module)),
+  content,
+);
 const found = {};
 for (const { name, stopTime, step, events, loops } of content.presets) {
   for (const [i, loop] of loops.entries()) {
     const result = made.run(loop, {}, { stopTime, step, events: loop.events[events] ?? [] });
     writeFileSync(`${folder}/${name}.${i}`, result.table);
-    const { columns, happened, failure, remark, messages } = result;
+    const { columns, happened, failure, remark } = result;
     found[`${name}.${i}`] = {
       columns,
       happened,
       failure,
       remark,
-      messages,
       metrics: loop.vehicles.map((vehicle) =>
         metrics(result, vehicle, loop.vehicles, content.lastSeconds),
       ),

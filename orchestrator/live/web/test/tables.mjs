@@ -1,13 +1,14 @@
-// Writes tables as a script asks the page for them: `node tables.mjs ENGINE MODULE DATA`, with a list
-// of changes of settings on the input; on the output, the digest of the table after each of them.
+// Writes tables as a script asks the page for them: `node tables.mjs ENGINE MODULES DATA`, with
+// commas between the modules, and a list of changes of settings on the input; on the output, the digest of the table after each of them.
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
-const [engine, module, data] = process.argv.slice(2);
+const [engine, modules, data] = process.argv.slice(2);
 const { apiWithoutPage, Engine } = await import(pathToFileURL(engine).href);
 const content = JSON.parse(readFileSync(data, "utf8"));
-const { set, csv } = apiWithoutPage(content, await Engine.load(readFileSync(module), content));
+const loaded = modules.split(",").map((module) => readFileSync(module));
+const { set, csv } = apiWithoutPage(content, await Engine.load(loaded, content));
 const found = [];
 for (const changes of JSON.parse(readFileSync(0, "utf8"))) {
   try {

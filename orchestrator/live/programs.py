@@ -1,0 +1,71 @@
+"""The programs of the live page: each system of a run as one program, and what they share."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+
+from fmus.ports.definition import Definition
+from orchestrator.machine.errors import InputError
+from orchestrator.program.components import definitions_of
+from orchestrator.program.writer import Equations, Text
+from orchestrator.runs.preparation import Prepared
+
+#: The source with the equations.
+EQUATIONS = "equations.c"
+
+
+class Programs:
+    """Programs of several runs, whose components share their equations.
+
+    Runs of the same system have the same program, whatever their parameters are.
+    """
+
+    def __init__(self, runs: Sequence[Prepared]) -> None:
+        """Write them.
+
+        Raises:
+            InputError: a system cannot be a program; the text says why.
+
+        """
+        definitions = [definitions_of_run(run) for run in runs]
+        all_ = (one for found in definitions for one in found.values())
+        self._equations = Equations(all_, (), is_tuned=True)
+        self._numbers: dict[str, int] = {}
+        for run, found in zip(runs, definitions, strict=True):
+            self._numbers.setdefault(self._text(run, found).apart(), len(self._numbers))
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self._numbers)
+
+    @cached_property
+    def sources(self) -> Mapping[str, str]:
+        """The sources by their names: that of the equations, and one for each program."""
+        programs = {f"{number}.c": text for text, number in self._numbers.items()}
+        return {EQUATIONS: self._equations.apart(), **programs}
+
+    def find(self, run: Prepared) -> tuple[int, Text] | None:
+        """The number of a run's program, and what it is written from; None: it is another one."""
+        definitions = definitions_of_run(run)
+        if not self._equations.kinds.keys() >= {*definitions.values()}:
+            return None
+        text = self._text(run, definitions)
+        number = self._numbers.get(text.apart())
+        return None if number is None else (number, text)
+
+    def _text(self, run: Prepared, definitions: Mapping[str, Definition]) -> Text:
+        return Text(run.plan, definitions, alters=True, equations=self._equations)
+
+
+def definitions_of_run(run: Prepared) -> Mapping[str, Definition]:
+    """The definitions of all components.
+
+    Raises:
+        InputError: one is not in the language of equations.
+
+    """
+    try:
+        return definitions_of(run.plan.system)
+    except InputError as error:
+        raise InputError(f"{run.scenario.name}: the live page cannot run {error}") from None
