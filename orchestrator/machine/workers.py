@@ -154,7 +154,7 @@ def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterato
     environment = {"TMPDIR": str(process_folder())} | cache.environment()
     with held_interrupts() as interrupts:
         crew = Workers(
-            min(n or _cores(), most_processes()), partial(_begin, environment, setup), interrupts
+            min(n or cores(), most_processes()), partial(_begin, environment, setup), interrupts
         )
         try:
             yield crew
@@ -164,7 +164,7 @@ def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterato
         crew.close()
 
 
-def _cores() -> int:
+def cores() -> int:
     """How many cores this process may use."""
     n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     # The share of a container; "max" where there is no limit.

@@ -277,7 +277,7 @@ def write_table(folder: Path, command: Sequence[str], force: bool = False) -> tu
         (unfinished / _TEXT).write_text(text, encoding="utf-8")
         write_variants(unfinished / _VARIANTS, found)
         content = {"command": list(command), **clock.times()}
-        write_content(unfinished, content, (*RECORDED_PACKAGES, "numba"))
+        write_content(unfinished, content, RECORDED_PACKAGES)
     return folder / _TEXT, folder / _VARIANTS
 
 

@@ -690,7 +690,7 @@ class Text:
                 look = f"if (t >= time_after(it, it->steps) - {last}) {look}"
             lines.append(look)
             gives.append(
-                f"{text.name}_give(&it->index_{i}, it->looked, it->start_time, it->stop_time, "
+                f"raised += {text.name}_give(&it->index_{i}, it->looked, it->start_time, it->stop_time, "
                 f"found + {n});"
             )
             n += sum(map(len, reducer.results.values()))
@@ -699,9 +699,12 @@ class Text:
             "/* Lets indices look at a row. */\n"
             + function("static void look(simulation *it, double t)", lines, ()),
             f"enum {{ INDICES = {n} }};\n\n"
-            "/* The indices of the rows so far; what is not there is not a number. */\n"
+            "/* The indices of the rows so far, what is not there is not a number; how many have raised.\n"
+            " */\n"
             + function(
-                "EXPORTED void indices(const simulation *it, double found[])", gives, ()
+                "EXPORTED int indices(const simulation *it, double found[])",
+                ["int raised = 0;", *gives, "return raised;"],
+                (),
             ),
         ]
 

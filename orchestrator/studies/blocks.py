@@ -1,7 +1,7 @@
 """Runs in blocks: how many together, what makes them, and what comes back.
 
-The processes of this machine make them, or the workers of a Dask cluster (:mod:`.cluster`). A block
-whose process is lost is made again by another one.
+Processes of this machine make them, or threads where the engine leaves Python, or the workers of a
+Dask cluster (:mod:`.cluster`). A block whose process is lost is made again by another one.
 """
 
 from __future__ import annotations
@@ -9,15 +9,17 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
+from threading import Event
 from time import monotonic
 from typing import NamedTuple, Protocol
 
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.workers import Workers
+from orchestrator.machine.interrupts import Interrupts, held_interrupts
+from orchestrator.machine.workers import Workers, cores
 from orchestrator.machine.workers import workers as workers_of
 from orchestrator.studies.engine import Engine, Outcome, Point
 
@@ -35,6 +37,9 @@ _MOST_RUNS = 10_000
 
 #: How often a block may lose its process on this machine before it is put aside.
 _LOSSES = 1
+
+#: How long threads are waited for before it is asked whether to stop [s].
+_GLANCE = 0.1
 
 #: What is said of a run that no worker has survived.
 FATAL = "every process that ran it died"
@@ -146,6 +151,58 @@ class _Local:
                 self._put_aside.append(block)
 
 
+@contextmanager
+def local_threads(n: int | None, engine: Engine) -> Iterator[Crew]:
+    """Threads of this process, for the time of the context: for an engine that leaves Python.
+
+    Args:
+        n: how many; None for one a core.
+        engine: makes the runs; several threads use it at the same time.
+
+    """
+    with held_interrupts() as interrupts, ThreadPoolExecutor(n or cores()) as pool:
+        threads = _Threads(n or cores(), pool, engine, interrupts)
+        try:
+            yield threads
+        finally:
+            threads.stop()
+
+
+class _Threads:
+    """Threads of this process."""
+
+    ahead = 1
+
+    def __init__(
+        self, n: int, pool: ThreadPoolExecutor, engine: Engine, interrupts: Interrupts
+    ) -> None:
+        self.threads, self._pool, self._engine, self._interrupts = n, pool, engine, interrupts
+        self._under_way: dict[Future[Answer], list[Point]] = {}
+        self._ends = Event()
+
+    def send(self, block: list[Point], limit: float) -> None:
+        future = self._pool.submit(answer, self._engine, block, limit, self._ends)
+        self._under_way[future] = block
+
+    def receive(self) -> tuple[list[Point], Answer | None]:
+        done: set[Future[Answer]] = set()
+        while not done:
+            done, _ = wait(self._under_way, _GLANCE, FIRST_COMPLETED)
+            if self._interrupts:
+                raise KeyboardInterrupt
+        future = next(iter(done))
+        block = self._under_way.pop(future)
+        try:
+            return block, future.result()
+        except Exception as error:
+            raise cannot_make(block, error) from error
+
+    def stop(self) -> None:
+        """End with the runs that are under way."""
+        self._ends.set()
+        self._pool.shutdown(cancel_futures=True)
+
+
 def _set_up(engine: Engine) -> None:
     _engine.append(engine)
     # Nothing of it belongs on the terminal where the study was started.
@@ -157,13 +214,15 @@ def _task(block: list[Point], limit: float) -> Answer:
     return answer(_engine[0], block, limit)
 
 
-def answer(engine: Engine, points: list[Point], limit: float) -> Answer:
-    """Make runs, or the first of them where all take longer than a limit [s]."""
+def answer(
+    engine: Engine, points: list[Point], limit: float, ends: Event | None = None
+) -> Answer:
+    """Make runs, or the first of them where all take longer than a limit [s], or nobody waits."""
     start, seconds, outcomes = monotonic(), 0.0, []
     for outcome in engine.outcomes(points):
         outcomes.append(outcome)
         seconds = monotonic() - start
-        if seconds > limit:
+        if seconds > limit or (ends is not None and ends.is_set()):
             break
     return seconds, outcomes
 

@@ -18,7 +18,7 @@ from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import ORDERS, Experiment
+from orchestrator.master.experiment import LINEAR
 from orchestrator.master.loop import LOOPS, LoopName
 from orchestrator.master.observers.observer import progress_bar
 from orchestrator.master.plan import PACKAGES
@@ -27,8 +27,8 @@ from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import CliOption, Force, KindOption, LoopOption
 from orchestrator.runs.scenario import Scenario
-from orchestrator.studies.batch_engine import BatchEngine, check_systems
-from orchestrator.studies.blocks import Making, local_workers
+from orchestrator.studies.batch_engine import REFUSED, BatchEngine
+from orchestrator.studies.blocks import Making, local_threads, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.own_indices import OwnIndex, own_indices, with_fields
 from orchestrator.studies.space import Space
@@ -39,13 +39,13 @@ from orchestrator.studies.study_result import StudyResult, read_study_record
 from orchestrator.system.structure import System
 
 #: Packages whose versions the runs and their table depend on.
-_PACKAGES = (*PACKAGES, "numba", "pyarrow", "scipy")
+_PACKAGES = (*PACKAGES, "pyarrow", "scipy")
 
 #: What a study says of its runs.
 _STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
 
 #: What a study needs besides.
-_NEEDED = ("numba", "pyarrow", "scipy")
+_NEEDED = ("pyarrow", "scipy")
 
 #: Fewer runs than this are not worth a word on what would make them faster.
 _MANY = 100
@@ -69,7 +69,7 @@ class Means:
     engine: Annotated[
         EngineName | None,
         CliOption(
-            "engine that makes the runs: fmu (the FMUs) or batch (the compiled equations); both "
+            "engine that makes the runs: fmu (the FMUs) or batch (the system as one program); both "
             "give the same numbers; default: from the study",
             choices=ENGINES,
         ),
@@ -185,7 +185,11 @@ def complete_study(
             if not len(kept) and (hint := faster(space, engine, means, own)):
                 say(hint)
             name = study.name if progress else None
-            _complete(kept, engine, space, means, name)
+            engines = [engine]
+            if isinstance(engine, BatchEngine):
+                # It does not say why a component refuses.
+                engines.append(FmuEngine(space.prepared, means.loop, own))
+            _complete(kept, engines, space, means, name)
         result = StudyResult(folder)
         kept.write_record(
             {**read_study_record(folder), "failed": result.failed, "cautions": result.cautions}
@@ -283,9 +287,7 @@ def check_installed(needed: Sequence[str] = _NEEDED) -> None:
         raise InputError(f"studies need {', '.join(missing)}: pip install 'auv-fmu[studies]'")
 
 
-def _check_engine(
-    name: str, prepared: Mapping[str, Prepared], own: Sequence[OwnIndex] = ()
-) -> None:
+def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
     """Check that there is such an engine, and that it does all that is asked of it in a run.
 
     Raises:
@@ -294,28 +296,29 @@ def _check_engine(
     """
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
-    if name == BATCH and own:
-        raise InputError(
-            f"{own[0].name}.py: engine {BATCH!r} makes no indices of one's own; use --engine {FMU}"
-        )
     for scenario, one in prepared.items():
         if one.input_table is not None:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
         if name == BATCH and one.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
-        if name == BATCH and (more := _unknown_to_batch(one.experiment)):
+        if name == BATCH and one.experiment.coupling == LINEAR:
             raise InputError(
-                f"{scenario}: has {more}, which engine {BATCH!r} lacks; use --engine {FMU}"
+                f"{scenario}: coupling {LINEAR} goes back in time, which engine {BATCH!r} cannot; "
+                f"use --engine {FMU}"
             )
 
 
 def _engine(
     name: str, prepared: Mapping[str, Prepared], means: Means, own: Sequence[OwnIndex]
 ) -> Engine:
-    _check_engine(name, prepared, own)
+    _check_engine(name, prepared)
     if name == FMU:
         return FmuEngine(prepared, means.loop, own)
-    return BatchEngine(_systems(prepared), means.kind)
+    engine = BatchEngine(_systems(prepared), own)
+    for scenario, one in prepared.items():
+        plan = one.experiment
+        engine.prepare(Point(0, scenario, {}, plan.stop_time, plan.step, plan.order))
+    return engine
 
 
 def _systems(prepared: Mapping[str, Prepared]) -> dict[str, System]:
@@ -330,22 +333,13 @@ def faster(space: Space, engine: Engine, means: Means, own: Sequence[OwnIndex] =
         if means.kind == PYTHON and is_bundles and machines_compiler():
             option = "--kind native"
         with suppress(InputError):
-            _check_engine(BATCH, space.prepared, own)
-            check_systems(_systems(space.prepared), means.kind)
+            _check_engine(BATCH, space.prepared)
+            BatchEngine(_systems(space.prepared), own)
             option = f"--engine {BATCH}"
     return option and (
         f"{len(space):,} runs by FMUs of the {means.kind} kind; {option} gives the same numbers in "
         "a fraction of the time"
     )
-
-
-def _unknown_to_batch(experiment: Experiment) -> str:
-    """What the batch engine would not do of an experiment, in words."""
-    order = experiment.order if experiment.order in ORDERS else None
-    length = experiment.stop_time - experiment.start_time
-    made = vars(Experiment(length, experiment.step, order)) | {"stop_time": experiment.stop_time}
-    different = [name for name, value in vars(experiment).items() if value != made[name]]
-    return ", ".join(f"{name} = {getattr(experiment, name)!r}" for name in different)
 
 
 def _record(
@@ -397,8 +391,8 @@ def making_runs(
     Args:
         engine: what makes them.
         points: to be made.
-        scheduler: address of a Dask scheduler; None for processes of this machine.
-        workers: how many processes of this machine; None for one a core.
+        scheduler: address of a Dask scheduler; None for processes or threads of this machine.
+        workers: how many of them; None for one a core.
 
     Raises:
         InputError: there is no such scheduler, or no worker is left to make the runs.
@@ -409,6 +403,8 @@ def making_runs(
         from orchestrator.studies.cluster import cluster  # noqa: PLC0415
 
         crew = cluster(scheduler, engine)
+    elif isinstance(engine, BatchEngine):
+        crew = local_threads(workers, engine)
     else:
         crew = local_workers(workers, engine)
     with crew as of:
@@ -416,31 +412,37 @@ def making_runs(
 
 
 def _complete(
-    unfinished: Store, engine: Engine, space: Space, means: Means, name: str | None
+    unfinished: Store, engines: Sequence[Engine], space: Space, means: Means, name: str | None
 ) -> None:
     """Make the runs that are missing, and the table of all.
 
     Args:
         unfinished: takes the runs.
-        engine: makes them.
+        engines: make them: each the ones that the one before it has refused.
         space: all of them.
         means: how they are made.
         name: of the study, for a bar; None: there is no bar.
 
     """
-    points = (space[number] for number in unfinished.missing(len(space)))
-    with (
-        making_runs(engine, points, scheduler=means.scheduler, workers=means.workers) as blocks,
-        progress_bar(
-            total=len(space),
-            initial=len(unfinished),
-            desc=name,
-            unit="run",
-            delay=_PATIENCE,
-            disable=None if name else True,
-        ) as bar,
-    ):
-        for outcomes in blocks:
-            unfinished.add(outcomes)
-            bar.update(len(outcomes))
+    with progress_bar(
+        total=len(space),
+        initial=len(unfinished),
+        desc=name,
+        unit="run",
+        delay=_PATIENCE,
+        disable=None if name else True,
+    ) as bar:
+        left: Iterable[int] = unfinished.missing(len(space))
+        for engine in engines:
+            points, refused = (space[number] for number in left), list[int]()
+            made = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
+            with made as blocks:
+                for outcomes in blocks:
+                    known = [one for one in outcomes if one.failure != REFUSED]
+                    refused += [one.number for one in outcomes if one.failure == REFUSED]
+                    unfinished.add(known)
+                    bar.update(len(known))
+            if not refused:
+                break
+            left = sorted(refused)
     unfinished.publish(space)

@@ -164,7 +164,7 @@ def _real_parameter(system: System, name: PortName) -> float | None:
 
 
 #: What cautions follow from.
-_WATCHED = (read_reducer(largest_bound), read_reducer(vertical_passed))
+WATCHED = (read_reducer(largest_bound), read_reducer(vertical_passed))
 
 
 class Watch:
@@ -177,7 +177,7 @@ class Watch:
     def begin(self, header: Header) -> None:
         """Find out what can be seen."""
         self._header = header
-        self._reductions = reductions_of(_WATCHED, self._loops, header)
+        self._reductions = reductions_of(WATCHED, self._loops, header)
 
     def take(self, rows: np.ndarray) -> None:
         """Look at some rows."""

@@ -46,9 +46,18 @@ def distances(table: Table, loops: Sequence[Loop]) -> dict[tuple[str, str], np.n
 
 def smallest_distances(table: Table, loops: Sequence[Loop]) -> np.ndarray:
     """Distance between the two vehicles that are closest to each other, per row [m]."""
-    positions = np.stack([table.group(*loop.position) for loop in loops], axis=1)
-    rows = max(1, _AT_ONCE // len(loops))
-    blocks = np.split(positions, range(rows, len(table), rows))
+    return smallest_of(np.stack([table.group(*loop.position) for loop in loops], axis=1))
+
+
+def smallest_of(positions: np.ndarray) -> np.ndarray:
+    """The smallest distance of each row [m].
+
+    Args:
+        positions: of vehicles, (rows, vehicles, 3) [m].
+
+    """
+    rows = max(1, _AT_ONCE // positions.shape[1])
+    blocks = np.split(positions, range(rows, len(positions), rows))
     return np.concatenate([_smallest(block) for block in blocks])
 
 

@@ -155,7 +155,7 @@ def index_columns(
     """
     of_each = (
         f"{prefix}{column}"
-        for _, prefix in _prefixed(loops)
+        for _, prefix in prefixed(loops)
         for index in (*INDICES, *own)
         for column in index.columns
     )
@@ -168,11 +168,12 @@ def index_units(index: Index, loops: Sequence[Loop] = (STANDARD,)) -> dict[str, 
     if len({*units.values()}) == 1:
         units[index.name] = index.unit
     return {
-        f"{prefix}{name}": unit for _, prefix in _prefixed(loops) for name, unit in units.items()
+        f"{prefix}{name}": unit for _, prefix in prefixed(loops) for name, unit in units.items()
     }
 
 
-def _prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
+def prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
+    """Loops with what the names of their columns begin with: of several, the vehicle."""
     for loop in loops:
         yield loop, f"{loop.name}." if len(loops) > 1 else ""
 
@@ -241,7 +242,7 @@ class Indices:
         """The numbers of all loops, by their columns in a study."""
         return self.together | {
             f"{prefix}{column}": value
-            for loop, prefix in _prefixed(self._loops)
+            for loop, prefix in prefixed(self._loops)
             for found in [self.found(loop)]
             for index in self._chosen
             if index.name in found
