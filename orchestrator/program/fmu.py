@@ -163,7 +163,7 @@ class SystemModel:
         """
         if plan.experiment.coupling == LINEAR:
             raise Unsupported(f"coupling {LINEAR} goes back in time, which one FMU cannot")
-        self.text, self.name = Text(plan, definitions, is_tuned=True), name
+        self.text, self.name = Text(plan, definitions, is_tuned=True, is_hosted=True), name
         self.plan, self._definitions, self._title = self.text.plan, definitions, title
 
     # What the description says
@@ -408,7 +408,7 @@ class SystemModel:
                 "}",
                 "it->start_time = t;",
                 f"it->step = {step};",
-                "model_set(it, parameters, 1);",
+                "model_set(it, parameters, 1, error);",
                 *self._feed_call(),
                 "found = come_to_rest(it, error);",
                 "if (found < 0) {",
@@ -422,7 +422,7 @@ class SystemModel:
             ],
             "derive": [
                 mine,
-                "model_set(it, parameters, !derived->begun);",
+                "model_set(it, parameters, !derived->begun, error);",
                 "derived->begun = 1;",
                 "model_take(it, state->v);",
                 *self._anew(refuse),
@@ -459,7 +459,9 @@ class SystemModel:
             _function("put", "const simulation *it, double to[]", self._moved("put")),
             _function("take", "simulation *it, const double from[]", self._taken()),
             _function(
-                "set", "simulation *it, const model_parameters *parameters, int all", self._set()
+                "set",
+                "simulation *it, const model_parameters *parameters, int all, Error *error",
+                self._set(),
             ),
             *self._feed(),
             constants(answers),
@@ -491,26 +493,19 @@ class SystemModel:
 
     def _set(self) -> list[str]:
         """Hand parameters over where they have changed, or all."""
-        lines = ["it->full_steps = it->steps = INT_MAX;"]
+        lines = ["it->full_steps = it->steps = INT_MAX;", *self.text.unsplit()]
         for name, member in self.text.members.items():
             kind, owner = self.text.kind(name), f"it->{member}"
-            anew = [f"    {owner}.underived = 1;"] if kind.said.derived else []
+            change, acts = "all", list[str]()
             if count(kind.types["parameters"]):
                 size = f"sizeof {owner}.parameters"
-                here, there = f"&{owner}.parameters", f"&parameters->{member}"
-                lines += [
-                    f"if (all || memcmp({here}, {there}, {size}) != 0) {{",
-                    f"    memcpy({here}, {there}, {size});",
-                    *anew,
-                    "}",
-                ]
-            elif anew:
-                lines += ["if (all) {", *anew, "}"]
+                moved = f"&{owner}.parameters, &parameters->{member}, {size}"
+                change, acts = f"all || memcmp({moved}) != 0", [f"memcpy({moved});"]
+            acts.append(f"{kind.name}_adopt(&{owner}, error);")
+            lines += [f"if ({change}) {{", *(f"    {line}" for line in acts), "}"]
             if kind.has_h_max:
                 longest = f"parameters->{self._longest(member)} * (1.0 + {euler.ROUNDING!r})"
                 lines.append(f"{owner}.longest_step = fmin({longest}, DBL_MAX);")
-            elif kind.said.hooks["update"]:
-                lines.append(f"{owner}.longest_step = DBL_MAX;")
             if kind.said.draws:
                 lines.append(f"{owner}.is_noisy = 1;")
         return lines

@@ -306,6 +306,7 @@ class Text:
         definitions: of its components, by their names.
         indices: that look on.
         is_tuned: whether parameters may change after the start.
+        is_hosted: whether a host says when each step begins.
         alters: whether events can happen in it.
         is_quick: whether all that has been computed is checked at once, when a row is shown; that
             does not tell which component has refused.
@@ -317,6 +318,7 @@ class Text:
     definitions: Mapping[str, Definition]
     indices: Sequence[Looking] = ()
     is_tuned: bool = False
+    is_hosted: bool = False
     alters: bool = False
     is_quick: bool = False
     equations: Equations | None = None
@@ -759,12 +761,14 @@ class Text:
         passing, parts = self.stages.passing, []
         if passing is not None:
             parts.append(self._made("pass", "Lets values of t_k pass", passing, ()))
+        end = self._end("it->start_time")
+        counted = "const int is_counted = k < it->full_steps && it->start_time == 0.0;"
         begin = [
             "const double h = length_of(it, k, 1);",
             # What a host that counts its steps would reach.
-            "const int is_counted = k < it->full_steps && it->start_time == 0.0;",
-            f"const double end = is_counted ? time_after(it, k + 1) : {self._end('it->start_time')};",
-        ] * (not self.alters)  # fmt: skip
+            *([] if self.is_hosted else [counted]),
+            f"const double end = {'' if self.is_hosted else 'is_counted ? time_after(it, k + 1) : '}{end};",
+        ] * (not self.alters)
         doc = "Makes the step after the k-th"
         if self.is_quick:
             parts.append(self._sound())
