@@ -229,17 +229,13 @@ def test_instances_do_not_know_of_each_other(workplace: Path):
     assert [row for [row], _ in turns] == apart == [row for _, [row] in turns]
 
 
-def test_a_component_of_ones_own_goes_with_it(workplace: Path):
-    assert main(["new", "component", "damper", "--like", "controller"]) == 0
-    assert main(["build", "damper", "--kind", "native"]) == 0
-    scenario = Path("damper", "damper.toml")
-    path = exported(str(scenario), "--step", str(H), out="with_damper")
-    result = expected(str(scenario), events=[], step=H)
-    found = play(path)
-    own = [name for name in outputs(path) if name.startswith("damper.")]
-    assert own
-    for name in outputs(path):
-        assert np.array_equal(found[name], result[name]), name
+def test_a_controller_of_ones_own_goes_with_it(workplace: Path):
+    assert main(["new", "controller", "my_law"]) == 0
+    scenario = str(Path("my_law", "my_law.toml"))
+    path = exported(scenario)
+    result = expected(scenario, events=[])
+    assert load(scenario).components["controller"].fmu.name == "MyLaw.fmu"
+    check(play(path), result, outputs(path))
 
 
 def test_its_variables_are_those_of_the_components(workplace: Path):
@@ -313,8 +309,8 @@ def test_its_bytes_depend_on_nothing_else(workplace: Path):
 
 
 def test_what_cannot_be_one_fmu_is_refused_by_name(workplace: Path, refused):
-    assert main(["new", "controller", "my_law"]) == 0
-    said = refused("export", "my_law/my_law.toml", "--format", "fmu", "--out", "none")
+    assert main(["new", "controller", "other_law", "--python"]) == 0
+    said = refused("export", "other_law/other_law.toml", "--format", "fmu", "--out", "none")
     assert mentions(said, "controller language")
     said = refused("export", "fig4", "--platforms", "all", "--out", "none")
     assert mentions(said, "--platforms --format fmu")
