@@ -81,10 +81,11 @@ def sources(
     definition: Definition, fmi: str = FMI_VERSIONS[0], arrays: bool = False
 ) -> dict[str, str]:
     """The C sources of a component by their names, all but identity.h."""
-    return _sources(translated(definition), tables(definition, arrays), fmi)
+    return sources_of(translated(definition), tables(definition, arrays), fmi)
 
 
-def _sources(equations: str, ports: str, fmi: str) -> dict[str, str]:
+def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:
+    """The C sources of a version of FMI by their names, with equations.c and ports.h."""
     others = {name for version, name in MAIN.items() if version != fmi}
     return {
         **{
@@ -159,7 +160,7 @@ def entries_of(
     """
     model, name = parts.model, parts.model.identifier
     describe = partial(_described, model, fmi=fmi, arrays=parts.arrays)
-    texts = _sources(parts.equations, parts.tables, fmi)
+    texts = sources_of(parts.equations, parts.tables, fmi)
     written = {name: text.encode() for name, text in texts.items()}
     guid = guid_of(digest_of({**written, "modelDescription.xml": describe("")}))
     written["identity.h"] = _IDENTITY.format(name=quoted(model.name), guid=guid).encode()

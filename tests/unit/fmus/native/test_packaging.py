@@ -11,7 +11,6 @@ from fmus.discovery import source_of
 from fmus.kinds import platforms
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
-from fmus.ports.definition import Definition
 from support.settings import NAMES
 
 PLANT = source_of("AuvPlant").definition
@@ -77,16 +76,16 @@ def test_guid_is_the_same_for_all_platforms():
 
 def test_guid_follows_from_sources_and_description(monkeypatch: pytest.MonkeyPatch):
     guids = {guid(entries(name, fmi)) for name in NAMES for fmi in FILES}
-    written = packaging.sources
-    for file in written(PLANT):
+    files, written = packaging.sources(PLANT), packaging.sources_of
+    for file in files:
 
-        def changed(it: Definition, *fmi: str, file: str = file) -> dict[str, str]:
-            sources = written(it, *fmi)
+        def changed(*parts: str, file: str = file) -> dict[str, str]:
+            sources = written(*parts)
             return {**sources, file: sources[file] + "\n"}
 
-        monkeypatch.setattr(packaging, "sources", changed)
+        monkeypatch.setattr(packaging, "sources_of", changed)
         guids.add(guid(entries("AuvPlant")))
-    assert len(guids) == 2 * len(NAMES) + len(written(PLANT))
+    assert len(guids) == 2 * len(NAMES) + len(files)
 
 
 @pytest.mark.parametrize("name", NAMES)
