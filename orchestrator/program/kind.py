@@ -316,7 +316,7 @@ class Kind:
         """What follows from parameters that have changed."""
         lines = [f"{self.call('check')};"] if self.said.hooks["check"] else []
         lines += ["it->underived = 1;"] * bool(self.said.derived)
-        return self._function("adopt", "", lines)
+        return self._function("adopt", "", lines or ["(void)it;"])
 
 
 def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
