@@ -98,15 +98,11 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
         InputError: there is no such scenario, or it or the page cannot run it.
 
     """
-    both = runs_of(opened)
-    modules = [bundled()]
-    if not all(map(modules[0].find, both)):
-        modules.append(Programs(both))
-    first = _preset(opened, both, modules)
-    for run in both:
-        # What an FMU refuses is refused here, before there is a page.
+    first, modules = preset(opened)
+    for run in runs_of(opened):
+        # What a component refuses is refused here, before there is a page.
         run.run([])
-    others = [preset(name) for name in names() if name != first["name"]]
+    others = [preset(name)[0] for name in names() if name != first["name"]]
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
@@ -133,14 +129,17 @@ def _printed(units: Mapping[Any, str]) -> dict[str, str]:
     return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 
-def preset(name: str) -> Plain:
-    """A scenario, and what it is compared with.
+def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
+    """A scenario, and what it is compared with; the programs among which theirs are.
 
     Raises:
         InputError: there is no such scenario, or the page cannot run it.
 
     """
-    return _preset(name, runs_of(name), [bundled()])
+    both, modules = runs_of(name), [bundled()]
+    if not all(map(modules[0].find, both)):
+        modules.append(Programs(both))
+    return _preset(name, both, modules), modules
 
 
 def _preset(name: str, both: Sequence[Prepared], modules: Sequence[Programs]) -> Plain:
