@@ -122,7 +122,12 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
 @cache
 def bundled() -> Programs:
     """The programs of all scenarios of the bundle, and of what they are compared with."""
-    return Programs([run for name in names() for run in runs_of(name)])
+    return Programs([run for both in _bundled_runs().values() for run in both])
+
+
+@cache
+def _bundled_runs() -> Mapping[str, list[Prepared]]:
+    return {name: runs_of(name) for name in names()}
 
 
 def _printed(units: Mapping[Any, str]) -> dict[str, str]:
@@ -136,15 +141,33 @@ def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
         InputError: there is no such scenario, or the page cannot run it.
 
     """
-    both, modules = runs_of(name), [bundled()]
-    if not all(map(modules[0].find, both)):
+    both, modules = _bundled_runs().get(name) or runs_of(name), [bundled()]
+    found = [modules[0].find(run) for run in both]
+    if None in found:
         modules.append(Programs(both))
-    return _preset(name, both, modules), modules
+        found = [modules[1].find(run) for run in both]
+    programs = (_Program(len(modules) - 1, *one) for one in found if one is not None)
+    return _preset(name, both, [*programs]), modules
 
 
-def _preset(name: str, both: Sequence[Prepared], modules: Sequence[Programs]) -> Plain:
+class _Program(NamedTuple):
+    """The program of a run.
+
+    Attributes:
+        module: the number of the module that has it.
+        number: its number there.
+        text: what it is written from.
+
+    """
+
+    module: int
+    number: int
+    text: Text
+
+
+def _preset(name: str, both: Sequence[Prepared], programs: Sequence[_Program]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
-    loops = [_loop(one, scenario, modules) for one in both]
+    loops = [_loop(one, scenario, program) for one, program in zip(both, programs, strict=True)]
     fleet = both[0].loops if len(both[0].loops) > 1 else ()
     loops[0]["scenario"] = name
     if len({loop["label"] for loop in loops}) < len(loops):
@@ -237,13 +260,11 @@ def _check(prepared: Prepared) -> None:
             raise InputError(f"{prepared.scenario.name}: the live page cannot run {what}")
 
 
-def _loop(prepared: Prepared, owner: Scenario, modules: Sequence[Programs]) -> Plain:
+def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
     system = plan.system
     controller = _controller(system)
-    [(module, number, text)] = [
-        (i, *found) for i, one in enumerate(modules) if (found := one.find(prepared))
-    ][:1]
+    module, number, text = program
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
         "vehicles": list(map(_vehicle, prepared.loops)),

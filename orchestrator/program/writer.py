@@ -263,6 +263,7 @@ class Equations:
         """All of it as a source of its own."""
         return "\n\n".join([head_of(self), *self.text()]) + "\n"
 
+    @cached_property
     def header(self) -> str:
         """What a program has to know of what is compiled apart."""
         structures, functions = self._structures, "\n".join(self._functions)
@@ -443,7 +444,7 @@ class Text:
 
     def apart(self) -> str:
         """All but the equations, of which it has the header."""
-        return "\n\n".join([self.equations.header(), *self._own(), *self.calls()]) + "\n"
+        return "\n\n".join([self.equations.header, *self._own(), *self.calls()]) + "\n"
 
     def core(self) -> list[str]:
         """What it is, whoever calls it: equations, components, the start, and a step."""
