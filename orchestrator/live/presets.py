@@ -6,6 +6,7 @@ program makes its steps, which parameters a comparison shares, and to which inpu
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cache
@@ -279,6 +280,7 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
         "program": [module, number],
         "ports": {name: _ports(text, name) for name in system.components},
         "actingRow": text.plan.experiment.acting_row,
+        "restarted": {name: _restarted(text, name) for name in system.components},
         "parameters": list(_parameters(text)),
         **({"fixedStep": plan.experiment.step} if text.slow else {}),
         "events": _events(prepared, owner),
@@ -293,6 +295,11 @@ def _ports(text: Text, name: str) -> dict[str, list[str]]:
     """The inputs and outputs of a component, in the order of a program's rows."""
     kind = text.kind(name)
     return {group: [one.name for one in kind.ports[group]] for group in ("input", "output")}
+
+
+def _restarted(text: Text, name: str) -> str:
+    """What a component says when its state is started over, with braces for the time."""
+    return re.sub(r"\{.*?\}", "{}", text.kind(name).said.restarted)
 
 
 def _parameters(text: Text) -> Iterator[Plain]:

@@ -151,7 +151,8 @@ def tables_of(text: Text) -> str:
 def text_of_events(text: Text) -> str:
     """The part of the text that has events happen."""
     source = _SOURCE.read_text(encoding="utf-8").strip()
-    return "\n\n".join([_PASSING[text.passes], _retune(text), _restart(text), source])
+    changes = (_retune(text), _restart(text), _restarts(text))
+    return "\n\n".join([_PASSING[text.passes], *changes, source])
 
 
 def _number(place: Place) -> str:
@@ -201,6 +202,20 @@ def _restart(text: Text) -> str:
     doc = "Starts a component over, with what feeds it now; whether it refuses."
     head = "restart(simulation *it, const simulation *now, int component, double t)"
     return _switch(doc, head, cases)
+
+
+def _restarts(text: Text) -> str:
+    rows = (
+        f"    times[{i}] = it->{member}.has_restarted ? it->{member}.restarted : -1.0;\n"
+        if text.kind(name).tells
+        else f"    times[{i}] = -1.0;\n"
+        for i, (name, member) in enumerate(text.members.items())
+    )
+    return (
+        "/* When guards of components first started states over [s]; less than 0: none did. */\n"
+        "EXPORTED void restarts(const simulation *it, double times[]) {\n"
+        f"    (void)it;\n{''.join(rows)}}}"
+    )
 
 
 # In numbers

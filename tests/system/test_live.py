@@ -123,7 +123,7 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         ending = run.run([table])
         assert said["columns"] == [table.columns[i - 1] for i in places(table)[1:]]
         assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
-        assert said.get("failure") == ending.failure
+        assert (tuple(said["messages"]), said.get("failure")) == (ending.messages, ending.failure)
         wanted = table.rows[:, places(table)]
         found = np.fromfile(rows.folder / f"{name}.{i}").reshape(wanted.shape)
         until = CHAOTIC.get(run.scenario.name, np.inf)
@@ -299,6 +299,14 @@ def compare(run: Prepared, folder: Path) -> tuple[Ending, Table]:
     found = np.fromfile(folder / "mine.0").reshape(wanted.shape)
     assert found == pytest.approx(wanted, rel=TOLERANCE, abs=TOLERANCE)
     return ending, table
+
+
+def test_a_state_that_a_guard_starts_over_is_told(parts: Parts, tmp_path):
+    """Of an observer that restarts; what an FMU says again after a reset is not."""
+    gate = "stop_time = 2.0\n[parameters]\ncontroller.innovation_gate = 1e-6\n"
+    said, run = both(gate, parts, tmp_path)
+    [message] = run.run([]).messages
+    assert said["messages"] == [message]
 
 
 #: Scenarios with what only programs of their own have.
