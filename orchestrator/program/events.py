@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,12 +28,11 @@ from orchestrator.master.hooks.events import (
     occurrence,
 )
 from orchestrator.master.observers.observer import Occurrence
+from orchestrator.master.plan import Plan
 from orchestrator.master.row import FACTOR, OFFSET
+from orchestrator.program.kind import Kind, Place
+from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear
-
-if TYPE_CHECKING:
-    from orchestrator.program.kind import Place
-    from orchestrator.program.writer import Text
 
 _SOURCE = Path(__file__).with_name("events.c")
 
@@ -122,6 +121,33 @@ _PASSING = {
 }
 
 
+class Text(Protocol):
+    """What has to be known of the text of a program: see :class:`.writer.Text`."""
+
+    plan: Plan
+    components: list[str]
+    members: dict[str, str]
+    passes: bool
+
+    @property
+    def columns(self) -> Mapping[PortName, Place]:
+        """All inputs and outputs."""
+
+    @property
+    def inputs(self) -> Mapping[PortName, int]:
+        """The numbers of all inputs."""
+
+    @property
+    def parameters(self) -> Mapping[PortName, Place]:
+        """All parameters, and the inputs that nothing feeds."""
+
+    def kind(self, component: str) -> Kind:
+        """The kind of a component."""
+
+    def evaluated(self, name: str) -> Iterator[str]:
+        """Compute the outputs of a component."""
+
+
 def tables_of(text: Text) -> str:
     """Where the numbers are that a host and events can set or see."""
     fed = {one.target: one.transformation for one in text.plan.system.connections}
@@ -129,8 +155,7 @@ def tables_of(text: Text) -> str:
     inputs = []
     for name in text.inputs:
         change = fed.get(name)
-        is_linear = isinstance(change, Linear)
-        factor, offset = (change.factor, change.offset) if is_linear else (FACTOR, OFFSET)
+        factor, offset = change if isinstance(change, Linear) else (FACTOR, OFFSET)
         numbers = f"{number_in_c(factor)}, {number_in_c(offset)}"
         inputs.append(f"    {{{places[name]}, {int(name in fed)}, {numbers}}},")
     components = {name: i for i, name in enumerate(text.components)}
@@ -199,7 +224,7 @@ def _restart(text: Text) -> str:
         ]
         for i, (name, member) in enumerate(text.members.items())
     }
-    doc = "Starts a component over, with what feeds it now; whether it refuses."
+    doc = "Starts a component over, with its inputs of now; whether it refuses."
     head = "restart(simulation *it, const simulation *now, int component, double t)"
     return _switch(doc, head, cases)
 
