@@ -21,6 +21,7 @@ from hatchling.builders.wheel import WheelBuilder
 from fmus.compilers import COMPILERS, compiler_for, library
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON, TARGETS, platforms
 from orchestrator.live import assembly, module
+from orchestrator.live.presets import bundled
 from orchestrator.machine.errors import InputError
 from orchestrator.master import stepper
 from orchestrator.runs import bundle
@@ -42,8 +43,9 @@ def write_ready(folder: Path) -> None:
     with loader_for_any_linux():
         place = folder / bundle.CATEGORY / bundle.key_of(PYTHON, FMI_VERSIONS[0])
         bundle.run_fmus("build", place, "--kind", PYTHON, "--loader", "native")
+    programs = bundled()
     for category, key, files in (
-        (module.CATEGORY, module.key_of(), module.compiled()),
+        (module.CATEGORY, module.key_of(programs), module.compiled(programs)),
         (assembly.CATEGORY, assembly.key_of(), assembly.bundled()),
     ):
         place = folder / category / key

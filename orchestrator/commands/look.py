@@ -82,7 +82,7 @@ def add_live(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         default=_OPENED,
         metavar="SCENARIO|FILE.toml",
-        help="scenario that the page opens with, made of the bundle's components; the page also "
+        help="scenario that the page opens with, made of components in the language; the page also "
         f"offers every scenario of `auv-fmu list`; default: {_OPENED}",
     )
     _add_file(parser, "page to write: .html; default: SCENARIO-live.html")

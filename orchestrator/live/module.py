@@ -48,7 +48,9 @@ _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
 _FREE = "__heap_base"
 
 #: Functions of a program that the page calls.
-_FUNCTIONS = ("size_of_simulation", "begin", "run_with_events", "rows_shown", "failure")
+_FUNCTIONS = (
+    "size_of_simulation", "begin", "run_with_events", "rows_shown", "failure", "restarts",
+)  # fmt: skip
 
 #: Others that each program has.
 _OTHERS = ("run", "set")

@@ -6,6 +6,7 @@ program makes its steps, which parameters a comparison shares, and to which inpu
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cache
@@ -98,15 +99,11 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
         InputError: there is no such scenario, or it or the page cannot run it.
 
     """
-    both = runs_of(opened)
-    modules = [bundled()]
-    if not all(map(modules[0].find, both)):
-        modules.append(Programs(both))
-    first = _preset(opened, both, modules)
-    for run in both:
-        # What an FMU refuses is refused here, before there is a page.
+    first, modules = preset(opened)
+    for run in runs_of(opened):
+        # What a component refuses is refused here, before there is a page.
         run.run([])
-    others = [preset(name) for name in names() if name != first["name"]]
+    others = [preset(name)[0] for name in names() if name != first["name"]]
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
@@ -126,26 +123,52 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
 @cache
 def bundled() -> Programs:
     """The programs of all scenarios of the bundle, and of what they are compared with."""
-    return Programs([run for name in names() for run in runs_of(name)])
+    return Programs([run for both in _bundled_runs().values() for run in both])
+
+
+@cache
+def _bundled_runs() -> Mapping[str, list[Prepared]]:
+    return {name: runs_of(name) for name in names()}
 
 
 def _printed(units: Mapping[Any, str]) -> dict[str, str]:
     return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 
-def preset(name: str) -> Plain:
-    """A scenario, and what it is compared with.
+def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
+    """A scenario, and what it is compared with; the programs among which theirs are.
 
     Raises:
         InputError: there is no such scenario, or the page cannot run it.
 
     """
-    return _preset(name, runs_of(name), [bundled()])
+    both, modules = _bundled_runs().get(name) or runs_of(name), [bundled()]
+    found = [modules[0].find(run) for run in both]
+    if None in found:
+        modules.append(Programs(both))
+        found = [modules[1].find(run) for run in both]
+    programs = (_Program(len(modules) - 1, *one) for one in found if one is not None)
+    return _preset(name, both, [*programs]), modules
 
 
-def _preset(name: str, both: Sequence[Prepared], modules: Sequence[Programs]) -> Plain:
+class _Program(NamedTuple):
+    """The program of a run.
+
+    Attributes:
+        module: the number of the module that has it.
+        number: its number there.
+        text: what it is written from.
+
+    """
+
+    module: int
+    number: int
+    text: Text
+
+
+def _preset(name: str, both: Sequence[Prepared], programs: Sequence[_Program]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
-    loops = [_loop(one, scenario, modules) for one in both]
+    loops = [_loop(one, scenario, program) for one, program in zip(both, programs, strict=True)]
     fleet = both[0].loops if len(both[0].loops) > 1 else ()
     loops[0]["scenario"] = name
     if len({loop["label"] for loop in loops}) < len(loops):
@@ -238,13 +261,11 @@ def _check(prepared: Prepared) -> None:
             raise InputError(f"{prepared.scenario.name}: the live page cannot run {what}")
 
 
-def _loop(prepared: Prepared, owner: Scenario, modules: Sequence[Programs]) -> Plain:
+def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     scenario, plan = prepared.scenario, prepared.plan
     system = plan.system
     controller = _controller(system)
-    [(module, number, text)] = [
-        (i, *found) for i, one in enumerate(modules) if (found := one.find(prepared))
-    ][:1]
+    module, number, text = program
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
         "vehicles": list(map(_vehicle, prepared.loops)),
@@ -259,6 +280,7 @@ def _loop(prepared: Prepared, owner: Scenario, modules: Sequence[Programs]) -> P
         "program": [module, number],
         "ports": {name: _ports(text, name) for name in system.components},
         "actingRow": text.plan.experiment.acting_row,
+        "restarted": {name: _restarted(text, name) for name in system.components},
         "parameters": list(_parameters(text)),
         **({"fixedStep": plan.experiment.step} if text.slow else {}),
         "events": _events(prepared, owner),
@@ -273,6 +295,11 @@ def _ports(text: Text, name: str) -> dict[str, list[str]]:
     """The inputs and outputs of a component, in the order of a program's rows."""
     kind = text.kind(name)
     return {group: [one.name for one in kind.ports[group]] for group in ("input", "output")}
+
+
+def _restarted(text: Text, name: str) -> str:
+    """What a component says when its state is started over, with braces for the time."""
+    return re.sub(r"\{.*?\}", "{}", text.kind(name).said.restarted)
 
 
 def _parameters(text: Text) -> Iterator[Plain]:

@@ -32,8 +32,12 @@ class Programs:
         all_ = (one for found in definitions for one in found.values())
         self._equations = Equations(all_, (), is_tuned=True)
         self._numbers: dict[str, int] = {}
+        #: Of each run, with what must not be another one's identity.
+        self._known: dict[int, tuple[Prepared, int, Text]] = {}
         for run, found in zip(runs, definitions, strict=True):
-            self._numbers.setdefault(self._text(run, found).apart(), len(self._numbers))
+            text = self._text(run, found)
+            number = self._numbers.setdefault(text.apart(), len(self._numbers))
+            self._known[id(run)] = run, number, text
 
     def __len__(self) -> int:
         """How many there are."""
@@ -47,12 +51,15 @@ class Programs:
 
     def find(self, run: Prepared) -> tuple[int, Text] | None:
         """The number of a run's program, and what it is written from; None: it is another one."""
+        if id(run) in self._known:
+            _, number, text = self._known[id(run)]
+            return number, text
         definitions = definitions_of_run(run)
         if not self._equations.kinds.keys() >= {*definitions.values()}:
             return None
         text = self._text(run, definitions)
-        number = self._numbers.get(text.apart())
-        return None if number is None else (number, text)
+        written = text.apart()
+        return (self._numbers[written], text) if written in self._numbers else None
 
     def _text(self, run: Prepared, definitions: Mapping[str, Definition]) -> Text:
         return Text(run.plan, definitions, alters=True, equations=self._equations)

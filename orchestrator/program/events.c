@@ -43,30 +43,6 @@ typedef struct {
     double turn;
 } course;
 
-/* Numbers of the simulation */
-
-static double get(const simulation *it, number of) {
-    const char *place = (const char *)it + of.place;
-    double value;
-    int whole;
-    if (!of.is_whole) {
-        memcpy(&value, place, sizeof value);
-        return value;
-    }
-    memcpy(&whole, place, sizeof whole);
-    return whole;
-}
-
-static void put(simulation *it, number of, double value) {
-    char *place = (char *)it + of.place;
-    const int whole = of.is_whole ? (int)value : 0;
-    if (of.is_whole) {
-        memcpy(place, &whole, sizeof whole);
-    } else {
-        memcpy(place, &value, sizeof value);
-    }
-}
-
 /* Lets an input take what feeds it, or what it would have, in another way. */
 static void alter(simulation *it, int i, double factor, double offset) {
     it->factors[i] = factor;
@@ -77,7 +53,7 @@ static void alter(simulation *it, int i, double factor, double offset) {
 /* Gives a tunable parameter, or an input that nothing feeds, a value in its range; whether the
  * component refuses. */
 EXPORTED int set(simulation *it, int which, double value) {
-    const parameter *of = &parameters[which];
+    const settable *of = &settables[which];
     const double before = get(it, of->at);
     if (of->input >= 0) {
         it->supplied[of->input] = value;

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -28,13 +28,11 @@ from orchestrator.master.hooks.events import (
     occurrence,
 )
 from orchestrator.master.observers.observer import Occurrence
+from orchestrator.master.plan import Plan
 from orchestrator.master.row import FACTOR, OFFSET
+from orchestrator.program.kind import Kind, Place
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear
-
-if TYPE_CHECKING:
-    from orchestrator.program.kind import Place
-    from orchestrator.program.writer import Text
 
 _SOURCE = Path(__file__).with_name("events.c")
 
@@ -63,9 +61,7 @@ typedef struct {{
     number at;
     int component;
     int input; /* -1: it is a parameter */
-}} parameter;
-
-{passing}
+}} settable;
 
 static const number columns[] = {{
 {columns}
@@ -75,10 +71,48 @@ static const input inputs[] = {{
 {inputs}
 }};
 
-static const parameter parameters[] = {{
-{parameters}
-}};"""
+static const settable settables[] = {{
+{settables}
+}};
 
+enum {{
+    COMPONENTS = {n_components}, INPUTS = {n_inputs}, SETTABLES = {n_settables}
+}};
+
+static double get(const simulation *it, number of) {{
+    const char *place = (const char *)it + of.place;
+    double value;
+    int whole;
+    if (!of.is_whole) {{
+        memcpy(&value, place, sizeof value);
+        return value;
+    }}
+    memcpy(&whole, place, sizeof whole);
+    return whole;
+}}
+
+static void put(simulation *it, number of, double value) {{
+    char *place = (char *)it + of.place;
+    const int whole = of.is_whole ? (int)value : 0;
+    if (of.is_whole) {{
+        memcpy(place, &whole, sizeof whole);
+    }} else {{
+        memcpy(place, &value, sizeof value);
+    }}
+}}"""
+
+#: What a simulation begins with: its parameters, and what events alter.
+BEGINNING = (
+    "for (int i = 0; i < SETTABLES; i++) put(it, settables[i].at, parameters[i]);",
+    "for (int i = 0; i < SETTABLES; i++) {",
+    "    if (settables[i].input >= 0) it->supplied[settables[i].input] = parameters[i];",
+    "}",
+    "for (int i = 0; i < INPUTS; i++) {",
+    "    it->factors[i] = inputs[i].factor;",
+    "    it->offsets[i] = inputs[i].offset;",
+    "}",
+    "for (int i = 0; i < COMPONENTS; i++) it->started[i] = start_time;",
+)
 
 #: Whether values pass before a row shows them.
 _PASSING = {
@@ -87,50 +121,63 @@ _PASSING = {
 }
 
 
-def beginning(text: Text) -> Iterator[str]:
-    """What the simulation begins with, for events to alter."""
-    for name, i in text.inputs.items():
-        factor, offset = _change(text, name)
-        yield f"it->factors[{i}] = {number_in_c(factor)};"
-        yield f"it->offsets[{i}] = {number_in_c(offset)};"
-    for i, name in enumerate(text.parameters):
-        if name in text.inputs:
-            yield f"it->supplied[{text.inputs[name]}] = parameters[{i}];"
-    n = len(text.components)
-    yield f"for (int i = 0; i < {n}; i++) it->started[i] = start_time;"
+class Text(Protocol):
+    """What has to be known of the text of a program: see :class:`.writer.Text`."""
+
+    plan: Plan
+    components: list[str]
+    members: dict[str, str]
+    passes: bool
+
+    @property
+    def columns(self) -> Mapping[PortName, Place]:
+        """All inputs and outputs."""
+
+    @property
+    def inputs(self) -> Mapping[PortName, int]:
+        """The numbers of all inputs."""
+
+    @property
+    def parameters(self) -> Mapping[PortName, Place]:
+        """All parameters, and the inputs that nothing feeds."""
+
+    def kind(self, component: str) -> Kind:
+        """The kind of a component."""
+
+    def evaluated(self, name: str) -> Iterator[str]:
+        """Compute the outputs of a component."""
+
+
+def tables_of(text: Text) -> str:
+    """Where the numbers are that a host and events can set or see."""
+    fed = {one.target: one.transformation for one in text.plan.system.connections}
+    places = {name: i for i, name in enumerate(text.columns)}
+    inputs = []
+    for name in text.inputs:
+        change = fed.get(name)
+        factor, offset = change if isinstance(change, Linear) else (FACTOR, OFFSET)
+        numbers = f"{number_in_c(factor)}, {number_in_c(offset)}"
+        inputs.append(f"    {{{places[name]}, {int(name in fed)}, {numbers}}},")
+    components = {name: i for i, name in enumerate(text.components)}
+    settables = [
+        f"    {{{_number(place)}, {components[name.component]}, {text.inputs.get(name, -1)}}},"
+        for name, place in text.parameters.items()
+    ]
+    return _TABLES.format(
+        columns="\n".join(f"    {_number(place)}," for place in text.columns.values()),
+        inputs="\n".join(inputs),
+        settables="\n".join(settables),
+        n_components=len(components),
+        n_inputs=len(inputs),
+        n_settables=len(settables),
+    )
 
 
 def text_of_events(text: Text) -> str:
     """The part of the text that has events happen."""
-    columns = [f"    {_number(place)}," for place in text.columns.values()]
-    places = {name: i for i, name in enumerate(text.columns)}
-    inputs = []
-    for name in text.inputs:
-        factor, offset = map(number_in_c, _change(text, name))
-        is_fed = int(name in _fed(text))
-        inputs.append(f"    {{{places[name]}, {is_fed}, {factor}, {offset}}},")
-    parameters = [
-        f"    {{{_number(place)}, {text.components.index(name.component)}, "
-        f"{text.inputs.get(name, -1)}}},"
-        for name, place in text.parameters.items()
-    ]
-    tables = _TABLES.format(
-        passing=_PASSING[text.passes],
-        columns="\n".join(columns),
-        inputs="\n".join(inputs),
-        parameters="\n".join(parameters),
-    )
-    return "\n\n".join([tables, _retune(text), _restart(text), _SOURCE.read_text().strip()])
-
-
-def _fed(text: Text) -> Mapping[PortName, object]:
-    return {one.target: one.transformation for one in text.plan.system.connections}
-
-
-def _change(text: Text, name: PortName) -> tuple[float, float]:
-    """What an input multiplies by, and adds to, what feeds it."""
-    change = _fed(text).get(name)
-    return (change.factor, change.offset) if isinstance(change, Linear) else (FACTOR, OFFSET)
+    source = _SOURCE.read_text(encoding="utf-8").strip()
+    changes = (_retune(text), _restart(text), _restarts(text))
+    return "\n\n".join([_PASSING[text.passes], *changes, source])
 
 
 def _number(place: Place) -> str:
@@ -140,13 +187,14 @@ def _number(place: Place) -> str:
 
 
 def _switch(doc: str, head: str, cases: Mapping[int, Sequence[str]]) -> str:
+    """A function that does something for one of the components."""
     body = "".join(
-        f"    case {i}:\n{''.join(f'        {line}{chr(10)}' for line in lines)}        break;\n"
+        f"    case {i}:\n" + "".join(f"        {line}\n" for line in lines)
         for i, lines in cases.items()
     )
     return (
         f"/* {doc} */\nstatic int {head} {{\n    Error noted = {{0}}, *error = &noted;\n"
-        f"    (void)error;\n    switch (component) {{\n{body}    }}\n    return 0;\n}}"
+        f"    switch (component) {{\n{body}    }}\n    return 0;\n}}"
     )
 
 
@@ -162,29 +210,37 @@ def _retune(text: Text) -> str:
         if text.passes and (kind.follows_inputs or kind.said.takes("outputs", "parameters")):
             # Outputs that follow from them are of now.
             lines += text.evaluated(name)
-        cases[i] = lines
+        cases[i] = [*lines, "return 0;"]
     doc = "Lets parameters of a component act from now on; whether it refuses them."
     return _switch(doc, "retune(simulation *it, int component)", cases)
 
 
 def _restart(text: Text) -> str:
-    cases = {}
-    for i, (name, member) in enumerate(text.members.items()):
-        lines = [
-            f"{text.columns[one.target].text} = {text.value(one, 'now')};"
-            for one in text.plan.system.feeding[name]
-        ]
-        lines += [
-            *text.checked_inputs(name),
-            f"it->started[{i}] = t;",
+    cases = {
+        i: [
+            f"feed_{i}(it, now, error);",
             *([f"it->{member}.is_seeded = 0;"] * bool(text.kind(name).said.draws)),
-            f"{text.kind(name).name}_start(&it->{member}, t, error);",
-            f"if (error->raised) return refused(it, {i}, AT_START, 0);",
+            f"return start_{i}(it, t, error);",
         ]
-        cases[i] = lines
-    doc = "Starts a component over, with what feeds it now; whether it refuses."
+        for i, (name, member) in enumerate(text.members.items())
+    }
+    doc = "Starts a component over, with its inputs of now; whether it refuses."
     head = "restart(simulation *it, const simulation *now, int component, double t)"
-    return _switch(doc, head, cases).replace("(void)error;", "(void)now;\n    (void)error;")
+    return _switch(doc, head, cases)
+
+
+def _restarts(text: Text) -> str:
+    rows = (
+        f"    times[{i}] = it->{member}.has_restarted ? it->{member}.restarted : -1.0;\n"
+        if text.kind(name).tells
+        else f"    times[{i}] = -1.0;\n"
+        for i, (name, member) in enumerate(text.members.items())
+    )
+    return (
+        "/* When guards of components first started states over [s]; less than 0: none did. */\n"
+        "EXPORTED void restarts(const simulation *it, double times[]) {\n"
+        f"    (void)it;\n{''.join(rows)}}}"
+    )
 
 
 # In numbers

@@ -179,6 +179,8 @@ class Kind:
             rows.append("double longest_step; /* that is not split [s] */")
         if self.is_timed:
             rows.append("double time; /* of the state [s] */")
+        if self.tells:
+            rows += ["double restarted; /* when its state first was [s] */", "int has_restarted;"]
         if self.said.draws:
             rows.append(f"double draws[{self.said.draws}];")
             rows.append("int is_noisy; /* whether it makes a difference what is drawn */")
@@ -192,12 +194,21 @@ class Kind:
         derived = f"it->derived = {self.call('derive', state=state, t=time)};"
         return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
 
-    def _guarded(self) -> list[str]:
+    @property
+    def tells(self) -> bool:
+        """Whether it keeps when its state was first started over."""
+        return self.is_tuned and self.said.hooks["credible"] is not None
+
+    def _guarded(self, *, tells: bool = False) -> list[str]:
         """A copy of the state, which a guard may start over."""
         lines = [f"{self._type('state')} state = it->state;"]
         if self.said.hooks["credible"]:
-            test = self.call("credible", state="state")
-            lines.append(f"if (!{test}) state = {self.call('restarted', state='state')};")
+            lines.append(f"if (!{self.call('credible', state='state')}) {{")
+            lines.append(f"    state = {self.call('restarted', state='state')};")
+            if tells:
+                lines.append("    if (!it->has_restarted) it->restarted = t;")
+                lines.append("    it->has_restarted = 1;")
+            lines.append("}")
         return lines
 
     def _computed(self) -> list[str]:
@@ -280,7 +291,7 @@ class Kind:
         if self.steps:
             split = self.emitter.call(self.euler["internal_steps"], ["h", "it->longest_step"])
             lines += [
-                *self._guarded(),
+                *self._guarded(tells=self.tells),
                 "int n = 1;",
                 "if (h > it->longest_step) {",
                 f"    if (h / it->longest_step > {float(euler.MOST_INTERNAL_STEPS)!r}) {{",

@@ -27,7 +27,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Order
 from orchestrator.master.plan import Plan, stages
 from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Stages, Visit, stages_of
-from orchestrator.program.events import beginning, text_of_events
+from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind, Place, function, scalars
 from orchestrator.program.reducing import Looking, ReducerText
 from orchestrator.system.connection import Connection
@@ -263,6 +263,7 @@ class Equations:
         """All of it as a source of its own."""
         return "\n\n".join([head_of(self), *self.text()]) + "\n"
 
+    @cached_property
     def header(self) -> str:
         """What a program has to know of what is compiled apart."""
         structures, functions = self._structures, "\n".join(self._functions)
@@ -445,7 +446,7 @@ class Text:
 
     def apart(self) -> str:
         """All but the equations, of which it has the header."""
-        return "\n\n".join([self.equations.header(), *self._own(), *self.calls()]) + "\n"
+        return "\n\n".join([self.equations.header, *self._own(), *self.calls()]) + "\n"
 
     def core(self) -> list[str]:
         """What it is, whoever calls it: equations, components, the start, and a step."""
@@ -460,6 +461,7 @@ class Text:
     def calls(self) -> list[str]:
         """What a host calls."""
         return [
+            *([tables_of(self)] if self.alters else []),
             self._begin(),
             self._show(),
             *self._look(),
@@ -500,14 +502,10 @@ class Text:
     # The start
 
     def _begin(self) -> str:
-        values = []
-        for i, (name, place) in enumerate(self.parameters.items()):
-            value = f"parameters[{i}]"
-            if place.type != FLOAT:
-                value = f"(int){value}"
-            elif name.port == H_MAX:
-                value = f"fmin({value} * (1.0 + {euler.ROUNDING!r}), DBL_MAX)"
-            values.append((place.text, value))
+        values = [
+            (place.text, f"parameters[{i}]" if place.type == FLOAT else f"(int)parameters[{i}]")
+            for i, place in enumerate(self.parameters.values())
+        ]
         lines = [
             "Error noted = {0};",
             "memset(it, 0, sizeof *it);",
@@ -516,19 +514,20 @@ class Text:
             "it->stop_time = stop_time;",
             "it->full_steps = full_steps;",
             "it->steps = steps;",
-            *_copies(values),
-            *(beginning(self) if self.alters else ()),
+            *(BEGINNING if self.alters else _copies(values)),
             *self.unsplit(),
             "return come_to_rest(it, &noted) != 0;",
         ]
         return function(_BEGIN, lines, ())
 
     def unsplit(self) -> Iterator[str]:
-        """Let steps of components that cannot split them be as long as they may."""
+        """Let components split steps that are longer than they may be, or none."""
         for name in self.components:
-            kind = self.kind(name)
-            if kind.steps and not kind.has_h_max:
-                yield f"it->{self.members[name]}.longest_step = DBL_MAX;"
+            kind, place = self.kind(name), f"it->{self.members[name]}.longest_step"
+            if kind.has_h_max:
+                yield f"{place} = fmin({place} * (1.0 + {euler.ROUNDING!r}), DBL_MAX);"
+            elif kind.steps:
+                yield f"{place} = DBL_MAX;"
 
     def _rest(self) -> str:
         """What lets values come to rest at the start."""
@@ -541,17 +540,11 @@ class Text:
             for one in system.connections
             if turn[one.source.component] >= turn[one.target.component]
         }
-        settled = ["const double t = it->start_time;", "int changed = 0, is_other;"]
-        for name in order:
-            settled.append("is_other = 0;")
-            for connection in system.feeding[name]:
-                target = self.columns[connection.target]
-                take = "take" if target.type == FLOAT else "take_whole"
-                settled.append(f"is_other |= {take}(&{target.text}, {self.value(connection)});")
+        settled = ["int changed = 0;"]
+        for i in map(self.components.index, order):
             settled += [
-                "if (is_other || everything) {",
-                *(f"    {line}" for line in self.checked_inputs(name)),
-                *(f"    {line}" for line in self._started(name)),
+                f"if (feed_{i}(it, it, error) | everything) {{",
+                f"    if (start_{i}(it, it->start_time, error)) return -1;",
                 "    changed = 1;",
                 "}",
             ]
@@ -561,39 +554,59 @@ class Text:
             start = self._port(connection.target).start or 0
             starts.append(f"{place.text} = {number_in_c(_as(place, start))};")
         lines = [
-            "const double t = it->start_time;",
             "int changed, rounds = 0;",
             *starts,
-            *(line for name in self.components if name in early for line in self._started(name)),
+            *(
+                f"if (start_{i}(it, it->start_time, error)) return -1;"
+                for i, name in enumerate(self.components)
+                if name in early
+            ),
             "changed = settle(it, 1, error);",
             f"while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
             "return changed;",
         ]  # fmt: skip
         return "\n\n".join(
             (
+                *(part for name in self.components for part in self._fed(name)),
                 "/* Hands values along all connections once: 1 where one has changed, 0, or -1 where a\n"
                 " * component refuses. */\n"
                 + function(
                     "static int settle(simulation *it, int everything, Error *error)",
-                    [*map(_negative, settled), "return changed;"],
+                    [*settled, "return changed;"],
                 ),
                 "/* Lets values come to rest at the start: 0, 1 where they do not, or -1 where a component\n"
                 " * refuses. */\n"
                 + function(
                     "static int come_to_rest(simulation *it, Error *error)",
-                    list(map(_negative, lines)),
-                    ("error", "t"),
+                    lines,
                 ),
             )
         )
 
-    def _started(self, name: str) -> list[str]:
-        member = self.members[name]
-        return [
-            f"{self.kind(name).name}_start(&it->{member}, t, error);",
-            self._refusal(name, START),
-            *([f"it->{member}_shown = it->{member}.outputs;"] if name in self.slow else []),
-        ]
+    def _fed(self, name: str) -> Iterator[str]:
+        """What feeds a component, and what starts it."""
+        i, taken = self.components.index(name), list[str]()
+        member = f"it->{self.members[name]}"
+        for connection in self.plan.system.feeding[name]:
+            target = self.columns[connection.target]
+            take = "take" if target.type == FLOAT else "take_whole"
+            taken.append(f"is_other |= {take}(&{target.text}, {self.value(connection, 'now')});")
+        yield f"/* Lets {closed(name)} take what feeds it now; whether it is anything else. */\n" + function(
+            f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
+            ["int is_other = 0;", *taken, "return is_other;"],
+            ("it", "now", "error"),
+        )
+        yield "/* Starts it; whether it refuses. */\n" + function(
+            f"static int start_{i}(simulation *it, double t, Error *error)",
+            [
+                *self.checked_inputs(name),
+                *([f"it->started[{i}] = t;"] * self.alters),
+                f"{self.kind(name).name}_start(&{member}, t, error);",
+                self._refusal(name, START),
+                *([f"{member}_shown = {member}.outputs;"] if name in self.slow else []),
+                "return 0;",
+            ],
+        )
 
     def _refusal(self, name: str, call: str) -> str:
         return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
@@ -904,10 +917,6 @@ def _waits(function: tree.Function) -> bool:
 
 def _as(place: Place, value: float) -> float:
     return int(value) if is_whole(place.type) else float(value)
-
-
-def _negative(line: str) -> str:
-    return line.replace("return refused(", "return -refused(")
 
 
 def _lower(name: str) -> str:

@@ -279,10 +279,8 @@ export class Page {
       return;
     }
     const failures = this.#each(({ failure }) => (failure === undefined ? [] : [failure]));
-    this.#refuse(
-      failures.join("; "),
-      this.#each(({ remark }) => (remark === undefined ? [] : [remark])).join("\n"),
-    );
+    const said = this.#each(({ remark, messages }) => [...(remark ? [remark] : []), ...messages]);
+    this.#refuse(failures.join("; "), said.join("\n"));
     this.#draw();
   }
 

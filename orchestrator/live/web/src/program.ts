@@ -49,6 +49,8 @@ export interface Run {
   /** Rows and what has happened, in the memory: the next run overwrites them. */
   readonly table: Float64Array;
   readonly happened: Float64Array;
+  /** When the guards of components first started their states over; less than 0: none did. */
+  readonly restarts: Float64Array;
 }
 
 type Function = (...args: number[]) => number;
@@ -69,14 +71,15 @@ export class Module {
     values: Float64Array,
     { step, stopTime, fullSteps, steps }: Times,
     width: number,
+    components: number,
     agenda: Agenda,
   ): Run {
     const call = (name: string) => this.exports[`p${number}_${name}`] as Function;
     const size = Math.ceil(call("size_of_simulation")() / REAL);
     const { n, events, actions, listed } = agenda;
-    const sizes = [size, size, 2, values.length, events.length, actions.length, listed];
+    const sizes = [size, size, 2, components, values.length, events.length, actions.length, listed];
     const places = this.lay([...sizes, (steps + 1) * width]);
-    const [simulation, ahead, failure, given, first, second, happened, rows] = places;
+    const [simulation, ahead, failure, restarts, given, first, second, happened, rows] = places;
     this.doubles(given, values.length).set(values);
     this.doubles(first, events.length).set(events);
     this.doubles(second, actions.length).set(actions);
@@ -88,6 +91,7 @@ export class Module {
       : 1;
     call("failure")(simulation, failure);
     const [component, kind, port, made] = new Int32Array(this.memory.buffer, failure, 4);
+    call("restarts")(simulation, restarts);
     const shown = call("rows_shown")(simulation);
     return {
       outcome: OUTCOMES[outcome],
@@ -95,6 +99,7 @@ export class Module {
       rows: shown,
       table: this.doubles(rows, shown * width),
       happened: this.doubles(happened, listed),
+      restarts: this.doubles(restarts, components),
     };
   }
 

@@ -53,6 +53,7 @@ export class Engine {
       Float64Array.from(numbers),
       experiment,
       1 + layout.names.length,
+      layout.components.size,
       agendaOf(events, layout),
     );
     if (found.rows === 0 && found.outcome === "refused")
@@ -65,6 +66,7 @@ export class Engine {
       copied(found.table, spare),
       parameters,
       happened,
+      messages(loop, found.restarts),
       found.outcome === "refused"
         ? `stopped at ${last}: ${whyRefused(found.refused, loop)}`
         : undefined,
@@ -147,6 +149,13 @@ function whyRefused({ component, call, port }: Refused, { ports, parameters }: L
   }
 }
 
+/** What components say of states that were started over. */
+function messages({ restarted }: LoopData, restarts: Float64Array): string[] {
+  return Object.entries(restarted).flatMap(([name, text], i) =>
+    restarts[i] < 0 ? [] : [`${name}: ${text.replace("{}", general(restarts[i]))}`],
+  );
+}
+
 /** Rows of their own, in the memory of a result that nothing shows any more. */
 function copied(rows: Float64Array, spare: Result | undefined): Float64Array {
   // Megabytes that were never written take longer than all steps.
@@ -173,6 +182,7 @@ class Table implements Result {
     readonly table: Float64Array,
     readonly parameters: Values,
     readonly happened: readonly Occurrence[],
+    readonly messages: readonly string[],
     failure: string | undefined,
     remark: string | undefined,
   ) {

@@ -103,6 +103,8 @@ export interface LoopData {
   readonly ports: Readonly<
     Record<string, { readonly input: readonly string[]; readonly output: readonly string[] }>
   >;
+  /** What each component says when its state is started over, with `{}` for the time. */
+  readonly restarted: Readonly<Record<string, string>>;
   /** The only step that its program can make [s]; absent: any. */
   readonly fixedStep?: number;
   /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
@@ -191,6 +193,8 @@ export interface Result {
   /** Values of all parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
+  /** What components say, `controller: ...`. */
+  readonly messages: readonly string[];
   /** Why the run has not come to its end; the rows before that are there. */
   readonly failure?: string;
   /** Why it has ended early without a failure. */

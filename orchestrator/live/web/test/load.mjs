@@ -75,6 +75,7 @@ const loop = (label, controller, more) => ({
   head: { order: null, vehicles: null, absent: [], only: [], wires: {} },
   program: [0, 0],
   ports: {},
+  restarted: {},
   actingRow: 0,
   parameters: [...gains, ...ofPlant],
   events,

@@ -15,12 +15,13 @@ for (const { name, stopTime, step, events, loops } of content.presets) {
   for (const [i, loop] of loops.entries()) {
     const result = made.run(loop, {}, { stopTime, step, events: loop.events[events] ?? [] });
     writeFileSync(`${folder}/${name}.${i}`, result.table);
-    const { columns, happened, failure, remark } = result;
+    const { columns, happened, failure, remark, messages } = result;
     found[`${name}.${i}`] = {
       columns,
       happened,
       failure,
       remark,
+      messages,
       metrics: loop.vehicles.map((vehicle) =>
         metrics(result, vehicle, loop.vehicles, content.lastSeconds),
       ),
