@@ -32,6 +32,13 @@ FLAGS = (
     "-std=c99", "-O2", *SAME_NUMBERS, "-fPIC", "-fvisibility=hidden", "-shared", "-s",
 )  # fmt: skip
 
+#: What functions of a library are marked with that others call.
+EXPORTED = (
+    ("-DEXPORTED=__declspec(dllexport)",)
+    if sys.platform == "win32"
+    else ('-DEXPORTED=__attribute__((visibility("default")))',)
+)
+
 #: Nothing here unwinds the stack, except the C library of Windows, half of a library there, which
 #: is compiled with the same options: the ones for a small library.
 _NO_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")

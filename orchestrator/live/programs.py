@@ -62,7 +62,7 @@ class Programs:
         return (self._numbers[written], text) if written in self._numbers else None
 
     def _text(self, run: Prepared, definitions: Mapping[str, Definition]) -> Text:
-        return Text(run.plan, definitions, alters=True, equations=self._equations)
+        return Text(run.plan, definitions, alters=True, shared=self._equations)
 
 
 def definitions_of_run(run: Prepared) -> Mapping[str, Definition]:

@@ -14,6 +14,7 @@ import numpy as np
 
 from fmus.language.types import FLOAT
 from fmus.native.emit import number_in_c
+from fmus.native.pieces import Place
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.hooks.events import (
     MOST_LISTED,
@@ -30,7 +31,7 @@ from orchestrator.master.hooks.events import (
 from orchestrator.master.observers.observer import Occurrence
 from orchestrator.master.plan import Plan
 from orchestrator.master.row import FACTOR, OFFSET
-from orchestrator.program.kind import Kind, Place
+from orchestrator.program.kind import Kind
 from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear
 
@@ -155,7 +156,9 @@ def tables_of(text: Text) -> str:
     inputs = []
     for name in text.inputs:
         change = fed.get(name)
-        factor, offset = change if isinstance(change, Linear) else (FACTOR, OFFSET)
+        factor, offset = FACTOR, OFFSET
+        if isinstance(change, Linear):
+            factor, offset = change.factor, change.offset
         numbers = f"{number_in_c(factor)}, {number_in_c(offset)}"
         inputs.append(f"    {{{places[name]}, {int(name in fed)}, {numbers}}},")
     components = {name: i for i, name in enumerate(text.components)}

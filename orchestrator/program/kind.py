@@ -9,13 +9,13 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 from auv_fmu.paper import euler
 from fmus.language.tree import Function
-from fmus.language.types import FLOAT, Array, Scalar, Type, type_of
-from fmus.native.emit import Emitter, closed, lines_of, members, number_in_c, unbroken
+from fmus.language.types import FLOAT, Scalar, Type, type_of
+from fmus.native.emit import Emitter, closed, number_in_c, unbroken
 from fmus.native.names import in_c
+from fmus.native.pieces import function, initializer, scalars
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
 from fmus.ports.port import H_MAX, Port
@@ -39,41 +39,6 @@ _MANY = 4
 
 #: A number so large that whatever it is multiplied by shows, unless that is zero.
 _LARGE = "1e300"
-
-
-class Place(NamedTuple):
-    """A number of a program: where it lies, and its type."""
-
-    text: str  #: after the name of the simulation
-    type: Scalar
-
-
-def scalars(type_: Type, text: str) -> Iterator[Place]:
-    """All numbers in a value, in their order."""
-    if isinstance(type_, Scalar):
-        yield Place(text, type_)
-    for suffix, part in members(type_):
-        yield from scalars(part, text + suffix)
-
-
-def initializer(type_: Type, texts: Iterator[str]) -> str:
-    """A value from the texts of its numbers."""
-    if isinstance(type_, Scalar):
-        return next(texts) if type_ == FLOAT else f"(int){next(texts)}"
-    parts = ", ".join(initializer(part, texts) for _, part in members(type_))
-    return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
-
-
-def function(head: str, lines: Sequence[str], arguments: Sequence[str] = ("error",)) -> str:
-    """A function of statements; arguments that it does not use are marked so."""
-    text = "\n".join(line for one in lines for line in _indented(one))
-    unused = [f"    (void){name};\n" for name in arguments if not re.search(rf"\b{name}\b", text)]
-    return f"{head} {{\n{''.join(unused)}{text}\n}}"
-
-
-def _indented(line: str) -> list[str]:
-    inner = line.lstrip()
-    return lines_of(inner, " " * (4 + len(line) - len(inner)))
 
 
 @dataclass
@@ -186,7 +151,9 @@ class Kind:
             rows.append("int is_noisy; /* whether it makes a difference what is drawn */")
             rows += ["int is_seeded;", "generator noise;"]
         body = "\n".join(f"    {row}" for row in rows)
-        return f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
+        return (
+            f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
+        )
 
     def _derive(self, state: str, time: str) -> list[str]:
         if not self.said.derived:

@@ -14,7 +14,7 @@ from threading import local
 import numpy as np
 from fmpy import platform_tuple, sharedLibraryExtension
 
-from fmus.compilers import LIMIT_OF_ZIG, SAME_NUMBERS
+from fmus.compilers import EXPORTED, LIMIT_OF_ZIG, SAME_NUMBERS
 from orchestrator.machine.cache import made_once, read_cached
 from orchestrator.machine.children import Compiler, compile_library, find_compiler, run_module
 from orchestrator.machine.disk import process_folder
@@ -32,7 +32,7 @@ _TOGETHER = ("-fno-builtin-sin", "-fno-builtin-cos")
 FLAGS = (
     "-std=c99", "-O3", "-fno-math-errno", *(flag for flag in SAME_NUMBERS if flag not in _TOGETHER),
     "-fPIC", "-fvisibility=hidden", "-shared", "-s", "-w",
-    *(() if sys.platform == "win32" else ('-DEXPORTED=__attribute__((visibility("default")))',)),
+    *EXPORTED,
 )  # fmt: skip
 
 #: Beside them, for ziglang: any processor of this kind, where it would take this very one.
@@ -43,9 +43,7 @@ def best_compiler() -> Compiler | None:
     """Find ziglang, whose programs are faster, or else this machine's compiler."""
     if find_spec("ziglang") is None:
         return find_compiler()
-    return lambda *given: run_module(
-        "ziglang", "cc", _ANY_PROCESSOR, *given, timeout=LIMIT_OF_ZIG
-    )
+    return lambda *given: run_module("ziglang", "cc", _ANY_PROCESSOR, *given, timeout=LIMIT_OF_ZIG)
 
 
 @dataclass(frozen=True)
@@ -201,11 +199,13 @@ def compiled(source: Source) -> bytes:
     compiler = best_compiler()
     if compiler is None:
         raise InputError(
-            "to compile a program takes a C compiler: install gcc or clang, or `pip install ziglang`"
+            "a program needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
     file = process_folder() / f"{source.key}.c"
     file.write_text(source.text, encoding="utf-8")
     try:
-        return compile_library(compiler, *FLAGS, str(file), *(() if sys.platform == "win32" else ("-lm",)))
+        return compile_library(
+            compiler, *FLAGS, str(file), *(() if sys.platform == "win32" else ("-lm",))
+        )
     finally:
         file.unlink(missing_ok=True)

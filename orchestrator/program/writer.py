@@ -13,6 +13,7 @@ import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 from auv_fmu.paper import euler
 from fmus.language import tree
@@ -20,6 +21,8 @@ from fmus.language.build import Program
 from fmus.language.types import FLOAT, Array, Type, is_whole
 from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
+from fmus.native.pieces import Place, function, scalars
+from fmus.native.reducer import ReducerText
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
@@ -28,8 +31,8 @@ from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Order
 from orchestrator.master.plan import Plan, stages
 from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Stages, Visit, stages_of
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
-from orchestrator.program.kind import EULER, Kind, Place, function, scalars
-from orchestrator.program.reducing import Looking, ReducerText
+from orchestrator.program.kind import EULER, Kind
+from orchestrator.program.reducing import Looking
 from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName, listed
@@ -205,10 +208,11 @@ class Equations:
         """
         distinct = [*dict.fromkeys(definitions)]
         hooks = {one: one.behaviour.hooks for one in distinct}
+        euler: Any = EULER
         by_identity = {id(one): one for one in reducers}
         program = Program(
             *(hook for one in distinct for hook in hooks[one].values() if hook),
-            *EULER,
+            *euler,
             *(hook for one in by_identity.values() for hook in one.hooks.values()),
         )
         program.check()
@@ -217,7 +221,7 @@ class Equations:
         # What waits for a number would wait for ever for one that is none.
         self.is_quick = is_quick and not any(map(_waits, functions))
         self.emitter = Emitter(functions)
-        self._euler = {one.__name__: program.function(one) for one in EULER}
+        self._euler = {one.__name__: program.function(one) for one in euler}
         self.kinds = {
             one: Kind(
                 one,
@@ -281,12 +285,17 @@ class Equations:
 
     @cached_property
     def _structures(self) -> list[str]:
-        return [one.structure() for one in (*self.kinds.values(), *self.reducers.values())]
+        return [
+            *(one.structure() for one in self.kinds.values()),
+            *(one.structure() for one in self.reducers.values()),
+        ]
 
     @cached_property
     def _functions(self) -> list[str]:
-        all_ = (*self.kinds.values(), *self.reducers.values())
-        return [part for one in all_ for part in one.text()]
+        return [
+            *(part for one in self.kinds.values() for part in one.text()),
+            *(part for one in self.reducers.values() for part in one.text()),
+        ]
 
 
 def head_of(equations: Equations) -> str:
@@ -311,7 +320,7 @@ class Text:
         alters: whether events can happen in it.
         is_quick: whether all that has been computed is checked at once, when a row is shown; that
             does not tell which component has refused.
-        equations: of its components, which several programs may share.
+        shared: equations that it shares with other programs; None: it has its own.
 
     """
 
@@ -322,7 +331,7 @@ class Text:
     is_hosted: bool = False
     alters: bool = False
     is_quick: bool = False
-    equations: Equations | None = None
+    shared: Equations | None = None
     #: Functions of connections that map values, by what follows their names.
     mappings: dict[str, str] = field(default_factory=dict)
 
@@ -349,14 +358,13 @@ class Text:
         self.components = [*system.components]
         self.members = dict(zip(self.components, _distinct(self.components), strict=True))
         self.slow = [name for name, n in self.plan.decimations.items() if n > 1]
-        if self.equations is None:
-            self.equations = Equations(
-                (self.definitions[name] for name in self.components),
-                [one.reducer for one in self.indices],
-                self.is_tuned,
-                self.is_quick,
-                self._foreseen,
-            )
+        self.equations = self.shared or Equations(
+            (self.definitions[name] for name in self.components),
+            [one.reducer for one in self.indices],
+            self.is_tuned,
+            self.is_quick,
+            self._foreseen,
+        )
         self.is_quick = self.equations.is_quick
         self.emitter, self.kinds = self.equations.emitter, self.equations.kinds
         self.reducers = self.equations.reducers
@@ -568,14 +576,14 @@ class Text:
         return "\n\n".join(
             (
                 *(part for name in self.components for part in self._fed(name)),
-                "/* Hands values along all connections once: 1 where one has changed, 0, or -1 where a\n"
-                " * component refuses. */\n"
+                "/* Hands values along all connections once: 1 where one has changed, 0, or -1\n"
+                " * where a component refuses. */\n"
                 + function(
                     "static int settle(simulation *it, int everything, Error *error)",
                     [*settled, "return changed;"],
                 ),
-                "/* Lets values come to rest at the start: 0, 1 where they do not, or -1 where a component\n"
-                " * refuses. */\n"
+                "/* Lets values come to rest at the start: 0, 1 where they do not, or -1 where a\n"
+                " * component refuses. */\n"
                 + function(
                     "static int come_to_rest(simulation *it, Error *error)",
                     lines,
@@ -591,10 +599,13 @@ class Text:
             target = self.columns[connection.target]
             take = "take" if target.type == FLOAT else "take_whole"
             taken.append(f"is_other |= {take}(&{target.text}, {self.value(connection, 'now')});")
-        yield f"/* Lets {closed(name)} take what feeds it now; whether it is anything else. */\n" + function(
-            f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
-            ["int is_other = 0;", *taken, "return is_other;"],
-            ("it", "now", "error"),
+        yield (
+            f"/* Lets {closed(name)} take what feeds it now; whether it is anything else. */\n"
+            + function(
+                f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
+                ["int is_other = 0;", *taken, "return is_other;"],
+                ("it", "now", "error"),
+            )
         )
         yield "/* Starts it; whether it refuses. */\n" + function(
             f"static int start_{i}(simulation *it, double t, Error *error)",
@@ -628,7 +639,8 @@ class Text:
         if self.alters:
             changed |= {*found}
             if any(found[one.target].type != FLOAT for one in feeding):
-                yield f"if (error->raised) return refused(it, {self.components.index(name)}, {INPUT}, -1);"
+                number = self.components.index(name)
+                yield f"if (error->raised) return refused(it, {number}, {INPUT}, -1);"
         for i, (port, (target, place)) in enumerate(
             zip(kind.ports["input"], found.items(), strict=True)
         ):
@@ -698,27 +710,33 @@ class Text:
             row = text.row(lambda port, of=of: self._source(of[port.name]))  # type: ignore[misc]
             look = (
                 f"{text.name}_look(&it->index_{i}, {row}, {acts_at_end}, t, h, it->start_time, "
-                "it->stop_time);"
+                "it->stop_time, &(Error){0});"
             )
             if reducer.last is not None:
                 last = number_in_c(reducer.last)
                 look = f"if (t >= time_after(it, it->steps) - {last}) {look}"
             lines.append(look)
-            gives.append(
-                f"raised += {text.name}_give(&it->index_{i}, it->looked, it->start_time, it->stop_time, "
-                f"found + {n});"
-            )
+            gives += [
+                f"raised += it->index_{i}.begun < 0;",
+                f"{text.name}_give(&it->index_{i}, it->looked, it->start_time, it->stop_time, "
+                f"found + {n}, error);",
+            ]
             n += sum(map(len, reducer.results.values()))
         lines.append("it->looked = t;")
         return [
             "/* Lets indices look at a row. */\n"
             + function("static void look(simulation *it, double t)", lines, ()),
             f"enum {{ INDICES = {n} }};\n\n"
-            "/* The indices of the rows so far, what is not there is not a number; how many have raised.\n"
-            " */\n"
+            "/* The indices of the rows so far, what is not there is not a number; how many have\n"
+            " * raised. */\n"
             + function(
                 "EXPORTED int indices(const simulation *it, double found[])",
-                ["int raised = 0;", *gives, "return raised;"],
+                [
+                    "Error noted = {0}, *error = &noted;",
+                    "int raised = 0;",
+                    *gives,
+                    "return raised + noted.raised;",
+                ],
                 (),
             ),
         ]
@@ -775,13 +793,13 @@ class Text:
         if passing is not None:
             parts.append(self._made("pass", "Lets values of t_k pass", passing, ()))
         end = self._end("it->start_time")
-        counted = "const int is_counted = k < it->full_steps && it->start_time == 0.0;"
-        begin = [
-            "const double h = length_of(it, k, 1);",
-            # What a host that counts its steps would reach.
-            *([] if self.is_hosted else [counted]),
-            f"const double end = {'' if self.is_hosted else 'is_counted ? time_after(it, k + 1) : '}{end};",
-        ] * (not self.alters)
+        begin = ["const double h = length_of(it, k, 1);"]
+        if not self.is_hosted:
+            # What a host that counts its steps reaches.
+            begin.append("const int is_counted = k < it->full_steps && it->start_time == 0.0;")
+            end = f"is_counted ? time_after(it, k + 1) : {end}"
+        begin.append(f"const double end = {end};")
+        begin = [] if self.alters else begin
         doc = "Makes the step after the k-th"
         if self.is_quick:
             parts.append(self._sound())
@@ -948,28 +966,30 @@ def _copies(values: Sequence[tuple[str, str]], arrays: Mapping[str, str] = {}) -
 
 def _follows(one: tuple[str, str], other: tuple[str, str]) -> bool:
     """Whether two assignments are of neighbours."""
-    found = [(_ELEMENT.fullmatch(a), _ELEMENT.fullmatch(b)) for a, b in zip(one, other, strict=True)]
-    return all(
-        a is not None and b is not None and a[1] == b[1] and a[2] == b[2] and int(b[3]) == int(a[3]) + 1
-        for a, b in found
-    )  # fmt: skip
+    for before, after in zip(one, other, strict=True):
+        a, b = _ELEMENT.fullmatch(before), _ELEMENT.fullmatch(after)
+        if a is None or b is None or a.groups()[:2] != b.groups()[:2]:
+            return False
+        if int(b[3]) != int(a[3]) + 1:
+            return False
+    return True
 
 
 def _copied(run: Sequence[tuple[str, str]], arrays: Mapping[str, str]) -> Iterator[str]:
-    if len(run) == 1:
+    ends = [_ELEMENT.fullmatch(text) for text in run[0]]
+    if len(run) == 1 or ends[0] is None or ends[1] is None:
         yield from (f"{target} = {value};" for target, value in run if target)
         return
-    ends = [_ELEMENT.fullmatch(text) for text in run[0]]
-    (cast, to, at), (cast, of, begin) = ((end[1] or "", end[2], int(end[3])) for end in ends if end)
-    whole = f" of {len(run)}"
-    types = {arrays.get(to.removesuffix(".v"), "a"), arrays.get(of.removesuffix(".v"), "b")}
-    if len(types) == 1 and types.pop().endswith(whole):
-        yield f"{to.removesuffix('.v')} = {of.removesuffix('.v')};"
+    to, of = ends
+    whole = [end[2].removesuffix(".v") for end in (to, of)]
+    types = [arrays.get(text, text) for text in whole]
+    if types[0] == types[1] and types[0].endswith(f" of {len(run)}"):
+        yield f"{whole[0]} = {whole[1]};"
         return
-    places = (f"i + {n}" if n else "i" for n in (at, begin))
-    yield (
-        f"for (int i = 0; i < {len(run)}; i++) {to}[{next(places)}] = {cast}{of}[{next(places)}];"
+    target, value = (
+        f"{end[1] or ''}{end[2]}[i + {end[3]}]".replace(" + 0]", "]") for end in (to, of)
     )
+    yield f"for (int i = 0; i < {len(run)}; i++) {target} = {value};"
 
 
 def _distinct(names: Sequence[str]) -> list[str]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cache, cached_property
 from itertools import chain
 from math import inf, isnan
@@ -19,7 +19,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment, Order, decimations
 from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import Plan, code_of, make_plan
+from orchestrator.master.plan import code_of, make_plan
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
 from orchestrator.program.reducing import looking_at
@@ -37,8 +37,8 @@ from orchestrator.vehicle.cautions import (
     values_of,
 )
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, smallest_of
-from orchestrator.vehicle.indices import INDICES, Index, prefixed
-from orchestrator.vehicle.signals import Loop, loops_of
+from orchestrator.vehicle.indices import INDICES, prefixed
+from orchestrator.vehicle.signals import loops_of
 
 #: What makes every system.
 _OTHER = "use --engine fmu"
@@ -206,7 +206,8 @@ class _Known:
         own, changed = self._values, point.parameters
 
         def value(name: str) -> Value | None:
-            return changed[name] if name in changed else own(name)
+            found: Value | None = changed[name] if name in changed else own(name)
+            return found
 
         found = cautions(value, point.step, self.loops)
         for loop, places in zip(self.loops, ready.watched, strict=True):
@@ -223,6 +224,7 @@ class _Known:
         """Without modules, which other machines need not have, but with what is compiled."""
         return {**self.__dict__, "_definitions": None, "_parameters": None}
 
+
 def _number(one: _Parameter, value: Any) -> float:
     """The number of a parameter's value.
 
@@ -230,7 +232,7 @@ def _number(one: _Parameter, value: Any) -> float:
         Refusal: the component would refuse it.
 
     """
-    given = one.items.get(value, value) if isinstance(value, str) else value
+    given: Any = one.items.get(value, value) if isinstance(value, str) else value
     return float(one.port.checked(given))
 
 
@@ -280,7 +282,7 @@ class BatchEngine:
         except InputError as error:
             raise InputError(f"{point.scenario}: {error}; {_OTHER}") from None
 
-    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Iterable[Point]) -> Iterator[Outcome]:
         """Make some runs, in their order."""
         for point in points:
             yield self._outcome(point)
@@ -337,7 +339,9 @@ class BatchEngine:
             for variable in component.having("parameter")
             for name in (PortName(component.name, variable.name),)
         }
-        return Table.of(Header(ready.source.columns, experiment, parameters), rows, Ending(None))
+        return Table.of(
+            Header(tuple(ready.source.columns), experiment, parameters), rows, Ending(None)
+        )
 
 
 def _experiment(point: Point) -> Experiment:

@@ -214,9 +214,7 @@ def _task(block: list[Point], limit: float) -> Answer:
     return answer(_engine[0], block, limit)
 
 
-def answer(
-    engine: Engine, points: list[Point], limit: float, ends: Event | None = None
-) -> Answer:
+def answer(engine: Engine, points: list[Point], limit: float, ends: Event | None = None) -> Answer:
     """Make runs, or the first of them where all take longer than a limit [s], or nobody waits."""
     start, seconds, outcomes = monotonic(), 0.0, []
     for outcome in engine.outcomes(points):

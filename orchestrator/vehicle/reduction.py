@@ -21,6 +21,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.observers.observer import Header
 from orchestrator.system.values import Value
+from orchestrator.vehicle.compiled_reducers import CompiledReduction, Raised, library_of
 from orchestrator.vehicle.signals import Loop
 
 #: How a double of a row becomes a value of a port, by its type.
@@ -181,6 +182,45 @@ def reductions_of(
     return found
 
 
+class _Interpreted:
+    """A reducer of rows in Python."""
+
+    def __init__(self, reducer: Reducer, sources: Sources, run: Experiment) -> None:
+        self._reducer, self._sources, self._run = reducer, sources, run
+        self._kept: Kept | None = None
+
+    def take(self, rows: np.ndarray) -> None:
+        """Take some rows into account.
+
+        Raises:
+            Raised: by one of them.
+
+        """
+        try:
+            self._kept = reduce_block(self._reducer, self._sources, self._run, rows, self._kept)
+        except Exception as error:
+            # One by one, to say when.
+            for row in rows if len(rows) > 1 else ():
+                self.take(row[np.newaxis])
+            raise Raised(f"{type(error).__name__}: {error}", float(rows[0, 0])) from error
+
+    def found(self) -> list[float]:
+        """The numbers of the results.
+
+        Raises:
+            Raised: by what gives them.
+
+        """
+        assert self._kept is not None
+        of = {"state": self._kept.state, "t": self._kept.time}
+        of |= {"begin": self._run.start_time, "end": self._run.stop_time}
+        given = [of[one] for one in self._reducer.arguments("outputs")]
+        try:
+            return [*_flat(self._reducer.hooks["outputs"](*given))]
+        except Exception as error:
+            raise Raised(f"{type(error).__name__}: {error}", self._kept.time) from error
+
+
 class Reduction:
     """A reducer of a run in progress.
 
@@ -194,8 +234,15 @@ class Reduction:
         self._reducer, self._sources, self._run = reducer, sources, run
         self._columns = [0, *sources.places.values()]
         self._recent: deque[np.ndarray] = deque()
-        self._kept: Kept | None = None
+        self._reducing, self._has_rows = self._begun(), False
         self.failure = ""
+
+    def _begun(self) -> _Interpreted | CompiledReduction:
+        library = library_of(self._reducer)
+        if library is None:
+            return _Interpreted(self._reducer, self._sources, self._run)
+        places = {name: i for i, name in enumerate(self._sources.places, 1)}
+        return CompiledReduction(library, self._reducer, places, self._sources.constants, self._run)
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows of the run into account."""
@@ -208,37 +255,32 @@ class Reduction:
             self._recent.popleft()
 
     def _reduce(self, rows: np.ndarray) -> None:
-        if self.failure:
+        if self.failure or not len(rows):
             return
+        self._has_rows = True
         try:
-            self._kept = reduce_block(self._reducer, self._sources, self._run, rows, self._kept)
-        except Exception as error:
-            # One by one, to say when.
-            for row in rows if len(rows) > 1 else ():
-                self._reduce(row[np.newaxis])
-            self._fail(error, rows[0, 0])
+            self._reducing.take(rows)
+        except Raised as error:
+            self._fail(error)
 
-    def _fail(self, error: Exception, t: float) -> None:
-        said = f"at t = {t:g} s: {type(error).__name__}: {error}"
-        self.failure = self.failure or f"{self._reducer.name}: {said}"
+    def _fail(self, error: Raised) -> None:
+        self.failure = f"{self._reducer.name}: at t = {error.time:g} s: {error}"
 
     def found(self) -> dict[str, list[float]]:
         """The members of its indices by their names; what is not a number is not there."""
         if self._recent and self._reducer.last is not None:
             rows = np.vstack(self._recent)
-            self._kept = None
+            self._reducing = self._begun()
             self._reduce(rows[rows[:, 0] >= rows[-1, 0] - self._reducer.last])
-        if self.failure or self._kept is None:
+        if self.failure or not self._has_rows:
             return {}
-        of = {"state": self._kept.state, "t": self._kept.time}
-        of |= {"begin": self._run.start_time, "end": self._run.stop_time}
-        given = [of[one] for one in self._reducer.arguments("outputs")]
         try:
-            outputs = self._reducer.hooks["outputs"](*given)
-        except Exception as error:
-            self._fail(error, self._kept.time)
+            numbers = iter(self._reducing.found())
+        except Raised as error:
+            self._fail(error)
             return {}
-        values = {name: list(_flat(getattr(outputs, name))) for name in self._reducer.results}
+        results = self._reducer.results.items()
+        values = {name: [next(numbers) for _ in ports] for name, ports in results}
         return {name: found for name, found in values.items() if not all(map(isnan, found))}
 
 

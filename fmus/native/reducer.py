@@ -1,0 +1,162 @@
+"""Indices in C: what takes a row after the other, and gives numbers at the end."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from fmus.language.build import Program
+from fmus.language.types import type_of
+from fmus.native.emit import Emitter
+from fmus.native.pieces import function, initializer, scalars
+from fmus.ports.port import Port
+from fmus.ports.reducer import Reducer
+
+#: Where a row has the value of a port, as an expression in C.
+Source = Callable[[Port], str]
+
+
+@dataclass(frozen=True)
+class ReducerText:
+    """An index in C.
+
+    Attributes:
+        reducer: what it says.
+        program: with its hooks as trees.
+        emitter: of all equations.
+        name: of its structure, and what its functions begin with.
+
+    """
+
+    reducer: Reducer
+    program: Program
+    emitter: Emitter
+    name: str
+
+    def structure(self) -> str:
+        """Its structure."""
+        state, row = map(self._type, (self.reducer.state, self.reducer.inputs))
+        before = f"    {row} before; /* the last row */\n" if self._looks_back else ""
+        return (
+            f"typedef struct {{\n    int begun; /* -1: it has raised */\n    {state} state;\n"
+            f"{before}}} {self.name};"
+        )
+
+    def text(self) -> Iterator[str]:
+        """What takes a row, and what gives its numbers."""
+        row, found = self._type(self.reducer.inputs), self._type(self.reducer.outputs)
+        start, update = self._call("start"), self._call("update", state="it->state")
+        lines = [
+            "if (it->begun < 0) return;",
+            "if (it->begun > 0) {",
+        ]
+        if self._looks_back:
+            lines.append(f"    const {row} before = it->before;")
+        if "acting" in self.reducer.arguments("update"):
+            lines.append(f"    const {row} acting = acts_at_end ? inputs : before;")
+        lines += [
+            f"    it->state = {update};",
+            "} else {",
+            f"    it->state = {start};",
+            "}",
+            "it->begun = error->raised ? -1 : 1;",
+            *(["it->before = inputs;"] if self._looks_back else []),
+        ]
+        yield function(
+            f"APART void {self.name}_look({self.name} *it, {row} inputs, int acts_at_end,\n"
+            "                 double t, double h, double begin, double end, Error *error)",
+            lines,
+            ("acts_at_end", "t", "h", "begin", "end"),
+        )
+        results = [port for ports in self.reducer.results.values() for port in ports]
+        numbers = (place.text for place in scalars(type_of(self.reducer.outputs), "all"))
+        lines = [
+            f"for (int i = 0; i < {len(results)}; i++) found[i] = NAN;",
+            "if (it->begun < 1) return;",
+            f"const {found} all = {self._call('outputs', state='it->state')};",
+            *(f"found[{i}] = {text};" for i, text in enumerate(numbers)),
+        ]
+        yield "/* Gives the numbers, which are none before the first row. */\n" + function(
+            f"APART void {self.name}_give(const {self.name} *it, double t, double begin,\n"
+            "                 double end, double found[], Error *error)",
+            lines,
+            ("t", "begin", "end", "error"),
+        )
+
+    @property
+    def _looks_back(self) -> bool:
+        """Whether it takes the row before."""
+        return not {"before", "acting"}.isdisjoint(self.reducer.arguments("update"))
+
+    def row(self, source: Source) -> str:
+        """A row, whose numbers come from a source."""
+        places = map(source, self.reducer.ports)
+        type_ = type_of(self.reducer.inputs)
+        return f"({self.emitter.type(type_)}){initializer(type_, places)}"
+
+    def _type(self, hint: object) -> str:
+        return self.emitter.type(type_of(hint))
+
+    def _call(self, hook: str, **given: str) -> str:
+        function = self.program.function(self.reducer.hooks[hook])
+        return self.emitter.call(function, [given.get(one, one) for one in function.arguments])
+
+
+_ROWS = """\
+/* What is kept of rows that come in blocks, and when the last one was [s]. */
+typedef struct {{
+    {name} of;
+    double time;
+}} kept;
+
+EXPORTED size_t size_of_rows(void) {{ return sizeof(kept); }}
+
+EXPORTED size_t size_of_error(void) {{ return sizeof(Error); }}
+
+EXPORTED const char *why(const Error *error) {{ return error->why.text; }}
+
+/* Takes n rows of a width; how many were taken before one raised. */
+EXPORTED int take(kept *it, const double rows[], int n, int width, const int from[],
+                  const double constants[], int acts_at_end, double begin, double end,
+                  Error *error) {{
+    error->raised = 0;
+    for (int k = 0; k < n; k++, rows += width) {{
+        const double t = rows[0], h = t - it->time;
+        {name}_look(&it->of, {row},
+            acts_at_end, t, h, begin, end, error);
+        if (error->raised) return k;
+        it->time = t;
+    }}
+    return n;
+}}
+
+/* Gives the numbers; whether that raised. */
+EXPORTED int give(const kept *it, double begin, double end, double found[], Error *error) {{
+    error->raised = 0;
+    {name}_give(&it->of, it->time, begin, end, found, error);
+    return error->raised;
+}}
+"""
+
+
+def text_over_rows(reducer: Reducer) -> str:
+    """An index in C over rows of any run: which columns it takes, the caller says.
+
+    Raises:
+        Untranslatable: it is outside the language of equations.
+
+    """
+    program = Program(*reducer.hooks.values())
+    program.check()
+    emitter = Emitter(program.functions.values())
+    one = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
+    places = {port.name: k for k, port in enumerate(reducer.ports)}
+    row = one.row(lambda port: _PLACE.format(places[port.name]))
+    functions = [*one.text()]
+    head = '#include "arithmetic.h"\n\n#define APART static'
+    rows = _ROWS.format(name=one.name, row=row)
+    return "\n\n".join([head, emitter.text(), one.structure(), *functions, rows])
+
+
+#: A value of a row, or one that never changes.
+_PLACE = "from[{0}] < 0 ? constants[{0}] : rows[from[{0}]]"
