@@ -976,19 +976,16 @@ def _follows(one: tuple[str, str], other: tuple[str, str]) -> bool:
 
 
 def _copied(run: Sequence[tuple[str, str]], arrays: Mapping[str, str]) -> Iterator[str]:
-    ends = [_ELEMENT.fullmatch(text) for text in run[0]]
-    if len(run) == 1 or ends[0] is None or ends[1] is None:
+    ends = [end for end in map(_ELEMENT.fullmatch, run[0]) if end]
+    if len(run) == 1 or len(ends) < 2:
         yield from (f"{target} = {value};" for target, value in run if target)
         return
-    to, of = ends
-    whole = [end[2].removesuffix(".v") for end in (to, of)]
+    whole = [end[2].removesuffix(".v") for end in ends]
     types = [arrays.get(text, text) for text in whole]
     if types[0] == types[1] and types[0].endswith(f" of {len(run)}"):
         yield f"{whole[0]} = {whole[1]};"
         return
-    target, value = (
-        f"{end[1] or ''}{end[2]}[i + {end[3]}]".replace(" + 0]", "]") for end in (to, of)
-    )
+    target, value = (f"{end[1] or ''}{end[2]}[i + {end[3]}]".replace(" + 0]", "]") for end in ends)
     yield f"for (int i = 0; i < {len(run)}; i++) {target} = {value};"
 
 

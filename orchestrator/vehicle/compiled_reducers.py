@@ -23,6 +23,7 @@ from orchestrator.machine.cache import made_once, read_cached
 from orchestrator.machine.children import compile_library, find_fast_compiler
 from orchestrator.machine.disk import process_folder
 from orchestrator.master.experiment import Experiment
+from orchestrator.system.values import Value
 
 #: Category in the cache.
 CATEGORY = "indices"
@@ -88,7 +89,7 @@ class CompiledReduction:
         library: CDLL,
         reducer: Reducer,
         places: Mapping[str, int],
-        constants: Mapping[str, float],
+        constants: Mapping[str, Value],
         run: Experiment,
     ) -> None:
         """Start with no rows.

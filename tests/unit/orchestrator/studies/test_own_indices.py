@@ -185,12 +185,15 @@ def test_without_a_file_the_name_is_no_number(tmp_path):
         prepare_study(read_study(str(file)), Means(kind="native"))
 
 
-def test_the_batch_engine_makes_none(tmp_path):
+def test_programs_give_what_fmus_give(tmp_path):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     file, _ = study(tmp_path)
-    with pytest.raises(
-        Refused, match=r"settling\.py: engine 'batch' makes no indices of one's own"
-    ):
-        prepare_study(read_study(str(file)), Means("batch", kind="native"))
+    results = [
+        sweep(str(file), engine=engine, kind="native", out=tmp_path / engine)
+        for engine in ("fmu", "batch")
+    ]
+    by_fmus, by_programs = (result["settling"] for result in results)
+    assert by_fmus.tobytes() == by_programs.tobytes()
 
 
 def test_figures_without_indices_of_ones_own_stay_as_they_are():
