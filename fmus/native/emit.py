@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from itertools import groupby
-from math import isinf, isnan
+from math import inf, isinf, isnan
 from typing import Any
 
 from fmus.language import tree
@@ -37,6 +37,7 @@ from fmus.language.types import (
     Record,
     Scalar,
     Type,
+    count,
     is_whole,
 )
 from fmus.native.names import class_in_c, in_c, is_of_library, words_of_runtime
@@ -174,9 +175,16 @@ class Emitter:
 
     """
 
-    def __init__(self, functions: Iterable[Function]) -> None:
-        """Begin with functions, each after those that it calls."""
+    def __init__(self, functions: Iterable[Function], most_copied: float = inf) -> None:
+        """Begin with functions.
+
+        Args:
+            functions: each after those that it calls.
+            most_copied: how many numbers are passed by value; a larger structure by its address.
+
+        """
         functions = [*functions]
+        self._addressed = {one: _addressed(one, most_copied) for one in functions}
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
         self._types: dict[Type | tuple[str, int], str] = {}
@@ -199,7 +207,16 @@ class Emitter:
 
     def call(self, function: Function, arguments: Sequence[str]) -> str:
         """A call, in a function that has an `error` where this one needs it."""
-        return _call(self.names[function], arguments, function.fails)
+        addressed = self.addressed(function)
+        given = [
+            f"&{text}" if name in addressed else text
+            for name, text in zip(function.arguments, arguments)
+        ]
+        return _call(self.names[function], given, function.fails)
+
+    def addressed(self, function: Function) -> frozenset[str]:
+        """The arguments of a function that are passed by their addresses."""
+        return self._addressed[function]
 
     # Names
 
@@ -298,13 +315,14 @@ class _Definition:
 
     def __init__(self, emitter: Emitter, function: Function) -> None:
         self._emitter, self._function = emitter, function
+        self._addressed = emitter.addressed(function)
 
     def text(self) -> str:
         """All of it."""
         emitter, function = self._emitter, self._function
         given = [
             f"const {emitter.type(type_)} *{in_c(name)}"
-            if name == function.by_address
+            if name in self._addressed
             else f"{emitter.declared(type_)}{in_c(name)}"
             for name, type_ in function.arguments.items()
         ]
@@ -334,11 +352,11 @@ class _Definition:
             return unbroken(one.value), _POSTFIX
         if isinstance(one, Local):
             name = in_c(one.name)
-            return f"(*{name})" if one.name == self._function.by_address else name, _POSTFIX
+            return f"(*{name})" if one.name in self._addressed else name, _POSTFIX
         if isinstance(one, tree.Constant):
             return self._emitter.constant(one), _POSTFIX
         if isinstance(one, Field):
-            return f"{self.expression(one.owner, _POSTFIX)}.{in_c(one.name)}", _POSTFIX
+            return f"{self._member(one.owner)}{in_c(one.name)}", _POSTFIX
         if isinstance(one, Item):
             return f"{self._owner(one.owner)}v[{self.expression(one.place)}]", _POSTFIX
         if isinstance(one, Make):
@@ -347,23 +365,40 @@ class _Definition:
             test, this = (self.expression(part, _OR) for part in (one.test, one.one))
             return f"{test} ? {this} : {self.expression(one.other)}", _TERNARY
         if isinstance(one, Call):
-            given = [self.expression(part) for part in one.parts]
-            if one.function.by_address:
-                place = [*one.function.arguments].index(one.function.by_address)
-                given[place] = f"&{given[place]}"
-            return self._emitter.call(one.function, given), _POSTFIX
+            addressed = self._emitter.addressed(one.function)
+            given = [
+                self._address(part) if name in addressed else self.expression(part)
+                for name, part in zip(one.function.arguments, one.parts)
+            ]
+            name = self._emitter.names[one.function]
+            return _call(name, given, one.function.fails), _POSTFIX
         assert isinstance(one, Operation)
         return self._operation(one)
 
+    def _address(self, one: Expression) -> str:
+        """The address of a value."""
+        if isinstance(one, Local) and one.name in self._addressed:
+            return in_c(one.name)
+        root = one
+        while isinstance(root, (Field, Item)):
+            root = root.owner
+        if isinstance(root, (Local, tree.Constant, Make)):
+            return f"&{self.expression(one, _UNARY)}"
+        return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}"
+
+    def _member(self, one: Expression) -> str:
+        """A structure, with the sign before a member of it."""
+        if isinstance(one, Local) and one.name in self._addressed:
+            return f"{in_c(one.name)}->"
+        return f"{self.expression(one, _POSTFIX)}."
+
     def _owner(self, one: Expression) -> str:
         """An array, with the sign before a member of it."""
-        if isinstance(one, Local) and one.name == self._function.by_address:
-            return f"{in_c(one.name)}->"
         root = one
         while isinstance(root, Field):
             root = root.owner
         if not isinstance(root, (Call, Choice)):
-            return f"{self.expression(one, _POSTFIX)}."
+            return self._member(one)
         # In C99, what comes from a function or a choice may end before an element of it is read.
         return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}->"
 
@@ -556,6 +591,13 @@ class _Definition:
             arguments.append(text)
         told = quoted(form).replace(" ", _KEPT)
         return f"raise_error({_list(['error', told, *arguments])});"
+
+
+def _addressed(function: Function, most_copied: float) -> frozenset[str]:
+    """The arguments of a function that are passed by their addresses: it does not change them."""
+    stored = {name for one in tree.statements_in(function.body) for name in tree.stored_in(one)}
+    large = {name for name, type_ in function.arguments.items() if count(type_) > most_copied}
+    return frozenset({function.by_address} | (large - stored)) - {""}
 
 
 def _ends(body: Sequence[Statement]) -> bool:

@@ -41,6 +41,9 @@ from orchestrator.system.units import Linear, Mapped
 #: What a component has refused, where `failure` names one.
 CALLS = START, INPUT, OUTPUTS, STEP, SET = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP", "AT_SET"
 
+#: How many numbers functions are given as they are; of more they get the address.
+_MOST_COPIED = 16
+
 #: Values go along all connections so often at the start, until they rest.
 _MOST_ROUNDS = 1000
 
@@ -220,7 +223,7 @@ class Equations:
         self._is_inlined = is_quick
         # What waits for a number would wait for ever for one that is none.
         self.is_quick = is_quick and not any(map(_waits, functions))
-        self.emitter = Emitter(functions)
+        self.emitter = Emitter(functions, _MOST_COPIED)
         self._euler = {one.__name__: program.function(one) for one in euler}
         self.kinds = {
             one: Kind(
