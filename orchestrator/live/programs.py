@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
+from fmus.language.build import Untranslatable
 from fmus.ports.definition import Definition
 from orchestrator.machine.errors import InputError
 from orchestrator.program.components import definitions_of
@@ -29,8 +30,12 @@ class Programs:
 
         """
         definitions = [definitions_of_run(run) for run in runs]
-        all_ = (one for found in definitions for one in found.values())
-        self._equations = Equations(all_, (), is_tuned=True)
+        all_ = [one for found in definitions for one in found.values()]
+        try:
+            self._equations = Equations(all_, (), is_tuned=True)
+        except Untranslatable as error:
+            name, why = runs[0].scenario.name, str(error).splitlines()[0]
+            raise InputError(f"{name}: the live page cannot run {why}") from None
         self._numbers: dict[str, int] = {}
         #: Of each run, with what must not be another one's identity.
         self._known: dict[int, tuple[Prepared, int, Text]] = {}
