@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
-from fmus.language.build import Untranslatable
 from fmus.ports.definition import Definition
 from orchestrator.machine.errors import InputError
 from orchestrator.program.components import definitions_of
-from orchestrator.program.writer import Equations, Text
+from orchestrator.program.writer import Equations, Text, Unsupported
 from orchestrator.runs.preparation import Prepared
 
 #: The source with the equations.
@@ -33,9 +32,9 @@ class Programs:
         all_ = [one for found in definitions for one in found.values()]
         try:
             self._equations = Equations(all_, (), is_tuned=True)
-        except Untranslatable as error:
-            name, why = runs[0].scenario.name, str(error).splitlines()[0]
-            raise InputError(f"{name}: the live page cannot run {why}") from None
+        except Unsupported as error:
+            name = runs[0].scenario.name
+            raise InputError(f"{name}: the live page cannot run {error}") from None
         self._numbers: dict[str, int] = {}
         #: Of each run, with what must not be another one's identity.
         self._known: dict[int, tuple[Prepared, int, Text]] = {}
