@@ -8,7 +8,7 @@ from functools import cached_property
 from fmus.ports.definition import Definition
 from orchestrator.machine.errors import InputError
 from orchestrator.program.components import definitions_of
-from orchestrator.program.writer import Equations, Text
+from orchestrator.program.writer import Equations, Text, Unsupported
 from orchestrator.runs.preparation import Prepared
 
 #: The source with the equations.
@@ -29,8 +29,12 @@ class Programs:
 
         """
         definitions = [definitions_of_run(run) for run in runs]
-        all_ = (one for found in definitions for one in found.values())
-        self._equations = Equations(all_, (), is_tuned=True)
+        all_ = [one for found in definitions for one in found.values()]
+        try:
+            self._equations = Equations(all_, (), is_tuned=True)
+        except Unsupported as error:
+            name = runs[0].scenario.name
+            raise InputError(f"{name}: the live page cannot run {error}") from None
         self._numbers: dict[str, int] = {}
         #: Of each run, with what must not be another one's identity.
         self._known: dict[int, tuple[Prepared, int, Text]] = {}

@@ -455,7 +455,7 @@ class SystemModel:
             f"enum {{ {counts} }};",
             *self._names(),
             _TOLD.strip(),
-            *([_NOISE.strip()] if any(one.said.draws for one in text.kinds.values()) else []),
+            *([_NOISE.strip()] if text.equations.is_noisy else []),
             _function("put", "const simulation *it, double to[]", self._moved("put")),
             _function("take", "simulation *it, const double from[]", self._taken()),
             _function(

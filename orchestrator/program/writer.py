@@ -17,7 +17,7 @@ from typing import Any
 
 from auv_fmu.paper import euler
 from fmus.language import tree
-from fmus.language.build import Program
+from fmus.language.build import Program, Untranslatable
 from fmus.language.types import FLOAT, Array, Type, is_whole
 from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
@@ -208,6 +208,9 @@ class Equations:
             is_quick: whether what is computed is checked by the program, if it can wait for that.
             foreseen: outputs that others take before their inputs are known.
 
+        Raises:
+            Unsupported: one is outside the language of equations.
+
         """
         distinct = [*dict.fromkeys(definitions)]
         hooks = {one: one.behaviour.hooks for one in distinct}
@@ -218,7 +221,10 @@ class Equations:
             *euler,
             *(hook for one in by_identity.values() for hook in one.hooks.values()),
         )
-        program.check()
+        try:
+            program.check()
+        except Untranslatable as error:
+            raise Unsupported(str(error).splitlines()[0]) from None
         functions = program.functions.values()
         self._is_inlined = is_quick
         # What waits for a number would wait for ever for one that is none.
@@ -342,8 +348,8 @@ class Text:
         """Translate the equations.
 
         Raises:
-            Unsupported: the system has a ring of direct feedthroughs.
-            Untranslatable: a component is outside the language of equations.
+            Unsupported: the system has a ring of direct feedthroughs, or a component is outside
+                the language of equations.
 
         """
         system = self.plan.system

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_fmu.language.variable import Refusal
-from fmus.language.build import Untranslatable
 from fmus.ports.definition import Definition
 from fmus.ports.port import Port
 from orchestrator.machine.errors import InputError
@@ -133,10 +132,7 @@ class _Known:
         reducers = [*dict.fromkeys(index.reducer for index in indices), *WATCHED]
         plan = make_plan(system, Experiment(step * 2.0**20, step, order))
         looking = [[*looking_at(system, loop, reducers)] for loop in self.loops]
-        try:
-            text = Text(plan, self._definitions, [*chain(*looking)], is_quick=True)
-        except Untranslatable as error:
-            raise InputError(str(error).splitlines()[0]) from None
+        text = Text(plan, self._definitions, [*chain(*looking)], is_quick=True)
         groups, watched, first = [], [], 0
         for (_, prefix), looks in zip(prefixed(self.loops), looking, strict=True):
             places: dict[str, int] = {}

@@ -334,6 +334,16 @@ def test_a_component_outside_the_language_is_refused_in_one_line(tmp_path, capsy
     error = capsys.readouterr().err
     assert "other_law: the live page cannot run controller: OtherLaw.fmu is no component" in error
     assert error.count("\n") == 1
+    new_controller("bad_law", tmp_path / "bad")
+    script = tmp_path / "bad" / "bad_law.py"
+    script.write_text(script.read_text().replace("    p, e,", "    assert {1: 2.0}\n    p, e,"))
+    assert main(["build", str(script), "--kind", "python"]) == 0
+    capsys.readouterr()
+    assert main(["live", str(tmp_path / "bad" / "bad_law.toml")]) == 2
+    error = capsys.readouterr().err
+    assert "bad_law.py:" in error
+    assert "a dict is not in the language of equations" in error
+    assert error.count("\n") == 1
 
 
 def test_a_step_that_a_program_cannot_make_is_refused(parts: Parts, tmp_path):
