@@ -867,6 +867,8 @@ class _Builder:
     def _assign(self, target: ast.expr, value: ast.expr, found: list[Statement]) -> None:
         if isinstance(target, ast.Name) and target.id == "_":
             found.append(tree.Do(self.expression(value)))
+        elif isinstance(target, ast.Name) and (change := self._change_of(target, value)):
+            found.append(change)
         elif isinstance(target, ast.Name):
             wanted = (self.known or {}).get(target.id)
             found.append(self._store(target, [(target.id, self.expression(value, wanted))]))
@@ -896,6 +898,25 @@ class _Builder:
             if not _is_fixed(made_of) or _names(target) & _names(value):
                 made_of = self._kept(made_of, self._name_of_all(target, value))
             found += self._take_apart(target, made_of)
+
+    def _change_of(self, target: ast.Name, value: ast.expr) -> Statement | None:
+        """The change of an element, if that is all that a name gets: no copy is needed then."""
+        method = value.func if isinstance(value, ast.Call) else None
+        is_same = (
+            isinstance(method, ast.Attribute) and method.attr == "replaced"
+            and isinstance(method.value, ast.Name) and method.value.id == target.id
+        )  # fmt: skip
+        if not is_same or target.id not in (self.known or {}):
+            return None
+        assert isinstance(value, ast.Call) and isinstance(method, ast.Attribute)
+        owner = self.expression(method.value)
+        if not (isinstance(owner, Local) and is_algebraic(owner.type)):
+            return None
+        self._check_plain(value, method.attr, 2)
+        place, element = self._replacing(value, owner.type)
+        assert isinstance(owner.type, Array)
+        at = Operation(tree.PLACE, (place, int_of(owner.type.n)), INT)
+        return tree.StoreItem(target.id, [at], element)
 
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
         """A name for what is taken apart: the name of the function it comes from."""
@@ -1865,14 +1886,15 @@ class _Builder:
         self._check_plain(node, name, 0 if name == "sum" else 2)
         if name == "sum":
             return arrays.sum_of(self.program.functions, owner)
+        return arrays.replaced(self.program.functions, owner, *self._replacing(node, type_))
+
+    def _replacing(self, node: ast.Call, type_: Type) -> tuple[Expression, Expression]:
+        """The place and the new value of an element, as `replaced` takes them."""
         assert isinstance(type_, Array)
-        place = self.fitting(node.args[0], INT)
-        value = (
-            self._number(node.args[1])
-            if type_.item == FLOAT
-            else self.fitting(node.args[1], type_.item)
-        )
-        return arrays.replaced(self.program.functions, owner, place, value)
+        place, value = node.args
+        is_number = type_.item == FLOAT
+        element = self._number(value) if is_number else self.fitting(value, type_.item)
+        return self.fitting(place, INT), element
 
     def _changed(self, node: ast.Call, owner: Expression) -> Expression:
         """A record with other values of some fields."""

@@ -36,8 +36,10 @@ def solve(A: Matrix, b: Vector) -> Vector:
             if abs(A[i, k]) > abs(A[p, k]):
                 p = i
         pivot, right = A[p] / A[p, k], b[p] / A[p, k]
-        A, b = A.replaced(p, A[k]), b.replaced(p, b[k])
-        A, b = A.replaced(k, pivot), b.replaced(k, right)
+        A = A.replaced(p, A[k])
+        A = A.replaced(k, pivot)
+        b = b.replaced(p, b[k])
+        b = b.replaced(k, right)
         for i in range(len(b)):
             if i != k:
                 factor = A[i, k]
