@@ -294,6 +294,8 @@ class Kind:
             lines.append("it->state = state;")
         if self.is_timed:
             lines.append("it->time = end;")
+            if said.takes("derive", "t") and not self.steps:
+                lines.append("it->underived = 1;")
         if said.draws:
             lines.append(f"if (it->is_noisy) draw_normals(&it->noise, it->draws, {said.draws});")
         if not said.is_sampled and not self.follows_inputs:
