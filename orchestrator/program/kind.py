@@ -13,7 +13,7 @@ from functools import cached_property
 from auv_fmu.paper import euler
 from fmus.language.tree import Function
 from fmus.language.types import FLOAT, Scalar, Type, type_of
-from fmus.native.emit import Emitter, closed, number_in_c, unbroken
+from fmus.native.emit import Emitter, closed, members, number_in_c, unbroken
 from fmus.native.names import in_c
 from fmus.native.pieces import function, initializer, scalars
 from fmus.ports.definition import Definition
@@ -309,13 +309,21 @@ class Kind:
         return self._function("adopt", "", lines or ["(void)it;"])
 
 
+def _has_gaps(type_: Type) -> bool:
+    """Whether records without fields lie in a value, which C gives room."""
+    if isinstance(type_, Scalar):
+        return False
+    parts = [part for _, part in members(type_)]
+    return not parts or any(map(_has_gaps, parts))
+
+
 def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
     """A test of all floats in a value; empty: there is none."""
     places = [*scalars(type_, text)]
     floats = [place.text for place in places if place.type == FLOAT]
     if not floats:
         return ""
-    if _MANY <= len(floats) == len(places):
+    if _MANY <= len(floats) == len(places) and not _has_gaps(type_):
         called = f"{name}((const double *)&{text}, {len(floats)})"
         return called if name == "are_finite" else f"{called} {test}"
     return f"{' + '.join(term.format(one) for one in floats)} {test}"
