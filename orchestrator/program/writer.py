@@ -782,7 +782,6 @@ class Text:
                 "if (it->made == it->steps && it->shown == it->steps) {",
                 "    const int k = it->made;",
                 *(f"    {line}" for line in row),
-                *(f"    {line}" for line in self._unsound()),
                 "}",
             ]
         else:
@@ -795,7 +794,8 @@ class Text:
                 "    it->made = k + 1;",
                 "}",
             ]
-        yield function(_RUN, [*lines, "return 0;"], ())
+        # Steps look at what those before them have computed.
+        yield function(_RUN, [*lines, *self._unsound(), "return 0;"], ())
 
     def _steps(self) -> list[str]:
         passing, parts = self.stages.passing, []
@@ -846,6 +846,9 @@ class Text:
                 lines += [test, *(f"    {line}" for line in inner), "}"]
             else:
                 lines += inner
+        if found is self.stages.stepping and found[-1].decimation is not None:
+            # The last stage, which looks at all, is not in every step.
+            lines += self._unsound()
         return f"/* {doc}; whether a component refuses. */\n" + function(
             f"static int {name}(simulation *it, int k, double t, Error *error)",
             [*lines, "return 0;"],
@@ -867,7 +870,7 @@ class Text:
         visits = [visit for visit in stage.visits if isinstance(visit, Visit)]
         for visit in visits:
             yield from self._visited(visit, stage.decimation.every if stage.decimation else 1)
-        if stage is self.stages.stepping[-1]:
+        if stage is self.stages.stepping[-1] and stage.decimation is None:
             # What was just written is slow to read in another way: outputs are better looked at
             # before they are computed again.
             yield from self._unsound()
