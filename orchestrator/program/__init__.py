@@ -5,6 +5,7 @@ module               what it holds
 ===================  ==============================================================
 :mod:`.components`   what the authors of its components wrote, found by their FMUs
 :mod:`.writer`       the text in C
+:mod:`.noise`        whether noise is added to what is measured, and so may be none
 :mod:`.fmu`          the text as one FMU, to a host that knows nothing of components
 :mod:`.library`      the text compiled, kept and called
 ===================  ==============================================================

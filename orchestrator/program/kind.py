@@ -13,12 +13,13 @@ from functools import cached_property
 from auv_fmu.paper import euler
 from fmus.language.tree import Function
 from fmus.language.types import FLOAT, Scalar, Type, type_of
-from fmus.native.emit import Emitter, closed, number_in_c, unbroken
+from fmus.native.emit import Emitter, closed, members, number_in_c, unbroken
 from fmus.native.names import in_c
 from fmus.native.pieces import function, initializer, scalars
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
 from fmus.ports.port import H_MAX, Port
+from orchestrator.program.noise import is_added
 
 #: Equations of the time step.
 EULER = (euler.internal_steps, euler.end_of_step)
@@ -38,7 +39,7 @@ _NOT_FINITE, _UNSOUND, _TOO_MANY = (
 _MANY = 4
 
 #: A number so large that whatever it is multiplied by shows, unless that is zero.
-_LARGE = "1e300"
+_LARGE = 1e300
 
 
 @dataclass
@@ -234,16 +235,25 @@ class Kind:
         """What begins the noise, unless it is multiplied by zero: then none need be drawn."""
         n, type_ = self.said.draws, self.functions["measured"].returns
         name = self.emitter.type(type_)
+        # They differ, or their difference would not show.
+        large = ", ".join(f"{_LARGE / (1.0 + 0.37 * i)!r}" for i in range(n))
         noisy = [
-            f"const double large[{n}] = {{{', '.join([_LARGE] * n)}}};",
+            "Error other = {0}, *error = &other;",
+            "(void)error;",
+            f"const double large[{n}] = {{{large}}};",
             f"const {name} none = {'0.0' if isinstance(type_, Scalar) else '{0}'};",
             f"const {name} all = {self._measured('large', 'none')};",
             "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
         ]
+        is_tried = not self.is_tuned and is_added(self.functions["measured"], "n", self.said.noisy)
         return [
             "it->is_seeded = 1;",
-            # Parameters that change may let it count.
-            *(["it->is_noisy = 1;"] if self.is_tuned else noisy),
+            # Parameters that change may let it count, and so may what is measured.
+            *(
+                ["{", *(f"    {line}" for line in noisy), "}"]
+                if is_tried
+                else ["it->is_noisy = 1;"]
+            ),
             "if (it->is_noisy) {",
             f"    seed_generator(&it->noise, (uint32_t){self.call('seed')});",
             f"    draw_normals(&it->noise, it->draws, {n});",
@@ -284,6 +294,8 @@ class Kind:
             lines.append("it->state = state;")
         if self.is_timed:
             lines.append("it->time = end;")
+            if said.takes("derive", "t") and not self.steps:
+                lines.append("it->underived = 1;")
         if said.draws:
             lines.append(f"if (it->is_noisy) draw_normals(&it->noise, it->draws, {said.draws});")
         if not said.is_sampled and not self.follows_inputs:
@@ -297,13 +309,21 @@ class Kind:
         return self._function("adopt", "", lines or ["(void)it;"])
 
 
+def _has_gaps(type_: Type) -> bool:
+    """Whether records without fields lie in a value, which C gives room."""
+    if isinstance(type_, Scalar):
+        return False
+    parts = [part for _, part in members(type_)]
+    return not parts or any(map(_has_gaps, parts))
+
+
 def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
     """A test of all floats in a value; empty: there is none."""
     places = [*scalars(type_, text)]
     floats = [place.text for place in places if place.type == FLOAT]
     if not floats:
         return ""
-    if _MANY <= len(floats) == len(places):
+    if _MANY <= len(floats) == len(places) and not _has_gaps(type_):
         called = f"{name}((const double *)&{text}, {len(floats)})"
         return called if name == "are_finite" else f"{called} {test}"
     return f"{' + '.join(term.format(one) for one in floats)} {test}"

@@ -113,17 +113,19 @@ static inline double sum_of_squares(const double values[], int n) {
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/* Takes a value into an input; whether it is another one, bit for bit. */
+/* Takes a value into an input: 0 where it is the same bit for bit, 1 where it is another one, and
+ * 3 where that is more than a rounding error. */
 static inline int take(double *input, double value) {
-    const int is_other = memcmp(input, &value, sizeof value) != 0;
+    const double before = *input;
+    if (memcmp(&before, &value, sizeof value) == 0) return 0;
     *input = value;
-    return is_other;
+    return fabs(value - before) <= 1e-12 + 1e-12 * fabs(before) ? 1 : 3;
 }
 
 static inline int take_whole(int *input, int value) {
     const int is_other = *input != value;
     *input = value;
-    return is_other;
+    return is_other ? 3 : 0;
 }"""
 
 _DRAWING = """\
@@ -557,19 +559,27 @@ class Text:
             for one in system.connections
             if turn[one.source.component] >= turn[one.target.component]
         }
-        settled = ["int changed = 0;"]
-        for i in map(self.components.index, order):
+        settled, passed = ["int changed = 0, other;"], list[str]()
+        for name in order:
+            i = self.components.index(name)
             settled += [
-                f"if (feed_{i}(it, it, error) | everything) {{",
+                f"other = feed_{i}(it, it, error);",
+                "changed |= other;",
+                "if (other || everything) {",
                 f"    if (start_{i}(it, it->start_time, error)) return -1;",
-                "    changed = 1;",
+                "}",
+            ]
+            passed += [
+                f"if (feed_{i}(it, it, error)) {{",
+                *map("    {}".format, self._anew(name)),
                 "}",
             ]
         starts = []
         for connection in system.connections:
             place = self.columns[connection.target]
-            start = self._port(connection.target).start or 0
-            starts.append(f"{place.text} = {number_in_c(_as(place, start))};")
+            start = self._port(connection.target).start
+            number = number_in_c(_as(place, 0 if start is None else start))
+            starts.append(f"{place.text} = {number};")
         lines = [
             "int changed, rounds = 0;",
             *starts,
@@ -580,18 +590,25 @@ class Text:
             ),
             "changed = settle(it, 1, error);",
             f"while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
+            # Of values that go on by rounding errors, the start leaves one.
+            *(["if (changed == 1) return hand_on(it, error) ? -1 : 0;"] if early else []),
             "return changed;",
         ]  # fmt: skip
+        handed_on = function(
+            "static int hand_on(simulation *it, Error *error)", [*passed, "return 0;"]
+        )
+        doc = "/* Hands values on after the start; whether a component refuses. */"
         return "\n\n".join(
             (
                 *(part for name in self.components for part in self._fed(name)),
-                "/* Hands values along all connections once: 1 where one has changed, 0, or -1\n"
-                " * where a component refuses. */\n"
+                "/* Hands values along all connections once: what `take` says of all, or -1 where\n"
+                " * a component refuses. */\n"
                 + function(
                     "static int settle(simulation *it, int everything, Error *error)",
                     [*settled, "return changed;"],
                 ),
-                "/* Lets values come to rest at the start: 0, 1 where they do not, or -1 where a\n"
+                *([f"{doc}\n{handed_on}"] if early else []),
+                "/* Lets values come to rest at the start: 0, 3 where they do not, or -1 where a\n"
                 " * component refuses. */\n"
                 + function(
                     "static int come_to_rest(simulation *it, Error *error)",
@@ -627,6 +644,17 @@ class Text:
                 "return 0;",
             ],
         )
+
+    def _anew(self, name: str) -> Iterator[str]:
+        """Compute the outputs of a component that has taken other inputs at the start."""
+        said, member = self.kind(name).said, f"it->{self.members[name]}"
+        yield from self.checked_inputs(name)
+        if said.derived and said.takes("derive", "inputs"):
+            yield f"{member}.underived = 1;"
+        yield f"{self.kind(name).name}_evaluate(&{member}, error);"
+        yield self._refusal(name, OUTPUTS)
+        if name in self.slow:
+            yield f"{member}_shown = {member}.outputs;"
 
     def _refusal(self, name: str, call: str) -> str:
         return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
@@ -782,7 +810,6 @@ class Text:
                 "if (it->made == it->steps && it->shown == it->steps) {",
                 "    const int k = it->made;",
                 *(f"    {line}" for line in row),
-                *(f"    {line}" for line in self._unsound()),
                 "}",
             ]
         else:
@@ -795,7 +822,8 @@ class Text:
                 "    it->made = k + 1;",
                 "}",
             ]
-        yield function(_RUN, [*lines, "return 0;"], ())
+        # Steps look at what those before them have computed.
+        yield function(_RUN, [*lines, *self._unsound(), "return 0;"], ())
 
     def _steps(self) -> list[str]:
         passing, parts = self.stages.passing, []
@@ -846,6 +874,9 @@ class Text:
                 lines += [test, *(f"    {line}" for line in inner), "}"]
             else:
                 lines += inner
+        if found is self.stages.stepping and found[-1].decimation is not None:
+            # The last stage, which looks at all, is not in every step.
+            lines += self._unsound()
         return f"/* {doc}; whether a component refuses. */\n" + function(
             f"static int {name}(simulation *it, int k, double t, Error *error)",
             [*lines, "return 0;"],
@@ -867,7 +898,7 @@ class Text:
         visits = [visit for visit in stage.visits if isinstance(visit, Visit)]
         for visit in visits:
             yield from self._visited(visit, stage.decimation.every if stage.decimation else 1)
-        if stage is self.stages.stepping[-1]:
+        if stage is self.stages.stepping[-1] and stage.decimation is None:
             # What was just written is slow to read in another way: outputs are better looked at
             # before they are computed again.
             yield from self._unsound()

@@ -201,8 +201,8 @@ Names = dict[str, str]
 class Component:
     """One component on its way, from a seed."""
 
-    def __init__(self, seed: int) -> None:
-        self._random = Random(seed)
+    def __init__(self, seed: int, rules: Mapping[str, Sequence[str]] = RULES) -> None:
+        self._random, self._rules = Random(seed), rules
 
     def text(self) -> str:
         """The script."""
@@ -222,7 +222,7 @@ class Component:
         if not derives:
             del groups["Derived"]
         parts = [HEAD, *(self._class(name, fields) for name, fields in groups.items())]
-        known = {name.lower(): _names(name.lower(), fields) for name, fields in groups.items()}
+        known = {name.lower(): names_of(name.lower(), fields) for name, fields in groups.items()}
         known |= {"t": {"t": FLOAT}, "h": {"h": FLOAT}}
         arguments = {
             "start": self._some("parameters", "inputs", "t"),
@@ -246,13 +246,13 @@ class Component:
                 test, value = self._number(BOOL, names, 2), self._number(FLOAT, names)
                 text = f"{{{value}:g}} is refused: {{{self._number(INT, names)}}} %"
                 lines.insert(0, f"if {test} and {value} > 3.0:\n        raise Refusal(f'{text}')")
-            parts += [_function(f"{hook}({said}) -> {made}:", lines)]
+            parts += [function(f"{hook}({said}) -> {made}:", lines)]
         if restarts:
             parts += self._restart(groups["State"], known["state"], known["inputs"])
         if draw.random() < 0.7:
             parts += self._noise(groups["Outputs"], known["parameters"])
         lines = ["if parameters.gain > 50.0:", "    raise Refusal('gain is large')"]
-        parts += [_function("check(parameters: Parameters) -> None:", lines)]
+        parts += [function("check(parameters: Parameters) -> None:", lines)]
         return "\n\n".join(parts)
 
     def _some(self, *arguments: str) -> list[str]:
@@ -281,18 +281,18 @@ class Component:
     def _restart(self, fields: Names, state: Names, inputs: Names) -> Iterator[str]:
         test = self._number(BOOL, state)
         yield f'RESTARTED = "{self._random.choice(MESSAGES)}"\n'
-        yield _function("credible(state: State) -> bool:", [f"return {test}"])
+        yield function("credible(state: State) -> bool:", [f"return {test}"])
         made = self._made("State", fields, state | inputs)
         head = "restarted(state: State, inputs: Inputs) -> State:"
-        yield _function(head, [f"return {made}"])
+        yield function(head, [f"return {made}"])
 
     def _noise(self, fields: Names, parameters: Names) -> Iterator[str]:
         group, hint = self._random.choice([*fields.items()])
         drawn = self._random.choice([*DRAWS])
-        names = _names("", {group: hint}) | dict.fromkeys(DRAWS[drawn], FLOAT) | parameters
-        yield _function("seed() -> int:", [f"return {self._random.randint(-5, 5)}"])
+        names = names_of("", {group: hint}) | dict.fromkeys(DRAWS[drawn], FLOAT) | parameters
+        yield function("seed() -> int:", [f"return {self._random.randint(-5, 5)}"])
         head = f"measured(parameters: Parameters, n: {drawn}, {group}: {hint}) -> {hint}:"
-        yield _function(head, [f"return {self._value(hint, names)}"])
+        yield function(head, [f"return {self._value(hint, names)}"])
 
     # Values
 
@@ -309,14 +309,14 @@ class Component:
         found = [name for name, kind in names.items() if kind == hint]
         if not names or not depth:
             return self._random.choice(found or CONSTANTS[hint])
-        rule = self._random.choice(RULES[hint])
+        rule = self._random.choice(self._rules[hint])
         for letter, kind in LETTERS.items():
             while f"{{{letter}}}" in rule:
                 rule = rule.replace(f"{{{letter}}}", self._number(kind, names, depth - 1), 1)
         return f"({rule})"
 
 
-def _names(owner: str, fields: Names) -> Names:
+def names_of(owner: str, fields: Names) -> Names:
     """The numbers in the fields of something, as they are written."""
     found = {}
     for field, hint in fields.items():
@@ -325,7 +325,8 @@ def _names(owner: str, fields: Names) -> Names:
     return found
 
 
-def _function(head: str, lines: Sequence[str]) -> str:
+def function(head: str, lines: Sequence[str]) -> str:
+    """A function of the lines of its body."""
     return (
         "\n".join([f"def {head}", '    """A hook."""', *(f"    {line}" for line in lines)]) + "\n"
     )
