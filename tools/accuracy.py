@@ -1,8 +1,8 @@
 """What the numbers of the scenarios owe to the step: the tables of docs/explanation/accuracy.md.
 
 `python tools/accuracy.py` prints them in Markdown. All runs are without measurement noise. The
-batch engine makes them, which needs the extra `studies`; only the body that moves freely is run by
-the FMU. It takes three minutes on one core, and 1 GB.
+batch engine makes them; only the body that moves freely is run by the FMU. It takes three minutes
+on one core, and 1 GB.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from auv_fmu.loop import closed_loop
-from auv_fmu.loop.blocks import Scene
-from auv_fmu.loop.closed_loop import Setting, Vehicles, blocks_of
+from auv_fmu.loop.closed_loop import Scene, Setting, Vehicles
 from auv_fmu.paper import motion_planner, plant
 from auv_fmu.paper.attitude import normalised, rotation_from_quaternion
 from auv_fmu.paper.euler import STEP
@@ -25,10 +24,11 @@ from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
-from orchestrator.studies.batch.kernel import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
+from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
+from straight import setting_of
 
 Values = Mapping[str, Any]
 
@@ -44,6 +44,7 @@ CHAOTIC = "fig6-pd"
 #: Smaller steps than the paper's, and one that stands for their limit [s].
 SMALLER, LIMIT = (0.01, 0.005, 0.002), 0.0002
 
+QUIET: Values = {"plant.noise.std": 0.0}
 EULER: Values = {}
 RK4: Values = {"plant.integrator": "rk4"}
 EXACT: Values = {**RK4, "plant.h_max": STEP / 10}
@@ -71,11 +72,13 @@ class Runs:
 
     def __init__(self) -> None:
         """Load them."""
-        self._engine = BatchEngine({name: load(name) for name in SCENARIOS})
+        self._systems = {name: load(name) for name in SCENARIOS}
+        self._engine = BatchEngine(self._systems)
 
     def setting(self, name: str, values: Values) -> Setting:
         """What the equations are given."""
-        return self._engine.setting(self._run(name, values, STEP))
+        changed = {port_name(port): value for port, value in {**QUIET, **values}.items()}
+        return setting_of(self._systems[name].with_parameters(changed))
 
     def table(self, name: str, values: Values = EULER, step: float = STEP) -> Table:
         """With all rows."""
@@ -102,8 +105,7 @@ class Runs:
 
     @staticmethod
     def _run(name: str, values: Values, step: float) -> Point:
-        quiet = {"plant.noise.std": 0.0, **values}
-        return Point(0, name, quiet, stop_time=SCENARIOS[name], step=step)
+        return Point(0, name, {**QUIET, **values}, stop_time=SCENARIOS[name], step=step)
 
 
 def plant_alone(runs: Runs) -> None:
@@ -200,33 +202,31 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
 
     Planner and controller go on by Euler's scheme, whose step over its length is the rate.
     """
-    blocks, h = blocks_of(setting), 2.0**-10
-    law, own, settings = blocks.controller, setting.plant, setting.planner
-    assert isinstance(own, plant.Parameters)
-    assert isinstance(settings, motion_planner.Parameters)
-    begun = closed_loop.begin(setting, blocks, (0.0, 0.0, 0.0))
-    assert isinstance(begun.controller_state, ControllerState)
-    # Its steps are all of one length, which so does not change.
-    control_begun = begun.controller_state._replace(h=h)
+    own, gains, settings, h = setting.plant, setting.controller, setting.planner, 2.0**-10
+    begun = closed_loop.begin(setting, (0.0, 0.0, 0.0))
+    control_begun = begun.controller_state
+    if isinstance(control_begun, ControllerState):
+        # Its steps are all of one length, which so does not change.
+        control_begun = control_begun._replace(h=h)
     start = begun.vehicles.plant, begun.vehicles.planner, control_begun
 
     def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Scene]:
         state, planner, control = like(start, iter(x.tolist()))
         rotation = rotation_from_quaternion(normalised(state.quaternion))
         moving = motion_planner.motion(settings.vehicle, planner, settings.tau_d)
-        vehicles = Vehicles(state, rotation, planner, moving, begun.vehicles.water)
-        return vehicles, control, closed_loop.scene(setting, blocks, vehicles, t, (0.0, 0.0, 0.0))
+        vehicles = Vehicles(state, rotation, planner, moving)
+        return vehicles, control, closed_loop.scene(setting, vehicles, t, (0.0, 0.0, 0.0))
 
     def rates(t: float, x: np.ndarray) -> np.ndarray:
         vehicles, control, seen = unpacked(t, x)
-        measured = law.measurement(seen)
-        control = law.gated(setting.controller, control, measured)
-        signals = law.evaluate(setting.controller, control, measured, 0.0)
+        measured = closed_loop.measurement(gains, seen)
+        control = closed_loop.gated(gains, control, seen.y)
+        signals = closed_loop.evaluate(gains, control, measured, 0.0)
         tau = plant.applied(own, signals.tau)
         state, rotation = vehicles.plant, vehicles.rotation
         moving = plant.rates(own.vehicle, own.roll, state, rotation, tau, seen.tau_w)
         planned = motion_planner.step(vehicles.planner, vehicles.moving, h)
-        control_later = law.step(control, signals, h)
+        control_later = closed_loop.advanced(gains, control, signals, h)
         rest = np.subtract(flat((planned, control_later)), flat((vehicles.planner, control))) / h
         return np.array([*flat(moving), *(0.0 for _ in flat((state.tau, state.water))), *rest])
 
@@ -236,6 +236,13 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     )
     states = zip(found.t, found.y.T, strict=True)
     return np.array([unpacked(t, x)[2].plant.y for t, x in states])
+
+
+def flat(state: Any) -> list[float]:
+    """The numbers of a state, in their order."""
+    if isinstance(state, float):
+        return [state]
+    return [number for part in state for number in flat(part)]
 
 
 def like(state: Any, numbers: Iterator[float]) -> Any:

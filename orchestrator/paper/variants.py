@@ -377,13 +377,12 @@ def quantiles_of(engine: BatchEngine, point: Point, starts: Sequence[int]) -> np
 
 def moved(engine: BatchEngine, point: Point, starts: Sequence[int]) -> Iterator[Point]:
     """A run from starts that are moved by :data:`FARTHEST_START` at most, each by its number."""
-    start = engine.setting(point).plant.eta0[: len(AXES)]
+    names = [f"plant.eta0.{axis}" for axis in AXES]
+    start = np.array([engine.value(point, name) for name in names], float)
     for number in starts:
         away = np.random.default_rng(number).uniform(-FARTHEST_START, FARTHEST_START, len(AXES))
-        values = zip(AXES, np.add(start, away).tolist(), strict=True)
-        yield point._replace(
-            parameters={**point.parameters, **{f"plant.eta0.{axis}": x for axis, x in values}}
-        )
+        values = zip(names, np.add(start, away).tolist(), strict=True)
+        yield point._replace(parameters={**point.parameters, **dict(values)})
 
 
 def _six(numbers: np.ndarray, reading: Sequence[int]) -> np.ndarray:

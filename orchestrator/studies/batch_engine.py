@@ -182,10 +182,12 @@ class _Known:
 
     @cached_property
     def _ports(self) -> Mapping[PortName, Port]:
-        """The ports of all components."""
+        """The ports of all components, whose choices are numbers: modules do not travel."""
         assert self._definitions is not None
         return {
-            PortName(name, port.name): port
+            PortName(name, port.name): replace(
+                port, choices={choice: int(number) for choice, number in port.choices.items()}
+            )
             for name, definition in self._definitions.items()
             for port in definition.ports
         }
@@ -199,11 +201,8 @@ class _Known:
 
     def cautions(self, ready: _Ready, point: Point, numbers: Sequence[float]) -> str | None:
         """What to be wary of in a run."""
-        own, changed = self._values, point.parameters
-
         def value(name: str) -> Value | None:
-            found: Value | None = changed[name] if name in changed else own(name)
-            return found
+            return self.value(point, name)
 
         found = cautions(value, point.step, self.loops)
         for loop, places in zip(self.loops, ready.watched, strict=True):
@@ -212,13 +211,23 @@ class _Known:
             found += cautions_seen(Seen(bound, vertical), loop, value, point.step)
         return kinds_of(found)
 
+    def value(self, point: Point, name: str) -> Value | None:
+        """The value of a parameter in a run; None: there is no such parameter."""
+        found: Value | None
+        found = point.parameters[name] if name in point.parameters else self._values(name)
+        return found
+
     @cached_property
     def _values(self) -> Any:
         return cache(values_of(self.system))
 
     def __getstate__(self) -> dict[str, Any]:
         """Without modules, which other machines need not have, but with what is compiled."""
-        return {**self.__dict__, "_definitions": None, "_parameters": None}
+        if self._definitions is not None:
+            self._ports  # noqa: B018
+        kept = {name: one for name, one in self.__dict__.items() if name != "_values"}
+        return {**kept, "_definitions": None, "_parameters": None}
+
 
 
 def _number(one: _Parameter, value: Any) -> float:
@@ -282,6 +291,10 @@ class BatchEngine:
         """Make some runs, in their order."""
         for point in points:
             yield self._outcome(point)
+
+    def value(self, point: Point, name: str) -> Value | None:
+        """The value of a parameter in a run; None: there is no such parameter."""
+        return self._known[point.scenario].value(point, name)
 
     def _ready(self, point: Point) -> _Ready:
         return self._known[point.scenario].ready(point.order, point.step)

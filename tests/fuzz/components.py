@@ -101,7 +101,7 @@ MESSAGES = ("again at {t:g} s", "100 % at {t}", "{{t}} is {t:.3f} %d", "ü witho
 NAMES = ("double", "error", "state", "llabs", "math_errhandling", "x_u0302", "self", "made")
 
 #: Modules of ours and functions in them that are outside the language: the user's own are not.
-HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop", "blocks_of"))
+HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop", "closed_loop"))
 
 #: What is refused, or means the same in both kinds.
 MISTAKES = (

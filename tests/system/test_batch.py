@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import pickle
-import re
 import subprocess
 import sys
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -18,33 +19,39 @@ import pytest
 from auv_fmu.loop.closed_loop import Instant, Setting
 from auv_fmu.loop.closed_loop import closed_loop as straight_line
 from auv_fmu.paper.output_feedback import ControllerState
+from fmus.compilers import machines_compiler
+from fmus.kinds import AUTO
+from orchestrator import sweep
+from orchestrator.commands.main import main
+from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
+from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Order
 from orchestrator.runs.loading import load, load_scenario
-from orchestrator.studies import batch_engine
-from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.runs.preparation import Prepared
+from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.engine import FmuEngine, Point
+from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.indices import INDICES
+from straight import setting_of
+from support import others
 from support.runs import prepared, whole
-from support.texts import tells
+from support.texts import mentions
 
-pytest.importorskip("numba", reason="needs the extra `studies`")
+pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
 KIND = "native"
 
-#: Those of the engine.
 ORDERS = (FEEDTHROUGH, JACOBI)
 
 #: The ready studies that the engine makes.
 STUDIES = [name for name in ready_studies() if read_study(name).engine == "batch"]
 
-#: How many runs of each study are tried, how many of them with FMUs, and how many steps of each.
-SAMPLES, STEPS = 200, 40
+#: How many runs of each study are tried, and how many steps of each.
+SAMPLES, STEPS = 100, 40
 
 
 @cache
@@ -52,9 +59,16 @@ def systems(*names: str) -> dict[str, System]:
     return {name: load(name, KIND) for name in names}
 
 
-def engines(*names: str) -> tuple[BatchEngine, FmuEngine]:
-    fmus = FmuEngine({name: prepared(name, KIND) for name in names}, "compiled")
-    return BatchEngine(systems(*names), KIND), fmus
+def ready(name: str) -> Prepared:
+    """A scenario, or an SSP with FMUs of its own, ready to be run."""
+    return prepared(name, AUTO if name.endswith(".ssp") else KIND)
+
+
+@cache
+def engines(*names: str, own: tuple[OwnIndex, ...] = ()) -> tuple[BatchEngine, FmuEngine]:
+    made = {name: ready(name) for name in names}
+    batch = BatchEngine({name: one.system for name, one in made.items()}, own)
+    return batch, FmuEngine(made, "compiled", own)
 
 
 @cache
@@ -74,60 +88,173 @@ def bits(rows: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(rows).view(np.int64)
 
 
-def straight_rows(setting: Setting, steps: int, order: Order) -> np.ndarray:
-    """Time and values of every row: what the FMUs' table holds."""
+def changes(values: Mapping[str, Any]) -> dict[Any, Any]:
+    return {port_name(name): value for name, value in values.items()}
+
+
+# The straight line
+
+
+#: What is compared with it, in the order of :func:`straight_row`.
+COMPARED = [
+    *(f"plant.eta.{k}" for k in ("x", "y", "z", "phi", "theta", "psi")),
+    *(f"plant.nu.{k}" for k in "uvwpqr"),
+    *(f"plant.{group}.{k}" for group in ("y", "dy") for k in "xyz"),
+    *(f"planner.{group}.{k}" for group in ("y_d", "dy_d", "ddy_d") for k in "xyz"),
+    *(f"plant.tau_applied.{k}" for k in "uqr"),
+    *(f"controller.theta_hat[{i}]" for i in range(1, 5)),
+    *(f"{part}.tau.{k}" for part in ("controller", "plant") for k in "uqr"),
+    *(f"plant.tau_w.{k}" for k in "uvwpqr"),
+]
+
+
+def straight_rows(setting: Setting, steps: int, order: Order | None) -> np.ndarray:
+    """The values of COMPARED in every row."""
     instants = list(straight_line(steps, setting, order == JACOBI))
-    acting = instants if order == FEEDTHROUGH else [instants[0], *instants[:-1]]
-    T = setting.plant.T
-    return np.array([_row(*pair, T) for pair in zip(acting, instants, strict=True)])
+    acting = [instants[0], *instants[:-1]] if order == JACOBI else instants
+    rows = zip(acting, instants, strict=True)
+    return np.array([straight_row(*pair, setting.plant.T) for pair in rows])
 
 
-def _row(acting: Instant, now: Instant, T: tuple[float, ...]) -> list[float]:
+def straight_row(acting: Instant, now: Instant, T: Sequence[float]) -> list[float]:
     seen, state = now.scene.plant, acting.controller_state
-    values = [
-        now.t, *now.vehicles.plant.position, *seen.euler, *seen.nu, *now.scene.y, *seen.dy,
-    ]  # fmt: skip
-    for one in now.scene.reference:
-        values += one
+    reference = [x for one in now.scene.reference for x in one]
     # Actuators with a lag give what they have come to.
     given = zip(T, now.vehicles.plant.tau, acting.tau, strict=True)
-    values += [reached if lag else tau for lag, reached, tau in given]
-    if isinstance(state, ControllerState):
-        values += acting.signals.dy_hat
-        state = state.theta_hat
-    return [*values, *state, *acting.signals.tau, *acting.command, *acting.tau_w]
+    applied = [reached if lag else tau for lag, reached, tau in given]
+    theta_hat = state.theta_hat if isinstance(state, ControllerState) else state
+    return [
+        *now.vehicles.plant.position, *seen.euler, *seen.nu, *now.scene.y, *seen.dy, *reference,
+        *applied, *theta_hat, *acting.signals.tau, *acting.command, *acting.tau_w,
+    ]  # fmt: skip
 
 
-def compare_with_straight_line(engine: BatchEngine, point: Point) -> None:
+def compare_with_straight_line(engine: BatchEngine, system: System, point: Point) -> None:
     table = engine.table(point)
-    order = table.header.experiment.order
-    straight = straight_rows(engine.setting(point), len(table) - 1, order)
-    different = np.argwhere(bits(table.rows) != bits(straight))
+    setting = setting_of(system.with_parameters(changes(point.parameters)), point.step)
+    straight = straight_rows(setting, len(table) - 1, point.order)
+    found = table.group(*COMPARED)
     # Where nothing is drawn, what is zero is not of a sign.
-    different = [at for at in different if table.rows[*at] != straight[*at]]
-    assert not different, ("time", *table.columns)[different[0][1]]
+    different = np.argwhere(found != straight)
+    assert not different.size, COMPARED[different[0][1]]
 
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_runs_of_studies_are_those_of_the_straight_line(name):
     """Every signal after every step."""
-    runs = sampled(name)
-    engine, _ = engines(*read_study(name).scenario)
-    for run in runs:
-        compare_with_straight_line(engine, run)
+    scenarios = read_study(name).scenario
+    engine, _ = engines(*scenarios)
+    for run in sampled(name):
+        compare_with_straight_line(engine, systems(*scenarios)[run.scenario], run)
+
+
+#: Values that make a difference to how the loop is computed.
+ADDITIONS: list[dict[str, Any]] = [
+    {"controller.saturation": "algebraic"},
+    {"controller.saturation": "arctan", "controller.observer": "exact"},
+    {"controller.observer": "integral", "controller.printed_jacobian": True},
+    {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
+    {"plant.roll": False, "plant.noise.std": 0.001},
+    {"plant.current.x": 0.4, "plant.current.z": -0.2},
+    {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0},
+    {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1},
+    {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01},
+    {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007},
+    {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0},
+]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("values", ADDITIONS, ids=", ".join)
+def test_additions_are_those_of_the_straight_line(values, order):
+    engine, _ = engines("fig4")
+    point = Point(0, "fig4", values, 2.0, 0.02, order)
+    compare_with_straight_line(engine, systems("fig4")["fig4"], point)
+
+
+# The FMUs
 
 
 @pytest.mark.parametrize("name", STUDIES)
 def test_runs_of_studies_are_those_of_the_fmus(name):
-    """All indices, and why runs fail."""
+    """All indices; why a run fails is left to the FMUs."""
     runs = sampled(name)
     batch, fmus = engines(*read_study(name).scenario)
     for one, other in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
-        assert one == other
+        if one.failure == REFUSED:
+            assert other.failure and not one.indices
+        else:
+            assert one == other
 
 
-#: Scenarios with other blocks in the loop than the paper has, and a loop with all of them but one.
-OTHERS = ["path", "path-pd", "sea", "sea-pd", "remus", "remus-pd"]
+def compare_with_fmus(name: str, point: Point, own: tuple[OwnIndex, ...] = ()) -> None:
+    """Every column of every row, to the last bit, and all indices."""
+    batch, fmus = engines(name, own=own)
+    point = point._replace(scenario=name)
+    table = batch.table(point)
+    system = ready(name).system.with_parameters(changes(point.parameters))
+    expected = whole(system, table.header.experiment, "compiled")
+    assert table.failure is None
+    assert len(table.columns) >= 40
+    assert table.header.parameters == expected.header.parameters
+    # A program that comes to its end has refused nothing.
+    faults = {f"{part}.fault" for part in system.components}
+    assert {*expected.columns} - {*table.columns} == faults
+    rows = np.column_stack([expected.time, expected.group(*table.columns)])
+    different = np.argwhere(bits(table.rows) != bits(rows))
+    assert not different.size, ("time", *table.columns)[different[0][1]]
+    [one], [other] = batch.outcomes([point]), fmus.outcomes([point])
+    assert one == other and one.indices
+
+
+#: With noise, and a shorter step at the end.
+NOISY = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
+PLANTS_FIRST: Order = ("plant", "disturbance", "planner", "controller")
+
+
+@pytest.mark.parametrize("order", [*ORDERS, None])
+@pytest.mark.parametrize(
+    "name", ["fig4", "fig5-pd", "path", "path-pd", "sea", "sea-pd", "remus", "remus-pd"]
+)
+def test_every_column_is_that_of_the_fmus(name, order):
+    compare_with_fmus(name, Point(0, name, NOISY, 10.01, 0.02, order))
+
+
+@pytest.mark.parametrize("order", [FEEDTHROUGH, JACOBI, PLANTS_FIRST, PLANTS_FIRST[::-1]], ids=str)
+def test_orders_are_those_of_the_fmus(order):
+    """One engine makes runs of all orders."""
+    compare_with_fmus("fig5", Point(0, "fig5", NOISY, 2.01, 0.02, order))
+
+
+@pytest.mark.parametrize("name", ["formation-v", "formation-change", "formation-pd"])
+@pytest.mark.parametrize("order", ORDERS)
+def test_fleets_are_those_of_the_fmus(name, order):
+    """The smallest distance between vehicles is among the indices."""
+    point = Point(
+        0, name, {"auv2.plant.noise.std": 0.01, "auv2.plant.m11": 26.0}, 5.01, 0.02, order
+    )
+    compare_with_fmus(name, point)
+    [outcome] = engines(name)[0].outcomes([point])
+    assert outcome.indices["smallest_distance"] > 0.0
+
+
+@pytest.mark.parametrize("start", [-1.0, 10.0])
+@pytest.mark.parametrize("name", ["fig4", "sea", "path"])
+def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
+    times = {"start_time": start, "stop_time": start + 4.0, "step": 0.02}
+    write_ssp(replace(systems(name)[name], name="later", **times), tmp_path)
+    point = Point(0, "", NOISY, start + 4.0, 0.02, start_time=start)
+    compare_with_fmus(str(tmp_path / "later.ssp"), point)
+
+
+@pytest.mark.parametrize("order", [FEEDTHROUGH, JACOBI, PLANTS_FIRST], ids=str)
+@pytest.mark.parametrize("slow", ["controller = 0.2", "planner = 0.06\ndisturbance = 0.04"])
+def test_components_with_longer_steps_are_those_of_the_fmus(tmp_path, slow, order):
+    path = tmp_path / "slow.toml"
+    path.write_text(f"stop_time = 4.0\n[steps]\n{slow}\n")
+    compare_with_fmus(str(path), Point(0, "", NOISY, 4.0, 0.02, order))
+
+
 REMUS_IN_A_SEA = """
 [components]
 plant = "Remus100"
@@ -156,57 +283,72 @@ planner.ell = 0.8
 planner.eta0.z = 2.0
 """
 
-
-def compare_with_fmus(name: str, values: dict[str, Any], order: str, until: float) -> None:
-    """Every signal after every step, and all indices, with noise and a shorter step at the end."""
-    batch, fmus = engines(name)
-    point = Point(0, name, values, until, 0.02, order)
-    table = batch.table(point)
-    system = systems(name)[name].with_parameters({port_name(k): v for k, v in values.items()})
-    expected = whole(system, Experiment(until, 0.02, order), "compiled")
-    assert table.failure is None
-    assert len(table.columns) >= 40
-    rows = np.column_stack([expected.time, expected.group(*table.columns)])
-    assert bits(table.rows).tolist() == bits(rows).tolist()
-    for one, other in zip(batch.outcomes([point]), fmus.outcomes([point]), strict=True):
-        assert one == other
+#: Systems that have parts more, or fewer.
+OTHERS = {
+    "remus in a sea": REMUS_IN_A_SEA,
+    "two planners": '[components]\nmore = "MotionPlanner"\n',
+    "an open loop": '[wires]\n"controller.y" = false\n',
+    "fed back": '[wires]\n"controller.y_d" = "plant.y"\n',
+}
 
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("name", OTHERS)
-def test_runs_with_other_blocks_are_those_of_the_fmus(name, order):
-    noise = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
-    compare_with_fmus(name, noise, order, 30.01)
+def test_other_systems_are_those_of_the_fmus(tmp_path, name, order):
+    path = tmp_path / "own.toml"
+    path.write_text(OTHERS[name])
+    compare_with_fmus(str(path), Point(0, "", {}, 4.01, 0.02, order))
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_remus_in_a_sea_is_that_of_the_fmus(tmp_path, order):
-    path = tmp_path / "both.toml"
-    path.write_text(REMUS_IN_A_SEA)
-    compare_with_fmus(str(path), {}, order, 10.01)
+def test_a_controller_of_ones_own_is_that_of_its_fmu(workplace):
+    assert main(["new", "controller", "my_law"]) == 0
+    script, scenario = Path("my_law/my_law.py"), Path("my_law/my_law.toml")
+    assert main(["build", str(script), "--kind", KIND]) == 0
+    compare_with_fmus(str(scenario.resolve()), Point(0, "", NOISY, 4.01, 0.02))
+    script.write_text(script.read_text() + "# Other words.\n")
+    with pytest.raises(InputError) as refused:
+        BatchEngine({"mine": load(str(scenario), KIND)})
+    assert mentions(str(refused.value), "mine: my_law.py changed --engine fmu")
 
 
 #: Values that make a difference to how these are computed.
 OTHER_ADDITIONS: list[tuple[str, dict[str, Any]]] = [
     ("path", {"planner.cruise": 0.4, "planner.rounding": 40.0, "plant.water.y": 0.1}),
     ("path", {"planner.timed": True, "planner.count": 4, "planner.waypoint[1].t": 0.01}),
+    ("path", {"plant.dwater.x": 0.1}),
     ("sea", {"sea.waves.spectrum": "none", "sea.current.mu": 0.5, "sea.current.root": 0.0}),
     ("sea", {"sea.waves.count": 64, "sea.waves.s": 0.0, "sea.depth": 6.0, "sea.waves.Hs": 0.5}),
     ("sea", {"plant.integrator": "rk4", "plant.current.z": 0.1, "plant.h_max": 0.007}),
     ("sea", {"plant.roll": False, "plant.actuator.T.u": 0.2, "sea.waves.seed": -3}),
     ("remus", {"plant.h_max": 0.004, "plant.water.x": 0.3, "plant.current.y": -0.1}),
     ("remus", {"allocation.measured": True, "plant.r_bg.y": 0.001, "plant.fin.T": 0.0}),
+    ("remus", {"disturbance.nu.r": 0.1}),
 ]
 
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(("name", "values"), OTHER_ADDITIONS)
-def test_additions_with_other_blocks_are_those_of_the_fmus(name, values, order):
-    compare_with_fmus(name, values, order, 2.01)
+def test_additions_in_other_systems_are_those_of_the_fmus(name, values, order):
+    compare_with_fmus(name, Point(0, name, values, 2.01, 0.02, order))
 
 
-#: What they refuse: values that do not fit, starts, steps.
-OTHERS_REFUSED: list[tuple[str, dict[str, Any]]] = [
+# What is refused
+
+
+#: What components refuse: values, values that do not fit, starts, steps.
+MISTAKES: list[tuple[str, dict[str, Any]]] = [
+    ("fig4", {"controller.gamma": -1.0}),
+    ("fig4", {"plant.tau_min.u": 0.0, "plant.tau_max.u": 0.0, "planner.eta0.theta": 1.6}),
+    ("fig4", {"plant.roll": False, "plant.nu0.p": 0.1}),
+    ("fig4", {"plant.eta0.x": 1e101}),
+    ("fig4", {"plant.ell": 1e308}),
+    ("fig4", {"plant.h_max": 1e-9, "controller.h_max": 1e-9}),
+    ("fig4", {"planner.tau_d.q": 40.0}),
+    ("fig4", {"plant.m11": 1e-9}),
+    ("fig4", {"plant.m66": 1e-3, "planner.tau_d.q": 50.0}),
+    ("fig4", {"disturbance.omega_d": 1e308}),
+    ("fig4", {"disturbance.A_d": 1.7e308, "disturbance.A_f": 1.7e308}),
+    ("fig4", {"controller.gamma": 1e200}),
     ("path", {"planner.cruise": 2.0, "planner.rounding": 0.5}),
     ("path", {"planner.timed": True, "planner.waypoint[3].t": 1.0}),
     ("path", {"planner.ell": 1e308}),
@@ -221,157 +363,116 @@ OTHERS_REFUSED: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(("name", "values"), OTHERS_REFUSED)
-def test_what_fmus_of_other_blocks_refuse_is_refused_at_the_same_step(name, values, order):
-    compare_refusals(Point(5, name, values, 3.0, 0.02, order))
+@pytest.mark.parametrize(("name", "values"), MISTAKES)
+def test_what_fmus_refuse_is_refused(name, values, order):
+    point = Point(5, name, values, 3.0, 0.02, order)
+    [[one], [other]] = (engine.outcomes([point]) for engine in engines(name))
+    assert other.failure
+    assert one == (5, {}, REFUSED, None)
+    with pytest.raises(InputError):
+        engines(name)[0].table(point)
 
 
-@pytest.mark.parametrize("name", ["plant.dwater.x", "disturbance.nu.r"])
-def test_inputs_without_a_place_stay_zero(name):
-    scenario = "remus" if name.startswith("disturbance") else "path"
-    batch, _ = engines(scenario)
-    [outcome] = batch.outcomes([Point(0, scenario, {name: 0.1}, 1.0, 0.02)])
-    assert outcome.failure == f"{name}: the batch engine has no place for it; leave it 0"
+def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
+    values = {"planner.tau_d.q": [1.0, 40.0, 45.0], "plant.noise.std": [0.0, 0.001]}
+    study = {"scenario": "fig4", "stop_time": 3.0, "vary": values}
+    one, other = (
+        sweep(study, engine=engine, kind=KIND, workers=1, out=tmp_path / engine)
+        for engine in ("batch", "fmu")
+    )
+    assert list(one) == list(other)
+    assert [*one["failure"][:2]] == [None, None]
+    assert all("SteepReference" in failure for failure in one["failure"][2:])
+    for name in one:
+        assert str(one[name].tolist()) == str(other[name].tolist()), name
+    assert (one.failed, one.cautions) == (4, other.cautions)
 
 
-#: Values that make a difference to how the loop is computed.
-ADDITIONS: list[dict[str, Any]] = [
-    {"controller.saturation": "algebraic"},
-    {"controller.saturation": "arctan", "controller.observer": "exact"},
-    {"controller.observer": "integral", "controller.printed_jacobian": True},
-    {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
-    {"plant.roll": False, "plant.noise.std": 0.001},
-    {"plant.current.x": 0.4, "plant.current.z": -0.2, "plant.water.y": 0.3, "plant.water.z": 0.1},
-    {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0},
-    {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1},
-    {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01},
-    {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007},
-    {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0},
-]
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ('[[events]]\nat = 0.5\nfreeze = "plant.y"\n', "own events 'batch'"),
+        ('coupling = "linear"\n', "coupling linear"),
+    ],
+)
+def test_what_no_program_can_be_is_refused_by_name(workplace, refused, content, said):
+    Path("own.toml").write_text(f"stop_time = 1.0\n{content}")
+    Path("mine.toml").write_text('scenario = "own.toml"\nengine = "batch"\n')
+    assert mentions(refused("sweep", "mine.toml", "--kind", KIND), said)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("values", ADDITIONS, ids=", ".join)
-def test_additions_are_those_of_the_straight_line(values, order):
-    engine, _ = engines("fig4")
-    compare_with_straight_line(engine, Point(0, "fig4", values, 2.0, 0.02, order))
-
-
-#: What components refuse: values, values that do not fit, starts, steps.
-REFUSED: list[dict[str, Any]] = [
-    {"controller.gamma": -1.0},
-    {"controller.saturation": "sigmoid"},
-    {"plant.tau.u": 1.0},
-    {"plant.tau_min.u": 0.0, "plant.tau_max.u": 0.0, "planner.eta0.theta": 1.6},
-    {"plant.roll": False, "plant.nu0.p": 0.1},
-    {"plant.eta0.x": 1e101},
-    {"plant.ell": 1e308},
-    {"plant.h_max": 1e-9, "controller.h_max": 1e-9},
-    {"planner.tau_d.q": 40.0},
-    {"plant.m11": 1e-9},
-    {"plant.m66": 1e-3, "planner.tau_d.q": 50.0},
-    {"disturbance.omega_d": 1e308},
-    {"disturbance.A_d": 1.7e308, "disturbance.A_f": 1.7e308},
-    {"controller.gamma": 1e200},
-]
-
-
-def where(failure: str | None) -> str:
-    """The step that a run fails in, or its start."""
-    found = re.search(r"initialisation refused|t = \S+ s", str(failure))
-    return found.group() if found else str(failure)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("values", REFUSED, ids=", ".join)
-def test_what_fmus_refuse_is_refused_at_the_same_step(values, order):
-    compare_refusals(Point(5, "fig4", values, 3.0, 0.02, order))
-
-
-def compare_refusals(run: Point) -> None:
-    """Both fail, in the same step."""
-    made = (engine.outcomes([run]) for engine in engines(run.scenario))
-    for batch, fmus in zip(*made, strict=True):
-        assert batch.failure and fmus.failure and not batch.indices
-        if run.order == JACOBI and "outputs refused" in fmus.failure:
-            # They are read at the end of the step before.
-            assert float(where(batch.failure)[4:-2]) == pytest.approx(
-                float(where(fmus.failure)[4:-2]) + run.step
-            )
-        else:
-            assert where(batch.failure) == where(fmus.failure)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("scenario", ["fig4", "fig5-pd"])
-def test_indices_are_those_of_the_rows_of_fmus(scenario, order):
-    """With noise, and a shorter step at the end."""
-    run = Point(0, scenario, {"plant.noise.std": 0.001}, 30.01, 0.02, order)
-    for batch, fmus in zip(*(engine.outcomes([run]) for engine in engines(scenario)), strict=True):
-        assert batch == fmus
-        assert batch.failure is None
-        assert ("estimate_error" in batch.indices) == (scenario == "fig4")
-
-
-@pytest.mark.parametrize("name", ["fig4", "fig5-pd", "remus"])
-def test_an_index_that_is_not_accumulated_is_made_of_the_rows(monkeypatch, name):
-    """To the last bit what the accumulators hold, for each of several stop times."""
-    batch, _ = engines(name)
-    run = Point(0, name, {"plant.noise.std": 0.001}, 20.01, 0.02)
-    ends = [2.0, 7.5, 20.01]
-    expected = batch.outcomes_at(run, ends)
-    monkeypatch.setattr(batch_engine, "_ACCUMULATED", [])
-    monkeypatch.setattr(batch_engine, "_OF_ROWS", INDICES)
-    assert batch.outcomes_at(run, ends) == expected
-    assert expected[-1].indices.keys() >= {"final_error.x", "late_error"}
-
-
-def test_an_index_of_what_is_not_computed_is_refused(monkeypatch):
-    first = INDICES[0]
-    ports = (replace(first.reducer.ports[0], name="controller.z.x"),)
-    reducer = replace(first.reducer, ports=ports)
-    of_z = first._replace(name="size_of_z", reducer=reducer)
-    monkeypatch.setattr(batch_engine, "_OF_ROWS", [of_z])
+def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
+    system = others.system_of(others.build(tmp_path), "t")
     with pytest.raises(InputError) as refused:
-        engines("fig4")
-    assert str(refused.value) == (
-        "fig4: its index size_of_z is of controller.z.x, which the batch engine cannot run; "
-        "use --engine fmu"
-    )
+        BatchEngine({"own": system})
+    assert mentions(str(refused.value), "own: t: no component language --engine fmu")
 
 
-def test_one_run_gives_what_came_of_shorter_ones():
-    batch, _ = engines("fig5-pd")
-    run = Point(3, "fig5-pd", {"plant.m66": 0.4}, 20.0, 0.02)
-    ends = [2.0, 7.5, 20.0]
-    alone = [next(batch.outcomes([run._replace(stop_time=end)])) for end in ends]
-    assert batch.outcomes_at(run, ends) == alone
+# Engines
 
 
-def test_ends_between_steps_are_refused():
-    batch, _ = engines("fig4")
-    run = Point(0, "fig4", {}, 1.0, 0.02)
-    for end in (0.515, 1.5):
-        [outcome] = batch.outcomes_at(run, [end])
-        assert tells(str(outcome.failure), (end, 1))
+INDEX = """
+from __future__ import annotations
+
+from math import nan
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
 
 
-def test_runs_that_failed_later_have_come_to_their_earlier_ends():
-    batch, _ = engines("fig4")
-    early, late = batch.outcomes_at(
-        Point(0, "fig4", {"planner.tau_d.q": 40.0}, 3.0, 0.02), [1.0, 3.0]
-    )
-    assert early.failure is None and early.indices
-    assert "SteepReference" in str(late.failure)
+class Inputs(NamedTuple):
+    z: Annotated[float, Variable("m", "Depth", name="plant.eta.z")]
+    z_d: Annotated[float, Variable("m", "Reference", name="planner.y_d.z")]
 
 
-def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
-    batch, _ = engines("fig4")
-    run = Point(0, "fig4", {}, 0.5, 0.02)
-    copy = pickle.loads(pickle.dumps(batch))
-    assert copy.digest == batch.digest
-    assert list(copy.outcomes([run])) == list(batch.outcomes([run]))
-    assert len(pickle.dumps(batch)) < 1_000_000
+class State(NamedTuple):
+    away: float
+    rows: int
+
+
+class Outputs(NamedTuple):
+    settling: Annotated[float, Variable("s", "last time that z is away")]
+    rows: Annotated[float, Variable("1", "rows")]
+
+
+def start(inputs: Inputs, t: float) -> State:
+    return update(State(nan, 0), inputs, t)
+
+
+def update(state: State, inputs: Inputs, t: float) -> State:
+    away = t if abs(inputs.z - inputs.z_d) > 1.0 else state.away
+    return State(away, state.rows + 1)
+
+
+def outputs(state: State) -> Outputs:
+    return Outputs(state.away, float(state.rows))
+"""
+
+
+@pytest.mark.parametrize("name", ["fig4", "formation-v"])
+def test_an_index_of_ones_own_is_that_of_the_fmus(name):
+    own = (OwnIndex("settling", INDEX.encode()),)
+    compare_with_fmus(name, Point(0, name, {}, 10.01, 0.02), own)
+    [outcome] = engines(name, own=own)[0].outcomes([Point(0, name, {}, 10.01, 0.02)])
+    found = {value for key, value in outcome.indices.items() if key.endswith("rows")}
+    assert found == {502.0}
+
+
+@pytest.mark.parametrize("name", ["fig4", "formation-v"])
+def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus(name):
+    """Before its first run as after it, if its program is prepared."""
+    batch = BatchEngine(systems(name))
+    run = Point(0, name, {}, 0.5, 0.02)
+    batch.prepare(run)
+    copies = [pickle.loads(pickle.dumps(batch))]
+    [outcome] = batch.outcomes([run])
+    sent = pickle.dumps(batch)
+    assert len(sent) < 2_000_000
+    copies += [pickle.loads(sent), pickle.loads(pickle.dumps(pickle.loads(sent)))]
+    for copy in copies:
+        assert copy.digest == batch.digest
+        assert list(copy.outcomes([run])) == [outcome]
 
 
 def test_threads_have_noise_of_their_own():
@@ -380,57 +481,34 @@ def test_threads_have_noise_of_their_own():
     with ThreadPoolExecutor(4) as pool:
         side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
     assert side_by_side == list(batch.outcomes(runs))
+    assert len({outcome.indices["late_error"] for outcome in side_by_side}) == len(runs)
 
 
-def test_other_systems_are_refused_by_what_differs(tmp_path):
-    other = tmp_path / "Other.fmu"
-    own = tmp_path / "own.toml"
-    plant = systems("fig4")["fig4"].components["plant"].fmu
-    other.write_bytes(plant.read_bytes())
-    for text, why in (
-        ('only = ["plant"]', "it has no controller"),
-        (f'[components]\nplant = "{other}"', f"its plant is {other}"),
-        ('[components]\nmore = "MotionPlanner"', "it also has more"),
-        ('[wires]\n"controller.y" = false', "it has no wire plant.y.x -> controller.y.x"),
-        (
-            '[wires]\n"controller.y_d" = "plant.y"',
-            "it has the wire plant.y.x -> controller.y_d.x",
-        ),
-        (
-            '[components]\nsea = "Sea"\n[wires]\n"sea.eta" = "plant.eta"\n'
-            '"plant.water" = "sea.water"',
-            "it has no wire sea.dwater.x -> plant.dwater.x",
-        ),
-        ('[components]\nsea = "MotionPlanner"', "it also has sea"),
-        (
-            '[components]\nplanner = "PathPlanner"\n[wires]\n"plant.tau_w" = false',
-            "it has no wire disturbance.tau_w.p -> plant.tau_w.p",
-        ),
-    ):
-        own.write_text(text)
-        with pytest.raises(InputError) as refused:
-            BatchEngine({"own": load(str(own), KIND)}, KIND)
-        assert str(refused.value) == (
-            f"own: {why}, which the batch engine cannot run; use --engine fmu"
-        )
+def test_threads_make_a_study_that_one_makes(tmp_path):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
+    starts = {"from": -5.0, "to": 5.0, "n": 40}
+    study = {"scenario": "fig5", "stop_time": 5.0, "vary": {"plant.eta0.y": starts}}
+    one, four = (
+        sweep(study, engine="batch", workers=n, out=tmp_path / str(n)).to_dataframe()
+        for n in (1, 4)
+    )
+    assert one.equals(four)
 
 
-def test_another_process_finds_the_kernel_compiled():
-    """It loads in a fraction of a second what has taken several to compile."""
+def test_another_process_finds_the_program_compiled(tmp_path):
+    """And needs no compiler."""
     text = (
-        "from auv_fmu.loop.closed_loop import PAPER, blocks_of\n"
-        "from orchestrator.studies.batch.compilation import compile_run\n"
-        "from orchestrator.studies.batch_engine import BatchEngine\n"
+        "from orchestrator.program import library\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
+        "library.best_compiler = lambda: sys.exit('it compiles')\n"
         "engine = pickle.load(sys.stdin.buffer)\n"
-        "list(engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
-        "stats = compile_run(blocks_of(PAPER)).stats\n"
-        "print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))\n"
+        "print(*engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
     )
     batch, _ = engines("fig4")
-    list(batch.outcomes([Point(0, "fig4", {}, 0.1, 0.02)]))
+    outcomes = list(batch.outcomes([Point(0, "fig4", {}, 0.1, 0.02)]))
     said = subprocess.run(
-        [sys.executable, "-c", text], input=pickle.dumps(batch), capture_output=True, check=True
-    )
-    assert said.stdout.split() == [b"1", b"0"]
+        [sys.executable, "-c", text],
+        input=pickle.dumps(batch), capture_output=True, check=True, cwd=tmp_path,
+    )  # fmt: skip
+    assert said.stdout.decode().split() == str(outcomes[0]).split()

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from auv_fmu.loop.blocks import measurement
 from auv_fmu.loop.closed_loop import PAPER, Instant, Setting, closed_loop
 from auv_fmu.paper import motion_planner, plant
 from auv_fmu.paper.disturbance import Disturbance
@@ -41,7 +40,7 @@ def rows_of(instants: Sequence[Instant], setting: Setting, table: Table) -> list
     """What every port of the FMU loop must hold in each row of a table."""
     late = [instants[0], *instants[:-1]] if table.header.experiment.acting_row else instants
     # Actuators with a lag give what they have come to.
-    T = setting.plant.T if isinstance(setting.plant, plant.Parameters) else (0.0,) * 3
+    T = setting.plant.T
     return [row(now, acting, T) for now, acting in zip(instants, late, strict=True)]
 
 
@@ -56,7 +55,7 @@ def row(now: Instant, acting: Instant, T: tuple[float, ...]) -> dict[str, float]
         for name in names:
             group(name, members, numbers)
 
-    signals, state, told = acting.signals, acting.controller_state, measurement(acting.scene)
+    signals, state, told = acting.signals, acting.controller_state, acting.measured
     vehicle, seen = now.vehicles.plant, now.scene.plant
     planned, reference = now.vehicles.planner, now.scene.reference
     both(("plant.tau", "controller.tau"), UQR, signals.tau)

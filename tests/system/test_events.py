@@ -8,15 +8,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from auv_fmu.loop import closed_loop as line
-from auv_fmu.loop.closed_loop import PAPER, Setting, blocks_of
-from auv_fmu.paper import plant
+from auv_fmu.loop.closed_loop import PAPER, Setting
+from auv_fmu.paper import output_feedback, plant
 from auv_fmu.paper.disturbance import disturbance
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
@@ -66,10 +65,8 @@ class Span:
 def straight(delayed: bool) -> Iterator[dict[str, Any]]:
     """The loop of `auv_fmu.loop.closed_loop`, written out once more, with what EVENTS say."""
     setting: Setting = PAPER
-    blocks = blocks_of(setting)
-    law = blocks.controller
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
-    vehicles = line.vehicles_at_start(setting, blocks)
+    vehicles = line.vehicles_at_start(setting)
     before, held, lost, fast = None, None, None, True
     for k in range(STEPS + 1):
         if k == 60:
@@ -78,14 +75,14 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
             setting = setting._replace(plant=current, disturbance=waves)
         k_d = 40.0 if k in Span(60, 85) else PAPER.controller.k_d
         setting = setting._replace(controller=setting.controller._replace(k_d=k_d))
-        parts = line.splits(setting, H)
+        parts = line.splits(setting)
         gains = setting.controller
         noise = tuple(gauss(0.0, 1.0) for _ in range(3))
-        seen = line.scene(setting, blocks, vehicles, k * H, noise)
+        seen = line.scene(setting, vehicles, k * H, noise)
         if lost is None and seen.plant.nu[0] > 0.15 and not fast:
             lost = Span(k, k + 10)
         fast = seen.plant.nu[0] > 0.15
-        measured = law.measurement(seen)
+        measured = line.measurement(gains, seen)
         if k in Span(18, 43):
             phi, theta, psi = measured.euler
             measured = measured._replace(euler=(phi, theta, psi + 0.1))
@@ -93,9 +90,9 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
             measured = measured._replace(y=held)
         held = measured.y
         if k in (0, 95):
-            control = law.start(gains, measured)
-        control = law.gated(gains, control, measured)
-        signals = law.evaluate(gains, control, measured, H)
+            control = output_feedback.initial_state(gains, measured.y)
+        control = output_feedback.gated(gains, control, measured.y)
+        signals = output_feedback.evaluate(gains, control, measured, H)
         # In Jacobi order what an event changes at an instant shows in outputs of the next.
         now = signals.tau, seen.plant.nu_r, setting.disturbance
         told, nu_r, waves = before if before and delayed else now
@@ -109,12 +106,9 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         if lost and k in lost:
             told = (told[0], 0.0, 0.0)
         yield {"k": k, "vehicle": vehicles.plant, "seen": seen, "tau": signals.tau, "told": told}
-        control = law.step(control, signals, H)
+        control = output_feedback.step(control, signals, H)
         tau = plant.applied(setting.plant, told)
-        begun: Any = SimpleNamespace(
-            t=k * H, vehicles=vehicles, tau=tau, tau_w=tau_w, water=seen.water
-        )
-        vehicles = line.move(setting, blocks, begun, H, parts)
+        vehicles = line.move(setting, vehicles, tau, tau_w, parts)
     assert lost is not None
 
 

@@ -1,9 +1,7 @@
 """The paper's Fig. 2 as one straight line of Python: no FMI, no master, no ports.
 
-Everything else that runs this loop is held against it. What happens at an instant and between two
-of them is written as functions of the language of equations, so that it can be compiled;
-:func:`closed_loop` puts them in a row. What stands in the loop follows from the setting; not in the
-paper, and off by default, are a path through waypoints, a sea, and another vehicle.
+Loops of FMUs and compiled programs are held against it. In it stand the vehicle, the proposed
+controller or the PD controller it is compared with, the disturbance and the planner of the paper.
 """
 
 from __future__ import annotations
@@ -11,19 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-from auv_fmu.guidance import path_planner
-from auv_fmu.language.vectors import Vector3, Vector6
-from auv_fmu.loop.blocks import LAWS, PLANNERS, VEHICLES, WATERS, Blocks, Scene, SeaWaves
-from auv_fmu.paper import motion_planner, plant
+from auv_fmu.language.vectors import Rotation, Vector3, Vector6
+from auv_fmu.paper import motion_planner, output_feedback, pd, plant
+from auv_fmu.paper.attitude import rotation_from_quaternion
 from auv_fmu.paper.disturbance import Disturbance, disturbance
 from auv_fmu.paper.euler import STEP, internal_steps, longest_step
-from auv_fmu.paper.output_feedback import Gains
-from auv_fmu.paper.pd import PdGains
-from auv_fmu.remus import allocation, remus100
-from auv_fmu.water.sea import WaterMotion
+from auv_fmu.paper.motion_planner import Motion, PlannerState, Reference
+from auv_fmu.paper.output_feedback import Gains, Measurement
+from auv_fmu.paper.pd import PdGains, PdMeasurement
+from auv_fmu.paper.plant import PlantOutputs, PlantState
 
-#: Before the first instant.
-_NO_COMMAND: Vector3 = (0.0, 0.0, 0.0)
+_ZERO: Vector3 = (0.0, 0.0, 0.0)
 
 
 class LongestSteps(NamedTuple):
@@ -40,29 +36,16 @@ class Setting(NamedTuple):
     Each block has its own, the distance ell and the vehicle too, as the components have.
     """
 
-    plant: plant.Parameters | remus100.Parameters = plant.Parameters()  #: the vehicle
-    controller: Gains | PdGains = Gains()  #: the proposed controller, or the PD one
+    plant: plant.Parameters = plant.Parameters()
+    controller: Gains | PdGains = Gains()
     disturbance: Disturbance = Disturbance()
-    planner: motion_planner.Parameters | path_planner.Parameters = motion_planner.Parameters()
+    planner: motion_planner.Parameters = motion_planner.Parameters()
     h_max: LongestSteps = LongestSteps()
     h: float = STEP  #: [s]
-    #: The sea, or the velocity of the water [m/s], earth frame; either is added to `current`.
-    water: Vector3 | SeaWaves = (0.0, 0.0, 0.0)
-    allocation: allocation.Parameters | None = None  #: of a REMUS 100
 
 
 #: Section 4.1.
 PAPER = Setting()
-
-
-def blocks_of(setting: Setting) -> Blocks:
-    """Which blocks stand in the loop."""
-    return Blocks(
-        LAWS[type(setting.controller)],
-        PLANNERS[type(setting.planner)],
-        VEHICLES[type(setting.plant)],
-        WATERS[type(setting.water)],
-    )
 
 
 class Splits(NamedTuple):
@@ -73,24 +56,22 @@ class Splits(NamedTuple):
     planner: int
 
 
-def splits(setting: Setting, h: float) -> Splits:
-    """How a step of h seconds is split."""
-    longest = setting.h_max
-    return Splits(
-        internal_steps(h, longest_step(longest.plant)),
-        internal_steps(h, longest_step(longest.controller)),
-        internal_steps(h, longest_step(longest.planner)),
-    )
-
-
 class Vehicles(NamedTuple):
-    """The vehicle, the reference, and the water: their states, and what follows from these."""
+    """The vehicle and the reference: their states, and what follows from these."""
 
-    plant: Any  #: state of the vehicle: a PlantState or a RemusState
-    rotation: Any  #: attitude of a plant, body to earth; of a REMUS 100 there is nothing here
-    planner: Any  #: a PlannerState or a PathState
-    moving: Any  #: motion of the reference vehicle; on a path there is nothing here
-    water: Any  #: the Variation of a sea; of steady water there is nothing here
+    plant: PlantState
+    rotation: Rotation  #: body to earth
+    planner: PlannerState
+    moving: Motion
+
+
+class Scene(NamedTuple):
+    """What vehicle and reference show at one instant."""
+
+    plant: PlantOutputs
+    y: Vector3  #: measured control point [m]
+    reference: Reference
+    tau_w: Vector6  #: disturbance (u, v, w, p, q, r) [N, N.m]
 
 
 class Sent(NamedTuple):
@@ -98,40 +79,6 @@ class Sent(NamedTuple):
 
     tau: Vector3  #: command (tau_u, tau_q, tau_r) [N, N.m]
     nu_r: Vector6  #: velocity of the vehicle through the water [m/s, rad/s]
-    position: Vector3  #: of the vehicle [m]
-    allocated: Any  #: an Allocated
-
-
-def vehicles_at_start(setting: Setting, blocks: Blocks) -> Vehicles:
-    """All at the start."""
-    varying = blocks.water.begin(setting.water)
-    x, y, z, _, _, _ = setting.plant.eta0
-    water = blocks.water.motion(setting.water, varying, (x, y, z), 0.0)
-    state, derived = blocks.vehicle.begin(setting.plant, water.velocity)
-    planned, moving = blocks.planner.begin(setting.planner)
-    return Vehicles(state, derived, planned, moving, varying)
-
-
-def scene(setting: Setting, blocks: Blocks, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
-    """What is seen at time t [s].
-
-    Args:
-        setting: of the loop.
-        blocks: that stand in it.
-        vehicles: at that time.
-        t: time [s].
-        n: three independent standard normal numbers, of the localisation system.
-
-    """
-    state = vehicles.plant
-    seen = blocks.vehicle.outputs(setting.plant, state, vehicles.rotation)
-    return Scene(
-        seen,
-        plant.measure(seen.y, n, setting.plant.noise.std),
-        blocks.planner.reference(setting.planner, vehicles.planner, vehicles.moving),
-        disturbance(setting.disturbance, blocks.vehicle.disturbed(seen.nu_r), t),
-        blocks.water.motion(setting.water, vehicles.water, state.position, t),
-    )
 
 
 class Moment(NamedTuple):
@@ -150,122 +97,168 @@ class Instant(NamedTuple):
     t: float  #: [s]
     vehicles: Vehicles
     scene: Scene
-    measured: Any  #: what the controller is told: Measurement or PdMeasurement
+    measured: Measurement | PdMeasurement  #: what the controller is told
     controller_state: Any  #: a ControllerState; of the PD controller theta_hat
     signals: Any  #: Signals or PdSignals
-    now: Sent  #: what this instant passes on
-    command: Vector3  #: (tau_u, tau_q, tau_r) of it, at the actuators or their allocation [N, N.m]
-    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]; of a REMUS 100 what is allocated
+    command: Vector3  #: (tau_u, tau_q, tau_r) that reaches the actuators [N, N.m]
+    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]
     tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
-    water: WaterMotion  #: that acts
+
+
+# The controllers
+
+
+def measurement(gains: Gains | PdGains, seen: Scene) -> Measurement | PdMeasurement:
+    """What the controller is told; only the PD controller is told the velocity."""
+    if isinstance(gains, PdGains):
+        return PdMeasurement(seen.y, seen.plant.euler, *seen.reference, seen.plant.dy)
+    return Measurement(seen.y, seen.plant.euler, *seen.reference)
+
+
+def first_state(gains: Gains | PdGains, y: Vector3) -> Any:
+    """State of the controller at the start."""
+    if isinstance(gains, PdGains):
+        return gains.theta_0
+    return output_feedback.initial_state(gains, y)
+
+
+def gated(gains: Gains | PdGains, state: Any, y: Vector3) -> Any:
+    """What the controller goes on from at an instant; the PD controller has no gate."""
+    return state if isinstance(gains, PdGains) else output_feedback.gated(gains, state, y)
+
+
+def evaluate(gains: Gains | PdGains, state: Any, measured: Any, h: float) -> Any:
+    """All that the controller computes from its state and what it is told."""
+    if isinstance(gains, PdGains):
+        return pd.evaluate(gains, state, measured)
+    return output_feedback.evaluate(gains, state, measured, h)
+
+
+def advanced(gains: Gains | PdGains, state: Any, signals: Any, h: float) -> Any:
+    """State of the controller after a step of h seconds."""
+    if isinstance(gains, PdGains):
+        return pd.step(state, signals, h)
+    return output_feedback.step(state, signals, h)
 
 
 # The loop
 
 
-def begin(setting: Setting, blocks: Blocks, n: Vector3) -> Moment:
+def splits(setting: Setting) -> Splits:
+    """How a step is split."""
+    return Splits(*(internal_steps(setting.h, longest_step(one)) for one in setting.h_max))
+
+
+def vehicles_at_start(setting: Setting) -> Vehicles:
+    """Vehicle and reference at the start."""
+    own, of_planner = setting.plant, setting.planner
+    state = plant.begin(own, plant.flow(own, _ZERO))
+    planner = motion_planner.initial_state(of_planner.eta0, of_planner.nu0)
+    moving = motion_planner.motion(of_planner.vehicle, planner, of_planner.tau_d)
+    return Vehicles(state, rotation_from_quaternion(state.quaternion), planner, moving)
+
+
+def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
+    """What is seen at time t [s].
+
+    Args:
+        setting: of the loop.
+        vehicles: at that time.
+        t: time [s].
+        n: three independent standard normal numbers, of the localisation system.
+
+    """
+    own, of_planner = setting.plant, setting.planner
+    seen = plant.outputs(vehicles.plant, vehicles.rotation, own.ell, own.roll.rolls)
+    return Scene(
+        seen,
+        plant.measure(seen.y, n, own.noise.std),
+        motion_planner.reference(vehicles.planner, vehicles.moving, of_planner.ell),
+        disturbance(setting.disturbance, seen.nu_r, t),
+    )
+
+
+def begin(setting: Setting, n: Vector3) -> Moment:
     """The start.
 
     Args:
         setting: of the loop.
-        blocks: that stand in it.
         n: three independent standard normal numbers.
 
     """
-    vehicles = vehicles_at_start(setting, blocks)
-    seen = scene(setting, blocks, vehicles, 0.0, n)
-    state = blocks.controller.start(setting.controller, blocks.controller.measurement(seen))
-    still = Sent(_NO_COMMAND, seen.plant.nu_r, vehicles.plant.position, blocks.vehicle.idle())
-    return Moment(0.0, vehicles, seen, state, still)
+    vehicles = vehicles_at_start(setting)
+    seen = scene(setting, vehicles, 0.0, n)
+    state = first_state(setting.controller, seen.y)
+    return Moment(0.0, vehicles, seen, state, Sent(_ZERO, seen.plant.nu_r))
 
 
-def act(
-    setting: Setting, blocks: Blocks, moment: Moment, h: float, parts: Splits, delayed: bool
-) -> Instant:
+def act(setting: Setting, moment: Moment, parts: Splits, delayed: bool) -> Instant:
     """All signals at a moment, from which a step begins.
 
     Args:
         setting: of the loop.
-        blocks: that stand in it.
         moment: of the loop.
-        h: the step [s].
-        parts: that it is split into.
-        delayed: what blocks pass on arrives one step late, as in Jacobi order (reading 5): the
-            command, what is allocated, and what the disturbance and the water are told.
+        parts: that a step is split into.
+        delayed: the command, and what the disturbance is told, arrive one step late, as in Jacobi
+            order (reading 5).
 
     """
-    t, vehicles, scene, controller_state, before = moment
-    law, vehicle = blocks.controller, blocks.vehicle
-    h_c = h / parts.controller
-    measured = law.measurement(scene)
-    state = law.gated(setting.controller, controller_state, measured)
-    signals = law.evaluate(setting.controller, state, measured, h_c)
-    tau_w, water = scene.tau_w, scene.water
-    late = delayed and t > 0.0
-    if late:
-        tau_w = disturbance(setting.disturbance, vehicle.disturbed(before.nu_r), t)
-        water = blocks.water.motion(setting.water, vehicles.water, before.position, t)
-    told = before.tau if late else signals.tau
-    allocated = vehicle.allocate(setting.allocation, told, scene.plant.nu_r)
-    now = Sent(signals.tau, scene.plant.nu_r, vehicles.plant.position, allocated)
-    tau = vehicle.driving(setting.plant, told, before.allocated if late else allocated)
-    return Instant(t, vehicles, scene, measured, state, signals, now, told, tau, tau_w, water)
+    t, vehicles, seen, state, before = moment
+    gains = setting.controller
+    measured = measurement(gains, seen)
+    state = gated(gains, state, seen.y)
+    signals = evaluate(gains, state, measured, setting.h / parts.controller)
+    command, tau_w = signals.tau, seen.tau_w
+    if delayed and t > 0.0:
+        command, tau_w = before.tau, disturbance(setting.disturbance, before.nu_r, t)
+    tau = plant.applied(setting.plant, command)
+    return Instant(t, vehicles, seen, measured, state, signals, command, tau, tau_w)
 
 
-def move(setting: Setting, blocks: Blocks, instant: Instant, h: float, parts: Splits) -> Vehicles:
-    """All one step later.
+def move(
+    setting: Setting, vehicles: Vehicles, tau: Vector3, tau_w: Vector6, parts: Splits
+) -> Vehicles:
+    """Vehicle and reference one step later.
 
     Args:
         setting: of the loop.
-        blocks: that stand in it.
-        instant: that the step begins with.
-        h: step [s].
-        parts: that it is split into.
+        vehicles: at the beginning of the step.
+        tau: (tau_u, tau_q, tau_r) that the limits of (3) leave [N, N.m].
+        tau_w: disturbance that acts (u, v, w, p, q, r) [N, N.m].
+        parts: that the step is split into.
 
     """
-    t, vehicles = instant.t, instant.vehicles
-    state, rotation = vehicles.plant, vehicles.rotation
-    planner, moving = vehicles.planner, vehicles.moving
-    n, n_d = parts.plant, blocks.planner.parts(parts.planner)
-    for _ in range(n):
-        state, rotation = blocks.vehicle.step(
-            setting.plant, state, rotation, instant.tau, instant.tau_w, instant.water, h / n
-        )
-    for i in range(n_d):
-        h_d = h / n_d
-        planner, moving = blocks.planner.step(setting.planner, planner, moving, t + i * h_d, h_d)
-    water = blocks.water.later(setting.water, vehicles.water, h)
-    return Vehicles(state, rotation, planner, moving, water)
+    own, of_planner = setting.plant, setting.planner
+    state, rotation, planner, moving = vehicles
+    h, h_d = setting.h / parts.plant, setting.h / parts.planner
+    for _ in range(parts.plant):
+        flow = plant.flow(own, _ZERO)
+        state = plant.advance(own, state, rotation, tau, tau_w, flow, _ZERO, h)
+        rotation = rotation_from_quaternion(state.quaternion)
+    for _ in range(parts.planner):
+        planner = motion_planner.step(planner, moving, h_d)
+        moving = motion_planner.motion(of_planner.vehicle, planner, of_planner.tau_d)
+    return Vehicles(state, rotation, planner, moving)
 
 
-def step(
-    setting: Setting,
-    blocks: Blocks,
-    instant: Instant,
-    h: float,
-    parts: Splits,
-    end: float,
-    n: Vector3,
-) -> Moment:
+def step(setting: Setting, instant: Instant, parts: Splits, end: float, n: Vector3) -> Moment:
     """All states advance together (reading 5).
 
     Args:
         setting: of the loop.
-        blocks: that stand in it.
         instant: that the step begins with.
-        h: step [s].
         parts: that it is split into.
         end: time at its end [s].
         n: three independent standard normal numbers, for what is measured then.
 
     """
-    gains, measured, h_c = setting.controller, instant.measured, h / parts.controller
-    law = blocks.controller
-    state = law.step(instant.controller_state, instant.signals, h_c)
+    gains, h_c = setting.controller, setting.h / parts.controller
+    state = advanced(gains, instant.controller_state, instant.signals, h_c)
     for _ in range(parts.controller - 1):
-        state = law.step(state, law.evaluate(gains, state, measured, h_c), h_c)
-    vehicles = move(setting, blocks, instant, h, parts)
-    return Moment(end, vehicles, scene(setting, blocks, vehicles, end, n), state, instant.now)
+        state = advanced(gains, state, evaluate(gains, state, instant.measured, h_c), h_c)
+    vehicles = move(setting, instant.vehicles, instant.tau, instant.tau_w, parts)
+    sent = Sent(instant.signals.tau, instant.scene.plant.nu_r)
+    return Moment(end, vehicles, scene(setting, vehicles, end, n), state, sent)
 
 
 def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> Iterator[Instant]:
@@ -280,11 +273,11 @@ def closed_loop(count: int, setting: Setting = PAPER, delayed: bool = False) -> 
         The instants t_0 = 0 to t_count, one more than steps.
 
     """
-    blocks, h, parts = blocks_of(setting), setting.h, splits(setting, setting.h)
+    parts = splits(setting)
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
-    moment = begin(setting, blocks, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
+    moment = begin(setting, (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)))
     for k in range(count + 1):
-        instant = act(setting, blocks, moment, h, parts, delayed)
+        instant = act(setting, moment, parts, delayed)
         yield instant
         n = gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0)
-        moment = step(setting, blocks, instant, h, parts, (k + 1) * h, n)
+        moment = step(setting, instant, parts, (k + 1) * setting.h, n)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, islice
 from math import cos, dist, hypot, pi, sin, sqrt
 from random import Random
 
@@ -24,11 +24,11 @@ from auv_fmu.guidance.formation import (
 )
 from auv_fmu.guidance.path_planner import ImpossiblePath
 from auv_fmu.loop import closed_loop
-from auv_fmu.loop.blocks import helix_begin, helix_step
 from auv_fmu.loop.closed_loop import PAPER
 from auv_fmu.paper import motion_planner
 from auv_fmu.paper.motion_planner import Reference
 from support.formations import FOUR, ORIGIN, every, follow, known, tables
+from support.helix import helix
 
 DEFAULT = Parameters()
 
@@ -216,15 +216,12 @@ def test_place_of_the_leader_has_its_reference():
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_places_beside_the_helix_of_the_paper_can_be_followed(shape, number):
     """From rest on: the inner places move back as the formation begins to turn."""
-    parameters, of_leader = in_shape(shape, number), motion_planner.Parameters()
-    moving, motion = helix_begin(of_leader)
-    state = None
-    for k in range(3000):
+    parameters, state = in_shape(shape, number), None
+    for k, (moving, motion) in enumerate(islice(helix(), 3000)):
         leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
         state = state or formation.first_state(leader)
         formation.reference(parameters, state, leader, 0.02 * k)
         state = formation.step(parameters, state, leader, 0.02)
-        moving, motion = helix_step(of_leader, moving, motion, 0.02 * k, 0.02)
 
 
 def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
@@ -232,9 +229,8 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
 
     The distances are within the errors that each has: all planners have the same heading.
     """
-    blocks, h, moments = closed_loop.blocks_of(PAPER), PAPER.h, []
-    parts, of_leader = closed_loop.splits(PAPER, h), motion_planner.Parameters()
-    moving, motion = helix_begin(of_leader)
+    h, parts, moments = PAPER.h, closed_loop.splits(PAPER), []
+    moving, motion = next(helix())
     leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
     planners = [in_shape(Shape.LINE, number) for number in (1, 2, 3)]
     states = [formation.first_state(leader)] * 3
@@ -242,15 +238,16 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
     for planner, state in zip(planners, states, strict=True):
         x, y, z = formation.reference(planner, state, leader, 0.0).y_d
         begun = PAPER._replace(plant=PAPER.plant._replace(eta0=(x - 0.35, y, z, 0.0, 0.0, 0.0)))
-        moments.append(closed_loop.begin(begun, blocks, ORIGIN))
-    for k in range(3000):
+        moments.append(closed_loop.begin(begun, ORIGIN))
+    for k, (moving, motion) in enumerate(islice(helix(), 3000)):
+        leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
         errors, positions = [], []
         for i, planner in enumerate(planners):
             wanted = formation.reference(planner, states[i], leader, k * h)
             moment = moments[i]._replace(scene=moments[i].scene._replace(reference=wanted))
-            instant = closed_loop.act(PAPER, blocks, moment, h, parts, delayed=False)
+            instant = closed_loop.act(PAPER, moment, parts, delayed=False)
             n = (noise(0.0, 1.0), noise(0.0, 1.0), noise(0.0, 1.0))
-            moments[i] = closed_loop.step(PAPER, blocks, instant, h, parts, (k + 1) * h, n)
+            moments[i] = closed_loop.step(PAPER, instant, parts, (k + 1) * h, n)
             states[i] = formation.step(planner, states[i], leader, h)
             errors.append(dist(moment.scene.plant.y, wanted.y_d))
             positions.append(moment.scene.plant.y)
@@ -259,8 +256,6 @@ def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
             d = dist(formation.offset(planners[i], 0), formation.offset(planners[j], 0))
             assert abs(dist(a, b) - d) <= errors[i] + errors[j] + 1e-9
         assert max(errors) < (0.2 if k * h > 40.0 else 1.5)
-        moving, motion = helix_step(of_leader, moving, motion, k * h, h)
-        leader = known(*motion_planner.reference(moving, motion, 0.35), moving.psi)
 
 
 def test_vehicle_points_along_its_reference_and_at_rest_with_the_formation():

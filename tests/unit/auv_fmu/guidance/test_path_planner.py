@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 
 from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import MOST, ImpossiblePath, Parameters, Waypoints, check, demand
-from auv_fmu.loop.blocks import helix_begin, helix_step
 from auv_fmu.paper import motion_planner
 from auv_fmu.paper.motion_planner import Reference
 from auv_fmu.paper.vehicle import Vehicle, accelerations
+from support.helix import helix_after
 
 VEHICLE, ELL = Vehicle(), 0.35
 
@@ -160,11 +160,7 @@ def test_vehicle_under_what_a_level_circle_asks_for_goes_round_it(speed, radius)
 
 def test_helix_of_fig_4_asks_for_the_torques_that_drive_it():
     """To 1 %: its climb is that of the path, not that of the vehicle, which drifts a little."""
-    parameters = motion_planner.Parameters()
-    state, moving = helix_begin(parameters)
-    for k in range(5000):
-        state, moving = helix_step(parameters, state, moving, 0.02 * k, 0.02)
-    asked = demand(VEHICLE, ELL, motion_planner.reference(state, moving, ELL))
+    asked = demand(VEHICLE, ELL, motion_planner.reference(*helix_after(5000), ELL))
     assert asked.tau == pytest.approx((5.0, 1.0, 2.0), rel=0.01)
 
 

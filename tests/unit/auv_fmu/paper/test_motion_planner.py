@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.loop.blocks import helix_begin
 from auv_fmu.paper import motion_planner
 from auv_fmu.paper.motion_planner import Parameters, PlannerState, SteepReference
 from auv_fmu.paper.vehicle import Vehicle, accelerations
+from support.helix import helix
 from support.strategies import angles, forces, lengths, speeds, vectors
 
 VEHICLE = Vehicle()
@@ -53,9 +53,9 @@ def test_reference_vehicle_obeys_equation_2_undisturbed(theta, psi, nu, tau_d):
 
 def test_reference_starts_in_its_posture_at_rest_or_in_motion():
     eta0, nu0 = (1.0, 2.0, 3.0, 0.4, 0.5), (0.1, 0.2, 0.3, 0.4, 0.5)
-    at_rest, _ = helix_begin(Parameters(eta0=eta0))
+    at_rest, _ = next(helix(Parameters(eta0=eta0)))
     assert at_rest == ((1.0, 2.0, 3.0), 0.4, 0.5, (0.0,) * 5)
-    moving, _ = helix_begin(Parameters(eta0=eta0, nu0=nu0))
+    moving, _ = next(helix(Parameters(eta0=eta0, nu0=nu0)))
     assert moving == ((1.0, 2.0, 3.0), 0.4, 0.5, nu0)
 
 

@@ -5,12 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.loop.blocks import helix_begin, helix_step
 from auv_fmu.paper import motion_planner
 from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import alpha_1_at_most, alphas, ball, reach, stretch, theorem
 from auv_fmu.proof.gain_conditions import Bounds, Zetas, bounds, conditions, coupling
+from support.helix import helix_after
 from support.strategies import speeds, vectors
 
 ELL = 0.35
@@ -97,11 +97,7 @@ def test_31_asks_for_a_small_lambda_in_any_unit(lambda_, v0):
 
 def test_31_asks_for_a_slow_reference_in_any_unit():
     """zeta_1 is k |dy_d| at least. Section 4.1 has 0.167 m/s, once it is on its way."""
-    planner = motion_planner.Parameters()
-    state, moving = helix_begin(planner)
-    for k in range(2500):
-        state, moving = helix_step(planner, state, moving, 0.02 * k, 0.02)
-    speed = np.linalg.norm(motion_planner.reference(state, moving, ELL).dy_d)
+    speed = np.linalg.norm(motion_planner.reference(*helix_after(2500), ELL).dy_d)
     assert speed == pytest.approx(0.167, abs=5e-4)
     known, k = bounds(Vehicle(), ELL), coupling(Vehicle(), ELL)
     found = theorem(Vehicle(), ELL, Gains(), 1.0)
