@@ -16,9 +16,11 @@ end in the same state as the straight line, to the last bit.
 
 from __future__ import annotations
 
+import sys
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
+from pathlib import Path
 from random import Random
 from statistics import median
 from time import process_time
@@ -31,9 +33,13 @@ from orchestrator.runs.loading import load, load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import ready_studies
+from orchestrator.studies.study import BATCH, ready_studies
 from orchestrator.studies.study_file import read_study
+from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tools"))
+from parts.straight_line import setting_of
 
 #: Runs that are timed: noise is drawn in the first.
 _SCENARIOS = ("fig4", "fig5", "fig5-pd")
@@ -58,12 +64,13 @@ def straight(setting: Setting, steps: int) -> None:
     deque(closed_loop(steps, setting), maxlen=0)
 
 
-def compare(engine: BatchEngine, steps: int, repetitions: int) -> None:
+def compare(systems: Mapping[str, System], steps: int, repetitions: int) -> None:
     """Print what a step costs."""
+    engine = BatchEngine(systems)
     print(f"medians of {repetitions} repetitions of {steps} steps, processor's time")
     for name in _SCENARIOS:
         point = Point(0, name, {}, steps * _STEP, _STEP)
-        setting = engine.setting(point)
+        setting = setting_of(systems[name], point)
         make(engine, [point])
         rows = [
             (
@@ -90,24 +97,26 @@ def grow(engine: BatchEngine) -> None:
 
 
 def check(n: int) -> None:
-    """Print how many runs of the ready studies end as the straight line does."""
+    """Print how many runs of the ready studies of this engine end as the straight line does."""
     for name in ready_studies():
         study = read_study(name)
-        systems = {one: load_scenario(one) for one in study.scenario}
-        engine = BatchEngine({one: system for one, (_, system) in systems.items()})
-        space = Space(study, systems)
+        if study.engine != BATCH:
+            continue
+        loaded = {one: load_scenario(one) for one in study.scenario}
+        systems = {one: system for one, (_, system) in loaded.items()}
+        engine, space = BatchEngine(systems), Space(study, loaded)
         points = [space[number] for number in Random(name).sample(range(len(space)), n)]
-        same = sum(map(is_straight, [engine] * n, points))
+        same = sum(is_straight(engine, systems[point.scenario], point) for point in points)
         print(f"{name:12} {same} of {n} runs end in the same state", flush=True)
 
 
-def is_straight(engine: BatchEngine, point: Point) -> bool:
+def is_straight(engine: BatchEngine, system: System, point: Point) -> bool:
     """Whether a run ends in the state in which the straight line ends, which has equal steps."""
     experiment = Experiment(point.stop_time, point.step, point.order)
     point = point._replace(stop_time=experiment.time(experiment.full_steps))
     table = engine.table(point)
     delayed = point.order == "jacobi"
-    *_, before, last = closed_loop(len(table) - 1, engine.setting(point), delayed)
+    *_, before, last = closed_loop(len(table) - 1, setting_of(system, point), delayed)
     state = (before if table.header.experiment.acting_row else last).controller_state
     theta_hat = getattr(state, "theta_hat", state)
     ends = (*last.vehicles.plant.position, *last.scene.plant.nu, *theta_hat)
@@ -123,9 +132,9 @@ def main() -> None:
     if given.check:
         check(given.check)
         return
-    engine = BatchEngine({name: load(name) for name in _SCENARIOS})
-    compare(engine, given.steps, given.repetitions)
-    grow(engine)
+    systems = {name: load(name) for name in _SCENARIOS}
+    compare(systems, given.steps, given.repetitions)
+    grow(BatchEngine(systems))
 
 
 if __name__ == "__main__":

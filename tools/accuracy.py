@@ -25,10 +25,10 @@ from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
-from orchestrator.studies.batch.kernel import flat
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
+from parts.straight_line import setting_of
 
 Values = Mapping[str, Any]
 
@@ -71,11 +71,12 @@ class Runs:
 
     def __init__(self) -> None:
         """Load them."""
-        self._engine = BatchEngine({name: load(name) for name in SCENARIOS})
+        self._systems = {name: load(name) for name in SCENARIOS}
+        self._engine = BatchEngine(self._systems)
 
     def setting(self, name: str, values: Values) -> Setting:
         """What the equations are given."""
-        return self._engine.setting(self._run(name, values, STEP))
+        return setting_of(self._systems[name], self._run(name, values, STEP))
 
     def table(self, name: str, values: Values = EULER, step: float = STEP) -> Table:
         """With all rows."""
@@ -205,9 +206,10 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     assert isinstance(own, plant.Parameters)
     assert isinstance(settings, motion_planner.Parameters)
     begun = closed_loop.begin(setting, blocks, (0.0, 0.0, 0.0))
-    assert isinstance(begun.controller_state, ControllerState)
-    # Its steps are all of one length, which so does not change.
-    control_begun = begun.controller_state._replace(h=h)
+    control_begun = begun.controller_state
+    if isinstance(control_begun, ControllerState):
+        # Its steps are all of one length, which so does not change.
+        control_begun = control_begun._replace(h=h)
     start = begun.vehicles.plant, begun.vehicles.planner, control_begun
 
     def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Scene]:
@@ -244,6 +246,11 @@ def like(state: Any, numbers: Iterator[float]) -> Any:
         return next(numbers)
     parts = [like(part, numbers) for part in state]
     return type(state)(*parts) if hasattr(state, "_fields") else tuple(parts)
+
+
+def flat(value: Any) -> tuple[float, ...]:
+    """The numbers of a state, in their order."""
+    return tuple(x for part in value for x in flat(part)) if isinstance(value, tuple) else (value,)
 
 
 def largest(path: np.ndarray, other: np.ndarray) -> float:

@@ -87,7 +87,7 @@ def test_programs_take_nothing_from_the_current_folder(workplace, monkeypatch):
     before = {path.name for path in workplace.iterdir()}
     command = ("sweep", "study.toml", "--engine", "batch", "--kind", "native", "--workers", "1")
     subprocess.run(
-        [sys.executable, "-m", "orchestrator", *command],
+        [sys.executable, "-P", "-m", "orchestrator", *command],
         stdout=subprocess.DEVNULL, check=True,
     )  # fmt: skip
     assert {path.name for path in workplace.iterdir()} == before | {"cache", "results"}
