@@ -14,7 +14,8 @@ room                what it is for
 :mod:`.vehicle`     this vehicle's signals, indices and certificates
 :mod:`.figures`     figures of runs and of studies
 :mod:`.runs`        scenarios, wiring, bundle, one run and its files
-:mod:`.live`        the page in which a loop runs
+:mod:`.program`     a system as one compiled program
+:mod:`.live`        the page in which a system runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
 :mod:`.studies`     many runs
 :mod:`.paper`       the paper's numbers and claims beside ours

@@ -62,7 +62,7 @@ _MARKDOWN = MarkdownIt("commonmark").enable("table")
 
 #: Where sentences end, the end of an item that is one, and what has a full stop within one.
 _END = re.compile(
-    r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|numba|pip|theta_hat))"""
+    r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|pip|theta_hat))"""
 )
 _SENTENCE = re.compile(r"""[.!?:]["')\]]*$""")
 _ABBREVIATION = re.compile(

@@ -1,7 +1,7 @@
 """A run of a study, what comes out of it, and what an engine is.
 
 There are two engines. The one here runs FMUs, of any system. The other (:mod:`.batch_engine`) runs
-the equations of the closed loop, compiled, and is some hundred times as fast. Both give the same
+a system of components in the language of equations as one compiled program. Both give the same
 numbers.
 """
 

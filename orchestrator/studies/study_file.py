@@ -172,8 +172,8 @@ class StudyFile(TomlTable):
         "What the report says below the figures, in Markdown without pictures.", "none"
     )
     engine: Annotated[str, OneOf(ENGINES)] = entry(
-        "What makes the runs: the FMUs, or the compiled equations, which cover only the closed "
-        "loop of one vehicle and give the same numbers.",
+        "What makes the runs: the FMUs, or one compiled program of the system, which takes "
+        "components in the language of equations and gives the same numbers.",
         f"`{ENGINES[0]}`",
     )
     stop_time: float | StopTimeTable = entry(

@@ -80,14 +80,16 @@ class Means:
         str | None,
         CliOption(
             "address of a Dask scheduler whose workers make the runs, for example "
-            "tcp://10.0.0.1:8786; default: processes on this machine",
+            "tcp://10.0.0.1:8786; default: this machine makes them",
             metavar="ADDRESS",
         ),
     ] = None
     workers: Annotated[
         int | None,
         CliOption(
-            "number of processes on this machine; default: one per core", type=int, metavar="N"
+            "how many runs this machine makes at a time; default: one per core",
+            type=int,
+            metavar="N",
         ),
     ] = None
     force: Force = False
@@ -125,9 +127,9 @@ def sweep(
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
             study began, else native where available.
         loop: loop that makes their steps: `python`, `compiled` or `auto`.
-        scheduler: address of a Dask scheduler whose workers make the runs; None: processes on
-            this machine.
-        workers: number of processes on this machine; None: one for each core.
+        scheduler: address of a Dask scheduler whose workers make the runs; None: this machine
+            makes them.
+        workers: how many runs this machine makes at a time; None: one for each core.
         out: folder of the study; runs that are finished there are not made again. None:
             `results/NAME`.
         progress: show a bar on studies that take longer than some seconds.

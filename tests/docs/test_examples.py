@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import orchestrator.studies.batch
 from fmus.compilers import machines_compiler
 from orchestrator import simulate, sweep
 from orchestrator.commands.main import main
@@ -55,7 +54,7 @@ def needs(extra: str, *packages: str) -> pytest.MarkDecorator:
     return pytest.mark.skipif(missing, reason=f"needs the extra `{extra}`")
 
 
-needs_studies = needs("studies", "numba", "pyarrow", "scipy")
+needs_studies = needs("studies", "pyarrow", "scipy")
 
 
 def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) -> list[str]:
@@ -154,20 +153,20 @@ def test_first_result_on_the_page_is_shown_as_it_is(capsys):
     assert f"`{shown}`" in PYTHON.read_text(encoding="utf-8")
 
 
-@needs("studies", "numba")
 def test_batch_engine_gives_what_the_fmus_give(capsys):
     first, *lines = executed(BATCH, capsys)
     result = simulate("fig5", {"controller.eps_t": 1.0}, stop_time=40.0, kind="native")
     z, failure = first.split()
     assert (float(z), failure) == (result["plant.eta.z"][-1], "None")
-    assert float(lines[-1].split()[0]) == result.metrics()["l2_effort"][0]
-    assert len(lines) == 3
+    assert float(lines[0].split()[0]) == result.metrics()["l2_effort"][0]
+    assert len(lines) == 2
 
 
 def test_modules_of_the_batch_engine_on_the_page_are_there():
     listed = re.findall(r"^\| `(\w+)\.py` \|", BATCH.read_text(encoding="utf-8"), re.MULTILINE)
+    room = DOCS.parent / "orchestrator" / "program"
     assert listed
-    assert all(f":mod:`.{name}`" in str(orchestrator.studies.batch.__doc__) for name in listed)
+    assert all((room / f"{name}.py").is_file() for name in listed)
 
 
 def test_pages_of_studies_name_all_columns_options_and_ready_studies():

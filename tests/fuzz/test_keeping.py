@@ -50,7 +50,7 @@ from support.tiers import slow
 #: Examples of each command; with the profile `attack` some hundred times as many.
 EXAMPLES = max(settings.default.max_examples // 10, 8)
 
-STUDIES = all(map(find_spec, ("numba", "pyarrow", "scipy")))
+STUDIES = all(map(find_spec, ("pyarrow", "scipy")))
 
 RUN = ["run", "fig3a", "--stop-time", "0.1", "--no-figures"]
 STUDY = """

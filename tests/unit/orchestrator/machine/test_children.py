@@ -13,7 +13,7 @@ from orchestrator.commands.main import main
 from orchestrator.machine.children import listen_to_module
 from support.tiers import slow
 
-#: Files that change what matplotlib or numba do, or how they end.
+#: Files that change what matplotlib does, or how it ends.
 RC = [
     b"font.size: 30\naxes.facecolor: yellow\nbackend: module://evil\n",
     b"\xff\xfe\x00",
@@ -73,22 +73,24 @@ def test_workers_of_a_report_read_it_no_more(workplace):
 
 
 @pytest.mark.slow
-def test_numba_takes_nothing_from_the_current_folder(workplace):
-    pytest.importorskip("numba", reason="needs the extra `studies`")
-    Path(".numba_config.yaml").write_text(
-        "cache_dir: planted\ncache_locator_classes: evil.Locator\ndisable_jit: 1\n"
-    )
-    Path("evil.py").write_text("open('mark', 'w')\n")
+def test_programs_take_nothing_from_the_current_folder(workplace, monkeypatch):
+    """Neither modules nor headers."""
+    pytest.importorskip("scipy", reason="needs the extra `studies`")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(workplace / "cache"))
+    for name in ("ziglang", "auv_fmu", "plant"):
+        Path(f"{name}.py").write_text("open('mark', 'w')\n")
+    for name in ("math.h", "stddef.h", "error.h"):
+        Path(name).write_text("#error planted\n")
     Path("study.toml").write_text(
         'scenario = "fig5"\nstop_time = 0.2\n[vary]\nplant.eta0.y = [0.0, 4.0]\n'
     )
     before = {path.name for path in workplace.iterdir()}
     command = ("sweep", "study.toml", "--engine", "batch", "--kind", "native", "--workers", "1")
     subprocess.run(
-        [sys.executable, "-m", "orchestrator", *command],
+        [sys.executable, "-P", "-m", "orchestrator", *command],
         stdout=subprocess.DEVNULL, check=True,
     )  # fmt: skip
-    assert {path.name for path in workplace.iterdir()} == before | {"results"}
+    assert {path.name for path in workplace.iterdir()} == before | {"cache", "results"}
 
 
 def test_lines_of_a_module_are_heard_before_it_ends(workplace, monkeypatch):

@@ -12,8 +12,10 @@ STUDY = {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}}
 
 
 def test_packages_that_are_missing_are_named_with_what_installs_them(monkeypatch, tmp_path):
-    monkeypatch.setattr(module, "find_spec", lambda name: None if name in ("scipy", "numba") else 1)
-    words = r"studies need numba, scipy: pip install 'auv-fmu\[studies\]'"
+    monkeypatch.setattr(
+        module, "find_spec", lambda name: None if name in ("scipy", "pyarrow") else 1
+    )
+    words = r"studies need pyarrow, scipy: pip install 'auv-fmu\[studies\]'"
     with pytest.raises(InputError, match=words):
         sweep(STUDY, out=tmp_path / "study")
     assert not (tmp_path / "study").exists()
