@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import chain
 from math import inf, isnan
@@ -201,6 +201,7 @@ class _Known:
 
     def cautions(self, ready: _Ready, point: Point, numbers: Sequence[float]) -> str | None:
         """What to be wary of in a run."""
+
         def value(name: str) -> Value | None:
             return self.value(point, name)
 
@@ -227,7 +228,6 @@ class _Known:
             self._ports  # noqa: B018
         kept = {name: one for name, one in self.__dict__.items() if name != "_values"}
         return {**kept, "_definitions": None, "_parameters": None}
-
 
 
 def _number(one: _Parameter, value: Any) -> float:

@@ -129,7 +129,7 @@ def test_all_mistakes_of_a_study_are_said(tmp_path, capsys):
 )  # fmt: skip
 def test_check_of_a_study_finds_what_sweep_finds(content, culprits, workplace, capsys):
     """All of it, where `sweep` says the first, and does nothing."""
-    pytest.importorskip("numba", reason="needs the extra `studies`")
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     file = workplace / "mine.toml"
     file.write_text(toml_text({"scenario": "fig5", **content}))
     assert main(["check", "mine.toml"]) == 2

@@ -168,7 +168,7 @@ def test_runs_are_kept_for_the_next_report(folder):
 
 
 def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):
-    pytest.importorskip("numba", reason="needs the extra `studies`")
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     (tmp_path / "many.toml").write_text(STUDY)
     [study] = make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
     text = "\n\n".join(study_sections([study], tmp_path / "kept", tmp_path))

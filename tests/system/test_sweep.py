@@ -29,7 +29,7 @@ from support.machine import contents
 from support.texts import mentions, tells
 from support.tiers import slow
 
-pytest.importorskip("numba", reason="needs the extra `studies`")
+pytest.importorskip("pyarrow", reason="needs the extra `studies`")
 
 STUDY = """
 title = "Two starts"

@@ -17,7 +17,7 @@ from orchestrator.paper.printed_table import NUMBERS
 from orchestrator.paper.variants import FARTHEST_START, all_variants
 from support.runs import InThisProcess
 
-pytest.importorskip("numba", reason="needs the extra `studies`")
+pytest.importorskip("pyarrow", reason="needs the extra `studies`")
 
 PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "table.md"
 
