@@ -39,6 +39,9 @@ EXPORTED = (
     else ('-DEXPORTED=__attribute__((visibility("default")))',)
 )
 
+#: The library of mathematics, which is a part of the C library of Windows.
+MATHEMATICS = () if sys.platform == "win32" else ("-lm",)
+
 #: Nothing here unwinds the stack, except the C library of Windows, half of a library there, which
 #: is compiled with the same options: the ones for a small library.
 _NO_TABLES = ("-fno-unwind-tables", "-fno-asynchronous-unwind-tables")

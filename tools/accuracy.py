@@ -28,7 +28,7 @@ from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
-from straight import setting_of
+from parts.straight import setting_of
 
 Values = Mapping[str, Any]
 

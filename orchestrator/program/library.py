@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, create_string_buffer
 from dataclasses import dataclass, field, replace
@@ -204,8 +203,6 @@ def compiled(source: Source) -> bytes:
     file = process_folder() / f"{source.key}.c"
     file.write_text(source.text, encoding="utf-8")
     try:
-        return compile_library(
-            compiler, *FLAGS, str(file), *(() if sys.platform == "win32" else ("-lm",))
-        )
+        return compile_library(compiler, *FLAGS, str(file), *MATHEMATICS)
     finally:
         file.unlink(missing_ok=True)

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from fmpy import platform_tuple, sharedLibraryExtension
 
-from fmus.compilers import EXPORTED, FLAGS
+from fmus.compilers import EXPORTED, FLAGS, MATHEMATICS
 from fmus.language.build import Untranslatable
 from fmus.native.names import RUNTIME
 from fmus.native.reducer import text_over_rows
@@ -66,7 +66,7 @@ def _compiled(text: str) -> bytes:
         source = Path(temporary, "indices.c")
         source.write_text(text, encoding="utf-8")
         return compile_library(
-            compiler, *FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", str(source), "-lm"
+            compiler, *FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", str(source), *MATHEMATICS
         )
 
 

@@ -36,7 +36,7 @@ from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from straight import setting_of
+from parts.straight import setting_of
 from support import others
 from support.runs import prepared, whole
 from support.texts import mentions
