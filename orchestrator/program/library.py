@@ -13,7 +13,7 @@ from threading import local
 import numpy as np
 from fmpy import platform_tuple, sharedLibraryExtension
 
-from fmus.compilers import EXPORTED, LIMIT_OF_ZIG, SAME_NUMBERS
+from fmus.compilers import EXPORTED, LIMIT_OF_ZIG, MATHEMATICS, SAME_NUMBERS
 from orchestrator.machine.cache import made_once, read_cached
 from orchestrator.machine.children import Compiler, compile_library, find_compiler, run_module
 from orchestrator.machine.disk import process_folder
