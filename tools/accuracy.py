@@ -26,8 +26,9 @@ from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
+from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
-from parts.straight_line import setting_of
+from straight import setting_of
 
 Values = Mapping[str, Any]
 
@@ -43,6 +44,7 @@ CHAOTIC = "fig6-pd"
 #: Smaller steps than the paper's, and one that stands for their limit [s].
 SMALLER, LIMIT = (0.01, 0.005, 0.002), 0.0002
 
+QUIET: Values = {"plant.noise.std": 0.0}
 EULER: Values = {}
 RK4: Values = {"plant.integrator": "rk4"}
 EXACT: Values = {**RK4, "plant.h_max": STEP / 10}
@@ -75,7 +77,8 @@ class Runs:
 
     def setting(self, name: str, values: Values) -> Setting:
         """What the equations are given."""
-        return setting_of(self._systems[name], self._run(name, values, STEP))
+        changed = {port_name(port): value for port, value in {**QUIET, **values}.items()}
+        return setting_of(self._systems[name].with_parameters(changed))
 
     def table(self, name: str, values: Values = EULER, step: float = STEP) -> Table:
         """With all rows."""
@@ -102,8 +105,7 @@ class Runs:
 
     @staticmethod
     def _run(name: str, values: Values, step: float) -> Point:
-        quiet = {"plant.noise.std": 0.0, **values}
-        return Point(0, name, quiet, stop_time=SCENARIOS[name], step=step)
+        return Point(0, name, {**QUIET, **values}, stop_time=SCENARIOS[name], step=step)
 
 
 def plant_alone(runs: Runs) -> None:
@@ -236,17 +238,19 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     return np.array([unpacked(t, x)[2].plant.y for t, x in states])
 
 
+def flat(state: Any) -> list[float]:
+    """The numbers of a state, in their order."""
+    if isinstance(state, float):
+        return [state]
+    return [number for part in state for number in flat(part)]
+
+
 def like(state: Any, numbers: Iterator[float]) -> Any:
     """The state of the same form with other numbers."""
     if isinstance(state, float):
         return next(numbers)
     parts = [like(part, numbers) for part in state]
     return type(state)(*parts) if hasattr(state, "_fields") else tuple(parts)
-
-
-def flat(value: Any) -> tuple[float, ...]:
-    """The numbers of a state, in their order."""
-    return tuple(x for part in value for x in flat(part)) if isinstance(value, tuple) else (value,)
 
 
 def largest(path: np.ndarray, other: np.ndarray) -> float:

@@ -36,7 +36,7 @@ from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from parts.straight_line import setting_of
+from straight import setting_of
 from support import others
 from support.runs import prepared, whole
 from support.texts import mentions
@@ -131,7 +131,7 @@ def straight_row(acting: Instant, now: Instant, T: Sequence[float]) -> list[floa
 
 def compare_with_straight_line(engine: BatchEngine, system: System, point: Point) -> None:
     table = engine.table(point)
-    setting = setting_of(system, point)
+    setting = setting_of(system.with_parameters(changes(point.parameters)), point.step)
     straight = straight_rows(setting, len(table) - 1, point.order)
     found = table.group(*COMPARED)
     # Where nothing is drawn, what is zero is not of a sign.
