@@ -1,8 +1,8 @@
 """What noise of 1 mm does: the numbers of README, reproduction.md and the scenarios' remarks.
 
 `python tools/noise_numbers.py` prints them in Markdown, each over many draws of the noise. A number
-of a draw is given by its median, with what 5 and 95 % of the draws stay below. It needs the extra
-`studies`, and takes some minutes.
+of a draw is given by its median, with what 5 and 95 % of the draws stay below. It takes some
+minutes.
 """
 
 from __future__ import annotations

@@ -110,7 +110,7 @@ class _Known:
         self._own = own
         self._ready: dict[_Key, _Ready] = {}
         self._definitions: Mapping[str, Definition] | None = definitions_of(system)
-        self._parameters: Mapping[str, _Parameter] | None = None
+        self._parameters: tuple[Mapping[str, _Parameter], np.ndarray] | None = None
 
     def ready(self, order: Order | None, step: float) -> _Ready:
         """The program for an order and a step.
@@ -157,22 +157,21 @@ class _Known:
 
         """
         if self._parameters is None:
-            self._parameters = {
-                name: self._parameter(i, name) for i, name in enumerate(ready.source.parameters)
-            }
-            system = self.system
-            self._base = np.array(
-                [
-                    _number(one, system.value(port_name(name)))
-                    for name, one in self._parameters.items()
-                ],
-                dtype=float,
-            )
-        values = self._base.copy()
+            # At once: other threads make runs.
+            self._parameters = self._taken(ready)
+        parameters, own = self._parameters
+        values = own.copy()
         for name, value in changed.items():
-            one = self._parameters[name]
+            one = parameters[name]
             values[one.place] = _number(one, value)
         return values
+
+    def _taken(self, ready: _Ready) -> tuple[Mapping[str, _Parameter], np.ndarray]:
+        """All parameters of a program by their names, and the values that the system has."""
+        names = ready.source.parameters
+        parameters = {name: self._parameter(place, name) for place, name in enumerate(names)}
+        own = [_number(one, self.system.value(port_name(name))) for name, one in parameters.items()]
+        return parameters, np.array(own, dtype=float)
 
     def _parameter(self, place: int, text: str) -> _Parameter:
         name = self.system.named(port_name(text))

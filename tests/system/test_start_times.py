@@ -274,7 +274,6 @@ def test_a_table_that_begins_before_the_run_does_not_belong_to_it(folders, refus
 @pytest.mark.parametrize("start", STARTS)
 def test_a_study_has_the_same_numbers(folders, name, start, tmp_path):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     tables = []
     for one in (start, 0.0):
         *_, parameter = SIGNALS[name]
