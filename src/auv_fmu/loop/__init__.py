@@ -1,1 +1,8 @@
-"""Fig. 2 of the paper as one straight line of Python: :mod:`.closed_loop`."""
+"""Fig. 2 of the paper, as tests and benchmarks need it.
+
+===================  ===========================================
+module               what it states
+===================  ===========================================
+:mod:`.closed_loop`  the line in Python, from instant to instant
+===================  ===========================================
+"""
