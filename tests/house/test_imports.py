@@ -51,9 +51,9 @@ DECLARED = re.compile(
     r"fmus\.(compilers|kinds|discovery|ports|language\.build\.Untranslatable)(\.|$)"
 )
 
-#: What the rooms import besides that translate components, and indices.
+#: What those import besides that translate components or indices.
 TRANSLATED = re.compile(r"fmus\.(documentation|language|native|script)(\.|$)")
-TRANSLATING = ("program", "vehicle")
+TRANSLATING = (("program",), ("vehicle", "compiled_reducers"))
 
 #: What of it knows no component: C is compiled in the same way here and there.
 COMPILERS = ("fmus", "compilers")
@@ -155,12 +155,16 @@ def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
             assert others.isdisjoint(("auv_fmu", "fmus")), path
 
 
+def is_translating(name: tuple[str, ...]) -> bool:
+    return any(name[: len(one)] == one for one in TRANSLATING)
+
+
 def test_the_orchestrator_knows_of_components_only_what_they_declare():
     for path, name in modules("orchestrator"):
         for imported in imports(path):
             if imported[0] == "fmus":
                 module = ".".join(imported)
-                translates = name and name[0] in TRANSLATING and TRANSLATED.match(module)
+                translates = is_translating(name) and TRANSLATED.match(module)
                 assert translates or DECLARED.match(module), f"{path} imports {module}"
 
 
@@ -168,7 +172,7 @@ def test_what_components_declare_brings_no_pythonfmu_into_the_process():
     rooms = [
         ".".join(("orchestrator", *name))
         for _, name in modules("orchestrator")
-        if name and name[0] in TRANSLATING
+        if is_translating(name)
     ]
     declared = ", ".join([*components().values(), *rooms])
     code = f"import sys, fmus.compilers, fmus.kinds, fmus.discovery, {declared}; "

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
-TOOLS = sorted((Path(__file__).parents[2] / "tools").glob("*.py"))
+FILES = sorted((Path(__file__).parents[2] / "tools").glob("*.py"))
+
+#: Others are parts that several tools have.
+TOOLS = [file for file in FILES if "__main__" in file.read_text(encoding="utf-8")]
 
 #: Packages of the extras `dev`, `docs` and `studies`.
 NEEDED = ("pandas", "PIL", "proselint", "pyarrow", "scipy")

@@ -1,8 +1,13 @@
-"""Fig. 2 of the paper as one straight line of Python.
-
-===================  ====================================
 module               what it states
 ===================  ====================================
 :mod:`.closed_loop`  the line, from instant to instant
 ===================  ====================================
+=======
+"""Fig. 2 of the paper, as tests and benchmarks need it.
+
+===================  ===========================================
+module               what it states
+===================  ===========================================
+:mod:`.closed_loop`  the line in Python, from instant to instant
+===================  ===========================================
 """

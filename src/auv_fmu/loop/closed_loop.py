@@ -203,16 +203,16 @@ def act(setting: Setting, moment: Moment, parts: Splits, delayed: bool) -> Insta
             order (reading 5).
 
     """
-    t, vehicles, scene, controller_state, before = moment
-    gains = setting.controller
-    measured = measurement(gains, scene)
-    state = gated(gains, controller_state, scene.y)
+    t, seen, gains = moment.t, moment.scene, setting.controller
+    measured = measurement(gains, seen)
+    state = gated(gains, moment.controller_state, seen.y)
     signals = evaluate(gains, state, measured, setting.h / parts.controller)
-    command, tau_w = signals.tau, scene.tau_w
+    command, tau_w = signals.tau, seen.tau_w
     if delayed and t > 0.0:
-        command, tau_w = before.tau, disturbance(setting.disturbance, before.nu_r, t)
+        command = moment.before.tau
+        tau_w = disturbance(setting.disturbance, moment.before.nu_r, t)
     tau = plant.applied(setting.plant, command)
-    return Instant(t, vehicles, scene, measured, state, signals, command, tau, tau_w)
+    return Instant(t, moment.vehicles, seen, measured, state, signals, command, tau, tau_w)
 
 
 def move(
