@@ -96,18 +96,18 @@ _HEADER = """\
  *
  * A run, with the parameters of the scenario:
  *
- *     static {name}_simulation simulation;
+ *     static {name}_simulation it;
  *     static {real} row[{NAME}_COLUMNS];
  *
- *     if ({name}_begin(&simulation, NULL, {NAME}_STEPS)) ...
+ *     if ({name}_begin(&it, NULL, {NAME}_STEPS)) ...
  *     for (int k = 0; k <= {NAME}_STEPS; k++) {{
- *         if ({name}_step(&simulation, row)) ...
+ *         if ({name}_step(&it, row)) ...
  *         ... row[{column}] ...
  *     }}
  *
- * All that a run depends on lies in the simulation, of which there can be several. Nothing is
- * allocated or printed. Structures of {stack} bytes lie on the stack at once, or of up to twice as
- * many where a compiler inlines functions; those of the C library add to that.
+ * The whole run is in its simulation, and there can be several. Nothing is allocated or printed.
+ * Up to {stack} bytes of structures are on the stack at once, or up to twice as many where a
+ * compiler inlines functions; the C library takes more.
  */
 #ifndef {NAME}_H
 #define {NAME}_H
@@ -139,8 +139,8 @@ typedef union {{
     unsigned char bytes[{NAME}_BYTES];
 }} {name}_simulation;
 
-/* Who has refused to go on, and what: an input by its number among those of its component. Where
- * the component is -1, values do not come to rest at the start. */
+/* Which component has refused a call, and which input, counted within the component. Where the
+ * component is -1, values do not come to rest at the start. */
 typedef struct {{
     int component, call, input;
     int steps; /* that were made before */
@@ -151,8 +151,8 @@ enum {{ {calls} }};
 /* The parameters of the scenario, for those who want to change some. */
 void {name}_defaults({real} parameters[]);
 
-/* Begin a run of so many steps: set parameters, those of the scenario if there are none, and let
- * values come to rest. INT_MAX steps have no end. 0, or 1 where a component refuses. */
+/* Begin a run of so many steps: set parameters, by default the scenario's, and let values come to
+ * rest. INT_MAX steps have no end. 0, or 1 where a component refuses. */
 int {name}_begin({name}_simulation *simulation, const {real} parameters[], int steps);
 
 /* Give the row of the time that has come, unless it is NULL, and make the step after it; at the end
@@ -226,11 +226,11 @@ _MAIN = """\
 {refused}
 {columns}
 
-static {name}_simulation simulation;
+static {name}_simulation it;
 static {real} row[{NAME}_COLUMNS];
 
 static int fail(void) {{
-    const {name}_refusal why = {name}_failure(&simulation);
+    const {name}_refusal why = {name}_failure(&it);
     if (why.component < 0) {{
         fprintf(stderr, "values do not come to rest at the start\\n");
     }} else {{
@@ -243,9 +243,9 @@ static int fail(void) {{
 int main(void) {{
     printf("%s", columns[0]);
     for (int i = 1; i < {NAME}_COLUMNS; i++) printf(",%s", columns[i]);
-    if ({name}_begin(&simulation, NULL, STEPS)) return fail();
+    if ({name}_begin(&it, NULL, STEPS)) return fail();
     for (int k = 0; k <= STEPS; k++) {{
-        if ({name}_step(&simulation, row)) return fail();
+        if ({name}_step(&it, row)) return fail();
         printf("\\n%.{digits}g", {cast}row[0]);
         for (int i = 1; i < {NAME}_COLUMNS; i++) printf(",%.{digits}g", {cast}row[i]);
     }}
@@ -485,8 +485,8 @@ def _single(found: re.Match[str]) -> str:
         value = float(text)
         if value.is_integer() and _ALL_WHOLE < value < _ALL_OF_DOUBLE and _rounded(value) != value:
             raise Unsupported(
-                f"equations count with {value:.0f}, as those of random numbers do, and single "
-                "precision does not have it: leave --single out"
+                f"equations count with {value:.0f}, as random numbers do, and single precision "
+                "does not have it: leave --single out"
             )
         held = min(max(value, _LEAST), _MOST) if value else value
         return f"{text if held == value else repr(held)}f"

@@ -225,7 +225,7 @@ def test_header_tells_the_bytes_that_a_program_takes(
     folder, upper = programs / name, stem(name).upper()
     header = (folder / f"{stem(name)}.h").read_text(encoding="utf-8")
     size = int(str(re.search(rf"{upper}_BYTES = (\d+)", header)[1]))  # type: ignore[index]
-    stack = int(str(re.search(r"Structures of (\d+) bytes", header)[1]))  # type: ignore[index]
+    stack = int(str(re.search(r"Up to (\d+) bytes of structures", header)[1]))  # type: ignore[index]
     exact = f"typedef char exactly[sizeof(simulation) == {size} ? 1 : -1];\n"
     source = tmp_path / "one.c"
     source.write_text(sources(folder)[0].read_text(encoding="utf-8") + exact, encoding="utf-8")
