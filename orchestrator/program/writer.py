@@ -753,13 +753,10 @@ class Text:
     def show(self) -> str:
         """What writes a row."""
         values = [(f"row[{i}]", place.text) for i, place in enumerate(self.columns.values(), 1)]
-        return (
-            "/* A row: the time, and all inputs and outputs. */\n"
-            + function(
-                "static void show(const simulation *it, double t, double row[])",
-                ["row[0] = t;", *_copies(values)],
-                (),
-            )
+        return "/* A row: the time, and all inputs and outputs. */\n" + function(
+            "static void show(const simulation *it, double t, double row[])",
+            ["row[0] = t;", *_copies(values)],
+            (),
         )
 
     def _look(self) -> list[str]:
