@@ -2,11 +2,10 @@
 
 Every repetition times Fig. 4, one after the other: the straight line `auv_fmu.loop.closed_loop`;
 our master on FMUs of the Python kind, on their twins in C, and on these in the compiled loop, every
-port recorded; a program in C on the twins, every port recorded, too; libcosim and ecos on either
-kind, which step in Jacobi order, alone and with every output read by their Python interfaces, and
-our compiled loop in that order. What comes before the first
-step is not counted. Printed are medians, ratios being taken within each repetition; then the size
-of the FMUs, and the time of an instance after the first.
+port recorded; libcosim and ecos on either kind, which step in Jacobi order, alone and with every
+output read by their Python interfaces, and our compiled loop in that order. What comes before the
+first step is not counted. Printed are medians, ratios being taken within each repetition; then the
+size of the FMUs, and the time of an instance after the first.
 """
 
 from __future__ import annotations
@@ -29,7 +28,6 @@ from measuring import options, python, steps_time, timed
 
 from auv_fmu.loop.closed_loop import closed_loop
 from auv_fmu.paper.euler import STEP
-from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts.comparison import HOSTS, compare
 from orchestrator.master.experiment import Experiment
 from orchestrator.master.loop import choose_loop
@@ -57,7 +55,6 @@ class Pair(NamedTuple):
 STRAIGHT = "straight-line Python loop"
 PYTHON, NATIVE = "master, Python kind", "master, native kind"
 COMPILED, COMPILED_JACOBI = "compiled loop, native kind", "compiled loop, native kind, Jacobi"
-C_PROGRAM = "C program, native kind"
 
 PAIRS = [
     Pair(NATIVE, PYTHON),
@@ -83,11 +80,6 @@ def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
     return sum(steps_time(system, steps, order, stepping) for _ in range(times)) / times
 
 
-def in_c(program: Path, steps: int) -> float:
-    """Steps in a program that calls the FMUs from C."""
-    return c_host.run_host([program], program.parent, steps, [])[1]
-
-
 def in_another(system: System, host: str, is_read: bool, steps: int) -> float:
     """Steps in a host that is not ours, alone or with every output read."""
     [verdict] = compare(system, [host], steps, STEP)
@@ -96,7 +88,7 @@ def in_another(system: System, host: str, is_read: bool, steps: int) -> float:
     return steps / (verdict.rows_per_second if is_read else verdict.steps_per_second)
 
 
-def engines(python: System, native: System, folder: Path) -> dict[str, Engine]:
+def engines(python: System, native: System) -> dict[str, Engine]:
     """All that can run here."""
     found: dict[str, Engine] = {
         STRAIGHT: straight_line,
@@ -104,7 +96,6 @@ def engines(python: System, native: System, folder: Path) -> dict[str, Engine]:
         NATIVE: partial(in_our_master, native, "python", "gauss-seidel"),
         COMPILED: partial(in_our_master, native, "compiled", "gauss-seidel"),
         COMPILED_JACOBI: partial(in_our_master, native, "compiled", "jacobi"),
-        C_PROGRAM: partial(in_c, c_host.compile_host(folder, native, Experiment(STEP, STEP))),
     }
     for name, host in OTHERS.items():
         if find_spec(HOSTS[host].package) is not None:
@@ -152,7 +143,7 @@ def main() -> None:
     print(f"medians of {given.repetitions} repetitions of {given.steps} steps")
     with TemporaryDirectory(prefix="auvfmu") as temporary:
         folders = {kind: current_fmus(kind) for kind in ("python", "native")}
-        runs = engines(*(wired(folder) for folder in folders.values()), Path(temporary))
+        runs = engines(*(wired(folder) for folder in folders.values()))
         for run in runs.values():
             run(10)
         times = [

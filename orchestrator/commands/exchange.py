@@ -31,6 +31,7 @@ from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import INITIAL, ORDERS, read_order
 from orchestrator.program.components import definitions_of
+from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
@@ -41,10 +42,10 @@ from orchestrator.runs.scenario_events import read_events
 from orchestrator.system.names import listed
 
 #: What a scenario can be exported as.
-EXPORT_FORMATS = SSP, OSP, FMU = "ssp", "osp", "fmu"
+EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"
 
 #: Options of `export` that are for one format only.
-_OF_FORMAT = {"flat": SSP, "connectors": SSP, "platforms": FMU}
+_OF_FORMAT = {"flat": SSP, "connectors": SSP, "platforms": FMU, "single": C}
 
 #: Tools that do not set parameters of a type.
 _LEAVING = {"Enumeration": "libcosim and ecos", "String": "OMSimulator and others"}
@@ -58,7 +59,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     describe(
         parser,
         "Write a scenario for other tools: its FMUs, connections and parameters, or all of it as "
-        "one FMU.",
+        "one FMU, or as a program in C.",
         "export fig4 --format osp --out exports/fig4",
     )
     add_system(parser)
@@ -66,8 +67,8 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         "--format",
         choices=EXPORT_FORMATS,
         default=SSP,
-        help="output format: ssp (SSP archive), osp (folder for libcosim) or fmu (one FMU in C, "
-        "without Python); default: ssp",
+        help="output format: ssp (SSP archive), osp (folder for libcosim), fmu (one FMU in C, "
+        "without Python) or c (one program in C, for your own); default: ssp",
     )
     parser.add_argument(
         "--flat",
@@ -81,6 +82,11 @@ def add_export(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="give the system of an SSP connectors, for tools that take it as one component: its "
         "components' outputs, and inputs without feed or value",
+    )
+    parser.add_argument(
+        "--single",
+        action="store_true",
+        help=f"write the program of --format {C} in single precision: float instead of double",
     )
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
@@ -198,8 +204,9 @@ def _export(options: argparse.Namespace) -> int:
     for name, wanted in _OF_FORMAT.items():
         if getattr(options, name) and options.format != wanted:
             raise InputError(f"--{name} applies only to --format {wanted}: leave it out")
-    # One FMU is made of what the components' authors wrote, whatever their own FMUs are.
-    chosen = (AUTO, FMI_VERSIONS[0]) if options.format == FMU else (options.kind, options.fmi)
+    # One program is made of what the components' authors wrote, whatever their own FMUs are.
+    is_one = options.format in (FMU, C)
+    chosen = (AUTO, FMI_VERSIONS[0]) if is_one else (options.kind, options.fmi)
     scenario, system = read_system(options, *chosen)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
@@ -233,6 +240,12 @@ def _export(options: argparse.Namespace) -> int:
                 prepared.plan, definitions, system.name, prepared.scenario.title or system.name
             )
             written = write_fmu(model, unfinished, options.fmi, options.platforms, say)
+        elif options.format == C:
+            title = prepared.scenario.title or system.name
+            program = ProgramFiles(
+                prepared.plan, definitions_of(system), prepared.scenario.stem, title, options.single
+            )
+            written = write_files(program, unfinished)
         elif options.format == OSP:
             written = write_osp(system, unfinished)
         else:

@@ -74,7 +74,7 @@ def _definition(component: Component) -> Definition:
             raise InputError(
                 f"{component.fmu.name} was built by another version of auv-fmu: build it again"
             )
-    raise InputError(f"{component.fmu.name} is no component in the language of equations")
+    raise InputError(f"{component.fmu.name} is not a component in the language of equations")
 
 
 def _is_made_from(component: Component, definition: Definition) -> bool:

@@ -36,14 +36,11 @@ from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, 
 from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
-from fmus.ports.port import Value as PortValue
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.experiment import LINEAR
 from orchestrator.master.plan import Plan
 from orchestrator.master.stages import Visit
 from orchestrator.program.writer import Text, Unsupported
 from orchestrator.system.names import PortName, file_name
-from orchestrator.system.values import items_of
 
 _NOISE = """\
 /* A generator as numbers. */
@@ -161,8 +158,6 @@ class SystemModel:
             InputError: it cannot be one FMU; the text says why.
 
         """
-        if plan.experiment.coupling == LINEAR:
-            raise Unsupported(f"coupling {LINEAR} goes back in time, which one FMU cannot")
         self.text, self.name = Text(plan, definitions, is_tuned=True, is_hosted=True), name
         self.plan, self._definitions, self._title = self.text.plan, definitions, title
 
@@ -223,20 +218,11 @@ class SystemModel:
         return replace(
             port,
             name=str(name),
-            start=None if port.causality == "output" else self._value(name),
+            start=None if port.causality == "output" else self.text.start(name),
             feedthrough=direct,
             initially=None if port.causality == "output" else (),
             array=None,
         )
-
-    def _value(self, name: PortName) -> PortValue:
-        value, port = self.plan.system.value(name), self._port(name)
-        if isinstance(value, str):
-            variable = self.plan.system.components[name.component].variable(name.port)
-            value = int(items_of(variable)[value])
-        if value is None:
-            value = port.start or 0
-        return {"Real": float, "Boolean": bool}.get(port.type, int)(value)
 
     def _direct(self, output: PortName) -> list[str]:
         """The open inputs that an output depends on without a state between."""

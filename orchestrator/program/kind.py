@@ -140,7 +140,7 @@ class Kind:
         rows.append(f"{self._type('outputs')} outputs;")
         if self.said.derived:
             rows.append(f"{self._type('derived')} derived;")
-            rows.append("int underived; /* whether it is to be derived again before it is used */")
+            rows.append("int underived; /* whether it must be derived again before use */")
         if self.steps:
             rows.append("double longest_step; /* that is not split [s] */")
         if self.is_timed:

@@ -27,7 +27,7 @@ from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Order
+from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
 from orchestrator.master.plan import Plan, stages
 from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Stages, Visit, stages_of
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
@@ -37,6 +37,7 @@ from orchestrator.system.connection import Connection
 from orchestrator.system.graph import rings
 from orchestrator.system.names import PortName, listed
 from orchestrator.system.units import Linear, Mapped
+from orchestrator.system.values import items_of
 
 #: What a component has refused, where `failure` names one.
 CALLS = START, INPUT, OUTPUTS, STEP, SET = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP", "AT_SET"
@@ -50,8 +51,9 @@ _MOST_ROUNDS = 1000
 _INCLUDES = """\
 #include <float.h>
 #include <stddef.h>
-#include <stdint.h>
+#include <stdint.h>"""
 
+_EXPORTED = """\
 #ifndef EXPORTED
 #define EXPORTED
 #endif"""
@@ -69,15 +71,17 @@ _HEADS = {
 
 _FAILURE = """\
 /* Where Python raises, an equation goes on with what C gives; only that something was raised is
- * noted. */
+ * noted. What Python says of it stands in the text alone: the function is never called. */
 typedef struct {
     int raised;
 } Error;
 
-#define raise_error(error, ...) ((void)((error)->raised = 1))
-#define raise_if(test, error, ...)         \\
-    do {                                   \\
-        if (test) (error)->raised = 1;     \\
+int(raise_error)(Error *error, const char *what, ...);
+
+#define raise_error(error, ...) ((void)sizeof raise_error(error, __VA_ARGS__), (error)->raised = 1)
+#define raise_if(test, error, ...)                    \\
+    do {                                              \\
+        if (test) raise_error(error, __VA_ARGS__);    \\
     } while (0)
 """
 
@@ -152,6 +156,9 @@ static int refused(simulation *it, int component, int call, int port) {
     it->port = port;
     return 1;
 }"""
+
+#: What keeps a file from being included twice.
+_GUARD = re.compile(r"^#ifndef (\w+_[CH])\n#define \1\n|\n#endif\n\Z", re.MULTILINE)
 
 _BEGIN = """\
 /* Sets parameters, and lets values come to rest at the start; whether a component refuses. */
@@ -315,7 +322,7 @@ def head_of(equations: Equations) -> str:
     noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
     arithmetic = arithmetic.replace('#include "error.h"\n', _FAILURE)
     parts = [_INCLUDES, arithmetic, *([noise] if equations.is_noisy else [])]
-    return "\n\n".join(part.strip() for part in parts)
+    return "\n\n".join(_GUARD.sub("", part).strip() for part in parts)
 
 
 @dataclass
@@ -329,7 +336,7 @@ class Text:
         is_tuned: whether parameters may change after the start.
         is_hosted: whether a host says when each step begins.
         alters: whether events can happen in it.
-        is_quick: whether all that has been computed is checked at once, when a row is shown; that
+        is_quick: whether outputs and states are checked together, once a step; that
             does not tell which component has refused.
         shared: equations that it shares with other programs; None: it has its own.
 
@@ -350,8 +357,8 @@ class Text:
         """Translate the equations.
 
         Raises:
-            Unsupported: the system has a ring of direct feedthroughs, or a component is outside
-                the language of equations.
+            Unsupported: the system has a ring of direct feedthroughs or goes back in time, or a
+                component is outside the language of equations.
 
         """
         system = self.plan.system
@@ -360,6 +367,8 @@ class Text:
             raise Unsupported(
                 f"direct feedthroughs of {names} form a ring, which no program can have"
             )
+        if self.plan.experiment.coupling == LINEAR:
+            raise Unsupported(f"coupling {LINEAR} goes back in time, which no program can")
         order: Order = self.plan.experiment.order or FEEDTHROUGH
         self.plan = replace(self.plan, experiment=replace(self.plan.experiment, order=order))
         self.sequence = stages(system, order)
@@ -414,6 +423,17 @@ class Text:
             inputs = self._inputs(name).items()
             found |= {port: place for port, place in inputs if port not in fed}
         return found
+
+    def start(self, name: PortName) -> float | int | bool:
+        """What a parameter, or an input that nothing feeds, is at the start."""
+        value, port = self.plan.system.value(name), self.port(name)
+        if isinstance(value, str):
+            variable = self.plan.system.components[name.component].variable(name.port)
+            value = int(items_of(variable)[value])
+        if value is None:
+            value = port.start or 0
+        types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}
+        return types.get(port.type, int)(value)
 
     def _inputs(self, name: str) -> dict[PortName, Place]:
         return self._named(name, "input", "inputs", f"it->{self.members[name]}.inputs")
@@ -481,8 +501,10 @@ class Text:
         """What a host calls."""
         return [
             *([tables_of(self)] if self.alters else []),
+            _EXPORTED,
             self._begin(),
-            self._show(),
+            f"enum {{ WIDTH = {1 + len(self.columns)} }};",
+            self.show(),
             *self._look(),
             *self._run(),
             _ACCESS,
@@ -501,14 +523,14 @@ class Text:
         if self.alters:
             n = len(self.inputs)
             rows += [
-                f"double factors[{n}], offsets[{n}]; /* of what inputs take */",
+                f"double factors[{n}], offsets[{n}]; /* of inputs */",
                 f"double supplied[{n}]; /* to inputs that nothing feeds */",
                 f"double started[{len(self.components)}]; /* when components were [s] */",
                 "int due; /* after how many steps an event needs action */",
             ]
         body = "\n".join(f"    {row}" for row in rows)
         return (
-            "/* All that a run depends on. */\n"
+            "/* Everything that a run depends on. */\n"
             "typedef struct {\n"
             "    double start_time, step, stop_time;\n"
             "    int full_steps, steps; /* if there is one more of all steps, it is shorter */\n"
@@ -520,11 +542,15 @@ class Text:
 
     # The start
 
-    def _begin(self) -> str:
+    def set_parameters(self) -> list[str]:
+        """Take the numbers of an array as parameters."""
         values = [
             (place.text, f"parameters[{i}]" if place.type == FLOAT else f"(int)parameters[{i}]")
             for i, place in enumerate(self.parameters.values())
         ]
+        return [*_copies(values)]
+
+    def _begin(self) -> str:
         lines = [
             "Error noted = {0};",
             "memset(it, 0, sizeof *it);",
@@ -533,7 +559,7 @@ class Text:
             "it->stop_time = stop_time;",
             "it->full_steps = full_steps;",
             "it->steps = steps;",
-            *(BEGINNING if self.alters else _copies(values)),
+            *(BEGINNING if self.alters else self.set_parameters()),
             *self.unsplit(),
             "return come_to_rest(it, &noted) != 0;",
         ]
@@ -577,7 +603,7 @@ class Text:
         starts = []
         for connection in system.connections:
             place = self.columns[connection.target]
-            start = self._port(connection.target).start
+            start = self.port(connection.target).start
             number = number_in_c(_as(place, 0 if start is None else start))
             starts.append(f"{place.text} = {number};")
         lines = [
@@ -659,7 +685,8 @@ class Text:
     def _refusal(self, name: str, call: str) -> str:
         return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
 
-    def _port(self, name: PortName) -> Port:
+    def port(self, name: PortName) -> Port:
+        """A port of a component, as its author declared it."""
         ports = self.definitions[name.component].ports
         return next(port for port in ports if port.name == name.port)
 
@@ -723,16 +750,13 @@ class Text:
 
     # Rows
 
-    def _show(self) -> str:
+    def show(self) -> str:
+        """What writes a row."""
         values = [(f"row[{i}]", place.text) for i, place in enumerate(self.columns.values(), 1)]
-        return (
-            f"enum {{ WIDTH = {1 + len(self.columns)} }};\n\n"
-            "/* A row: the time, and all inputs and outputs. */\n"
-            + function(
-                "static void show(const simulation *it, double t, double row[])",
-                ["row[0] = t;", *_copies(values)],
-                (),
-            )
+        return "/* A row: the time, and all inputs and outputs. */\n" + function(
+            "static void show(const simulation *it, double t, double row[])",
+            ["row[0] = t;", *_copies(values)],
+            (),
         )
 
     def _look(self) -> list[str]:
@@ -852,7 +876,7 @@ class Text:
         return self.emitter.call(kind.euler["end_of_step"], [start, "t", "h"])
 
     def _sound(self) -> str:
-        """What checks all that has been computed."""
+        """Check outputs and states of all components."""
         tests = ["!error->raised"]
         for name, member in self.members.items():
             kind = self.kind(name)

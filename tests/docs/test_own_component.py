@@ -22,12 +22,13 @@ from fmus.compilers import machines_compiler
 from fmus.kinds import TARGETS
 from fmus.ports.behaviour import HOOKS
 from orchestrator.commands.main import main
-from orchestrator.exchange import c_host
 from orchestrator.master.experiment import Experiment
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.record import read_result
 from support.markdown import DOCS, blocks
 from support.patches import patch
+from support.replay import compile_replay, replay
+from support.runs import whole
 
 PAGE = DOCS / "tutorials" / "your-own-component.md"
 FORM = DOCS / "explanation" / "component.md"
@@ -137,7 +138,7 @@ def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
     if all(map(find_spec, EXTRAS[" hosts "])):
         lines = [line.split() for line in said.splitlines()]
         found = {words[0]: words for words in lines if words[:1] and "0.0e+00" in words}
-        assert found.keys() >= {"libcosim-ssp", "ecos", "fmpy", "c-program"}, said
+        assert found.keys() >= {"libcosim-ssp", "ecos", "fmpy"}, said
 
 
 @pytest.mark.slow
@@ -161,14 +162,15 @@ def test_other_machines_give_the_same_numbers(
     command = ["build", str(folder / "pid/pid.py"), "--kind", "native", "--out", str(tmp_path)]
     assert main([*command, "--platforms", platform]) == 0
     fmpy.extract(tmp_path / "Pid.fmu", unzipdir=tmp_path / "Pid")
-    library = tmp_path / f"Pid/binaries/{platform}/Pid{ending}"
     _, system = load_scenario(str(folder / "native/Pid.fmu"))
     system = system.with_parameters({"Pid.set_point": 0.2})
     zig = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[machine]]
-    name = "host.exe" if ending == ".dll" else "host"
-    experiment = Experiment(10.0, 0.02)
-    host = c_host.compile_host(tmp_path, system, experiment, lambda _: library, zig, name)
+    host = compile_replay(tmp_path, zig, "replay.exe" if ending == ".dll" else "replay")
     run = [tool, "-L", ARM_LIBRARIES, host] if tool == QEMU else [tool, host]
-    rows, _ = c_host.run_host(run, tmp_path, experiment.full_steps, ["Pid.command"])
+    experiment = Experiment(10.0, 0.02)
+    table = whole(system, experiment)
+    place = f"binaries/{platform}/Pid{ending}"
+    rows, expected = replay(run, tmp_path / "Pid", place, system, "Pid", table, experiment)
+    np.testing.assert_allclose(rows, expected, rtol=0.0, atol=tolerance)
     here = read_result(folder / "native-kind")[1]["Pid.command"]
-    np.testing.assert_allclose(rows[:, 0], here, rtol=0.0, atol=tolerance)
+    np.testing.assert_array_equal(expected[:, 0], here)

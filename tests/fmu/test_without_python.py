@@ -16,12 +16,11 @@ from fmpy.build import build_platform_binary
 
 from fmus.compilers import machines_compiler
 from fmus.kinds import TARGETS
-from orchestrator.exchange import c_host
-from orchestrator.exchange.verify import verify
 from orchestrator.master.experiment import Experiment
-from orchestrator.system.component import Component
+from orchestrator.master.observers.table import Table
 from orchestrator.system.structure import System
 from support.hosts import bare_root, libraries_of
+from support.replay import compile_replay, replay
 from support.runs import run, system_of
 from support.settings import NAMES
 
@@ -56,20 +55,10 @@ def unpacked(native: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def place(folder: Path, platform: str, ending: str) -> c_host.LibraryOf:
-    """Where the libraries of a platform are below a folder."""
-
-    def library(component: Component) -> Path:
-        name = component.fmu.stem
-        return folder / name / "binaries" / platform / f"{name}{ending}"
-
-    return library
-
-
 @pytest.mark.skipif(NM is None, reason="nm is not installed")
 @pytest.mark.parametrize("name", NAMES)
 def test_library_needs_the_c_library_and_its_mathematics_alone(unpacked: Path, name: str):
-    library = place(unpacked, "linux64", ".so")(Component(name, Path(name), None, ""))
+    library = unpacked / name / f"binaries/linux64/{name}.so"
     found = {path.name: path for path in libraries_of(library)}
     given = {s for n, path in found.items() if n.startswith(("libc.", "libm."))
              for s in symbols(path, "--defined-only")}  # fmt: skip
@@ -77,40 +66,58 @@ def test_library_needs_the_c_library_and_its_mathematics_alone(unpacked: Path, n
     assert all(symbol.startswith("fmi2") for symbol in symbols(library, "--defined-only"))
 
 
+def hold(
+    system: System,
+    table: Table,
+    folder: str | Path,
+    place: str,
+    command: Sequence[str | Path],
+    experiment: Experiment,
+    tolerance: float = 0.0,
+) -> None:
+    """Hold each component of a system, run by a host in C, against a run here.
+
+    Args:
+        system: of the FMUs.
+        table: of the run here.
+        folder: with a folder of each FMU, as the host sees it.
+        place: of a library in its folder, where {} is its name.
+        command: that starts the host.
+        experiment: of the run.
+        tolerance: how far outputs may be off.
+
+    """
+    for name, component in system.components.items():
+        fmu = component.fmu.stem
+        there, here = replay(
+            command, f"{folder}/{fmu}", place.format(fmu), system, name, table, experiment
+        )
+        assert there.shape == here.shape == (experiment.rows, len(here.T))
+        np.testing.assert_allclose(there, here, rtol=0.0, atol=tolerance, err_msg=name)
+
+
 @needs_compiler
 @each_scenario
 def test_host_runs_where_there_is_nothing_but_a_c_library(
     dist: Path, native: Path, unpacked: Path, tmp_path: Path, scenario: str
 ):
-    """5,000 steps; the table is that of the FMUs in Python, with tolerance 0."""
+    """5,000 steps; the outputs are those of the FMUs in Python, bit for bit."""
     system = system_of(native, scenario)
-    host = c_host.compile_host(tmp_path, system, WHOLE, place(Path("/"), "linux64", ".so"))
+    host = compile_replay(tmp_path)
     for component in system.components.values():
         shutil.copytree(unpacked / component.fmu.stem, tmp_path / component.fmu.stem)
     root = bare_root(tmp_path, host, *tmp_path.glob("*/binaries/linux64/*.so"))
-    c_host.run_host([*root, "/host"], tmp_path, WHOLE.full_steps, [])
-    said = verify(tmp_path / c_host.TABLE_FILE, system_of(dist, scenario), 0.0)
-    assert "to 100 s, in feedthrough order" in said
+    table = run(system_of(dist, scenario), WHOLE.stop_time, WHOLE.step)
+    hold(system, table, "", "binaries/linux64/{}.so", [*root, "/replay"], WHOLE)
 
 
 def zig(machine: str) -> list[str]:
     return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[machine]]
 
 
-def run_elsewhere(
-    system: System,
-    folder: Path,
-    machine: str,
-    library: c_host.LibraryOf,
-    command: Sequence[str | Path],
-    name: str = "host",
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows of all Reals on another machine, where the command runs a program, and here."""
-    here = run(system, SHORT.stop_time, SHORT.step)
-    names = [name for name in here.header.columns if not name.endswith(".fault")]
-    program = c_host.compile_host(folder, system, SHORT, library, zig(machine), name)
-    rows, _ = c_host.run_host([*command, program], folder, SHORT.full_steps, names)
-    return rows, here.group(*names)
+def here(native: Path, scenario: str) -> tuple[System, Table]:
+    system = system_of(native, scenario)
+    return system, run(system, SHORT.stop_time, SHORT.step)
 
 
 @pytest.fixture(scope="module")
@@ -128,11 +135,9 @@ def elsewhere(release: dict[str, Path], tmp_path_factory: pytest.TempPathFactory
 @each_scenario
 def test_windows_gives_the_same_but_for_rounding(native: Path, elsewhere: Path, scenario: str):
     """Its C library has another sine."""
-    library = place(elsewhere, "win64", ".dll")
-    there, here = run_elsewhere(
-        system_of(native, scenario), elsewhere, "x86_64-windows", library, [str(WINE)], "host.exe"
-    )
-    np.testing.assert_allclose(there, here, rtol=0.0, atol=1e-9)
+    host = compile_replay(elsewhere, zig("x86_64-windows"), "replay.exe")
+    place = "binaries/win64/{}.dll"
+    hold(*here(native, scenario), elsewhere, place, [str(WINE), host], SHORT, tolerance=1e-9)
 
 
 @pytest.mark.slow
@@ -141,11 +146,9 @@ def test_windows_gives_the_same_but_for_rounding(native: Path, elsewhere: Path, 
 @pytest.mark.skipif(not ARM_LIBRARIES.is_dir(), reason="there is no C library for ARM")
 @each_scenario
 def test_arm_gives_the_same_bit_for_bit(native: Path, elsewhere: Path, scenario: str):
-    library, command = place(elsewhere, "aarch64-linux", ".so"), [str(QEMU), "-L", ARM_LIBRARIES]
-    there, here = run_elsewhere(
-        system_of(native, scenario), elsewhere, "aarch64-linux", library, command
-    )
-    np.testing.assert_array_equal(there, here)
+    host = compile_replay(elsewhere, zig("aarch64-linux"))
+    place, command = "binaries/aarch64-linux/{}.so", [str(QEMU), "-L", ARM_LIBRARIES, host]
+    hold(*here(native, scenario), elsewhere, place, command, SHORT)
 
 
 @pytest.mark.slow

@@ -14,7 +14,6 @@ from typing import Any
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
@@ -46,8 +45,6 @@ WITHOUT_PARAMETERS = ["fmpy", "fmpy-ssp"]
 
 def require(host: str) -> None:
     """Skip the test without the host."""
-    if host == "c-program" and machines_compiler() is None:
-        pytest.skip("there is no C compiler")
     pins = HOSTS[host].pins
     if HOSTS[host].label() is None or (pins and not is_whole(folder_of(pins))):
         pytest.skip(f"{HOSTS[host].package} is not installed")
@@ -137,9 +134,7 @@ def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
     assert (after["clock.t"] - h - given) / h == LATE.get(host, (2, 2))[place]
 
 
-@pytest.mark.parametrize(
-    "host", ["libcosim-ssp", "ecos", "fmpy-ssp", *slow("libcosim-osp", "c-program")]
-)
+@pytest.mark.parametrize("host", ["libcosim-ssp", "ecos", "fmpy-ssp", *slow("libcosim-osp")])
 def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: str):
     """Some are given a flat archive: what they read of a nested one is not all of it."""
     system = fleet(dist)
@@ -195,10 +190,6 @@ def chosen(dist: Path) -> System:
     return closed_loop(dist).with_parameters({PortName("controller", "saturation"): "algebraic"})
 
 
-def test_a_choice_reaches_its_component(dist: Path):
-    check(chosen(dist), "c-program", 300)
-
-
 @pytest.mark.parametrize("host", ["libcosim-ssp", "libcosim-osp", "ecos"])
 def test_tools_without_enumerations_are_held_to_no_choice(dist: Path, host: str):
     require(host)
@@ -213,7 +204,7 @@ def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str)
     check(system, host, 300)
 
 
-@pytest.mark.parametrize("host", ["c-program", *slow("libcosim-ssp", "libcosim-osp", "fmpy-ssp")])
+@pytest.mark.parametrize("host", ["libcosim-ssp", *slow("libcosim-osp", "fmpy-ssp")])
 def test_a_start_time_reaches_the_host(dist: Path, host: str):
     """The disturbance (56) is a function of the time."""
     check(replace(closed_loop(dist), start_time=10.0), host, 300)

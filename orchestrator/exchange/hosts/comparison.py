@@ -109,7 +109,6 @@ HOSTS: dict[str, Host] = {
     "ecos": Host("ecospy", here.ecos, _BOTH, turned=True),
     "fmpy": Host("fmpy", drivers.fmpy_slaves, _BOTH),
     "fmpy-ssp": Host("fmpy", here.fmpy_ssp, initial=ZERO),
-    "c-program": Host("auv_fmu", here.c_program),
     "cofmupy": Host("cofmupy", drivers.cofmupy, _BOTH, _REST, ZERO, pins=["cofmupy==1.0.0"]),
     "fmuloader": Host("fmuloader", drivers.fmuloader, _BOTH, pins=["fmuloader==0.1.2rc0"]),
     "gemseo-fmu": Host(

@@ -19,7 +19,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
-from orchestrator.exchange import c_host
 from orchestrator.exchange.hosts.drivers import write_rows
 from orchestrator.formats.osp import write_osp
 from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
@@ -190,12 +189,6 @@ def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
     # Its row at a time has the outputs of the step that begins there.
     rows = np.column_stack([table[name] for name in _names(system)])
     return Ran(rows[: experiment.rows - 1], seconds)
-
-
-def c_program(system: System, experiment: Experiment, folder: Path) -> Ran:
-    program = c_host.compile_host(folder, system, experiment)
-    rows, seconds = c_host.run_host([program], folder, experiment.rows - 1, _names(system))
-    return Ran(rows[1:], seconds)
 
 
 if __name__ == "__main__":
