@@ -70,8 +70,8 @@ _HEADS = {
 }
 
 _FAILURE = """\
-/* Where Python raises, an equation goes on with what C gives; only that something was raised is
- * noted. What Python says of it stands in the text alone: the function is never called. */
+/* Where Python raises an exception, equations continue with the results of C, and the error is
+ * noted, without its message. */
 typedef struct {
     int raised;
 } Error;
@@ -883,7 +883,7 @@ class Text:
             tests += filter(None, [kind.are_finite(f"it->{member}.outputs")])
             tests += filter(None, [kind.is_sound(f"it->{member}.state")] * kind.steps)
         lines = [f"int is_sound = {tests[0]};", *(f"is_sound &= {test};" for test in tests[1:])]
-        return "/* Whether all that was computed is what a run can go on from. */\n" + function(
+        return "/* Whether outputs and states are sound. */\n" + function(
             "static inline int is_sound(const simulation *it, const Error *error)",
             [*lines, "return is_sound;"],
         )

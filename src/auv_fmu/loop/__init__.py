@@ -1,8 +1,3 @@
-module               what it states
-===================  ====================================
-:mod:`.closed_loop`  the line, from instant to instant
-===================  ====================================
-=======
 """Fig. 2 of the paper, as tests and benchmarks need it.
 
 ===================  ===========================================
