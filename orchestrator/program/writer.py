@@ -931,6 +931,8 @@ class Text:
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
             if is_stale and self.reads(visit):
                 is_early = bool(kind.foreseen) and visit.steps and not visit.takes
+                # What is shown of a slow one may not be computed again before.
+                is_early &= visit.component not in self.slow
                 yield from self.evaluated(visit.component, "foresee" if is_early else "evaluate")
 
     def _visited(self, visit: Visit, every: int) -> Iterator[str]:

@@ -165,7 +165,7 @@ class Calm(Component):
         if state and draw.random() < 0.15:
             # What is not finite, and what cannot be computed.
             wrong = draw.choice(("1e308 * abs(state.x) * 10.0", "state.x / (state.x - state.x)"))
-            hooks["update"][1:1] = [
+            hooks["update"][-1:-1] = [
                 "if abs(state.x) > parameters.limit:",
                 f"    return made._replace(x={wrong})",
             ]
