@@ -9,10 +9,11 @@ import keyword
 import os
 import re
 import shutil
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from importlib.util import find_spec
+from importlib.machinery import PathFinder
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from zipfile import BadZipFile, ZipFile
@@ -155,7 +156,8 @@ def _names(name: str, what: str) -> tuple[str, str]:
     for word in (module, class_name):
         if keyword.iskeyword(word):
             raise InputError(f"{name!r}: {word} is a word of Python; choose another name")
-    if find_spec(module):
+    # What a user has in this process already is not Python's.
+    if module in sys.stdlib_module_names or PathFinder.find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name
 

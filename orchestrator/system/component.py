@@ -103,7 +103,8 @@ def described(fmu: Path, folder: Path) -> Described:
     try:
         root: ElementTree.Element
         # The version comes first: all else differs between them.
-        _, root = next(ElementTree.iterparse(file, ["start"]))
+        with file.open("rb") as source:
+            _, root = next(ElementTree.iterparse(source, ["start"]))
         version = root.get("fmiVersion")
         if version not in _VERSIONS:
             wanted = " or ".join(_VERSIONS)

@@ -59,7 +59,6 @@ SECTION_4_1 = {
     "Setting": {"h": 0.02},
 }
 OURS = {
-    "Setting": {"water": ZERO_3, "allocation": None},
     "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
     "Gains": {"printed_jacobian": False, "innovation_gate": 1.0, "form": EULER},
