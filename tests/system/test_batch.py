@@ -397,6 +397,7 @@ def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
     ],
 )
 def test_what_no_program_can_be_is_refused_by_name(workplace, refused, content, said):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     Path("own.toml").write_text(f"stop_time = 1.0\n{content}")
     Path("mine.toml").write_text('scenario = "own.toml"\nengine = "batch"\n')
     assert mentions(refused("sweep", "mine.toml", "--kind", KIND), said)
