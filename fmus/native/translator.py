@@ -8,7 +8,7 @@ functions that are written here go over it number by number: ints of 32 bits are
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from operator import itemgetter
@@ -20,16 +20,16 @@ from fmus.language.build import Program, Untranslatable
 from fmus.language.tree import Call, Expression, Function, Make
 from fmus.language.types import (
     FLOAT,
-    Array,
     Scalar,
     Type,
     count,
     scalars_in,
     type_of,
 )
-from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, members, quoted
+from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, quoted
 from fmus.native.names import in_c
 from fmus.native.numbers import has_only_doubles, moves
+from fmus.native.pieces import initializer
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
@@ -223,7 +223,7 @@ def _measured(
 ) -> list[str]:
     """What gives a group of outputs its noise."""
     type_ = function.arguments["n"]
-    n = _drawn(type_, map("draws[{}]".format, range(said.draws)))
+    n = initializer(type_, map("draws[{}]".format, range(said.draws)))
     if not isinstance(type_, Scalar):
         n = f"({emitter.type(type_)}){n}"
     where = "groups." if outputs.gather else "outputs->"
@@ -237,14 +237,6 @@ def _measured(
         change,
         outputs.put("outputs", "groups"),
     ]
-
-
-def _drawn(type_: Type, draws: Iterator[str]) -> str:
-    """The next numbers in a value of a type, as an initializer."""
-    if isinstance(type_, Scalar):
-        return next(draws)
-    parts = ", ".join(_drawn(part, draws) for _, part in members(type_))
-    return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
 
 
 def defined(bodies: Mapping[str, Sequence[str]]) -> list[str]:

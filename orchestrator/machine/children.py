@@ -152,6 +152,19 @@ def compile_library(compiler: Compiler, *arguments: str) -> bytes:
         return path.read_bytes()
 
 
+def compile_text(compiler: Compiler, text: str, *options: str) -> bytes:
+    """Compile a library of the text of one source, and give its bytes.
+
+    Raises:
+        OSError: it does not; the text is its first error.
+
+    """
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        source = Path(temporary, "source.c")
+        source.write_text(text, encoding="utf-8")
+        return compile_library(compiler, str(source), *options)
+
+
 def _follow() -> None:
     """End with the process that has started this one."""
     wait_for_end(sys.stdin.fileno())

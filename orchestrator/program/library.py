@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, create_string_buffer
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from hashlib import sha256
 from importlib.util import find_spec
 from threading import local
@@ -15,8 +14,7 @@ from fmpy import platform_tuple, sharedLibraryExtension
 
 from fmus.compilers import EXPORTED, LIMIT_OF_ZIG, MATHEMATICS, SAME_NUMBERS
 from orchestrator.machine.cache import made_once, read_cached
-from orchestrator.machine.children import Compiler, compile_library, find_compiler, run_module
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.children import Compiler, compile_text, find_compiler, run_module
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.master.experiment import Experiment
 from orchestrator.program.writer import Text
@@ -107,11 +105,6 @@ class Program:
         self._size = self._library.size_of_simulation()
         self._own = _Own()
 
-    @cached_property
-    def places(self) -> Mapping[str, int]:
-        """The places of parameters by their names."""
-        return {name: i for i, name in enumerate(self.source.parameters)}
-
     def run(
         self,
         values: np.ndarray,
@@ -141,11 +134,6 @@ class Program:
         found = np.empty(self.source.n_indices)
         if len(found) and library.indices(memory, found.ctypes.data):
             return None
-        return found
-
-    def made_rows(self) -> int:
-        """How many rows the last run of this thread has made."""
-        found: int = self._library.rows_shown(self._own.memory(self._size))
         return found
 
 
@@ -179,7 +167,6 @@ def _loaded(source: Source) -> CDLL:
         c_void_p, c_void_p, c_double, c_double, c_double, c_int, c_int,
     )  # fmt: skip
     library.run.argtypes = (c_void_p, c_int, c_void_p)
-    library.rows_shown.argtypes = (c_void_p,)
     if source.n_indices:
         library.indices.argtypes = (c_void_p, c_void_p)
     return library
@@ -200,9 +187,4 @@ def compiled(source: Source) -> bytes:
         raise InputError(
             "a program needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
-    file = process_folder() / f"{source.key}.c"
-    file.write_text(source.text, encoding="utf-8")
-    try:
-        return compile_library(compiler, *FLAGS, str(file), *MATHEMATICS)
-    finally:
-        file.unlink(missing_ok=True)
+    return compile_text(compiler, source.text, *FLAGS, *MATHEMATICS)

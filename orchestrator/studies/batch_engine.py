@@ -109,6 +109,7 @@ class _Known:
         self.system, self.loops = system, loops_of(system)
         self._own = own
         self._ready: dict[_Key, _Ready] = {}
+        self._found: dict[tuple[Order | None, float], _Ready] = {}
         self._definitions: Mapping[str, Definition] | None = definitions_of(system)
         self._parameters: tuple[Mapping[str, _Parameter], np.ndarray] | None = None
 
@@ -119,10 +120,12 @@ class _Known:
             InputError: there is none.
 
         """
-        key = order, tuple(decimations(self.system, step).values())
-        if key not in self._ready:
-            self._ready[key] = self._written(order, step)
-        return self._ready[key]
+        if (order, step) not in self._found:
+            key = order, tuple(decimations(self.system, step).values())
+            if key not in self._ready:
+                self._ready[key] = self._written(order, step)
+            self._found[order, step] = self._ready[key]
+        return self._found[order, step]
 
     def _written(self, order: Order | None, step: float) -> _Ready:
         system = self.system
@@ -241,14 +244,7 @@ def _number(one: _Parameter, value: Any) -> float:
 
 
 class BatchEngine:
-    """Makes runs by the compiled programs of their systems, one after the other in each thread.
-
-    Attributes:
-        can_share: whether threads of a process can make runs at the same time.
-
-    """
-
-    can_share = True
+    """Makes runs by the compiled programs of their systems, one after the other in each thread."""
 
     def __init__(self, systems: Mapping[str, System], own: Sequence[OwnIndex] = ()) -> None:
         """Take systems.

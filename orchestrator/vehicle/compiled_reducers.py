@@ -9,7 +9,6 @@ from functools import cache
 from hashlib import sha256
 from itertools import chain
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 from fmpy import platform_tuple, sharedLibraryExtension
@@ -20,8 +19,7 @@ from fmus.native.names import RUNTIME
 from fmus.native.reducer import text_over_rows
 from fmus.ports.reducer import Reducer
 from orchestrator.machine.cache import made_once, read_cached
-from orchestrator.machine.children import compile_library, find_fast_compiler
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.children import compile_text, find_fast_compiler
 from orchestrator.master.experiment import Experiment
 from orchestrator.system.values import Value
 
@@ -62,12 +60,8 @@ def library_of(reducer: Reducer) -> CDLL | None:
 def _compiled(text: str) -> bytes:
     compiler = find_fast_compiler()
     assert compiler is not None
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        source = Path(temporary, "indices.c")
-        source.write_text(text, encoding="utf-8")
-        return compile_library(
-            compiler, *FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", str(source), *MATHEMATICS
-        )
+    options = (*FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", *MATHEMATICS)
+    return compile_text(compiler, text, *options)
 
 
 def _loaded(place: Path) -> CDLL:

@@ -28,8 +28,9 @@ from fmus.discovery import source_of
 from fmus.language.build import Program
 from fmus.language.types import type_of
 from fmus.native.emit import Emitter, strip_sphinx_marks
+from fmus.native.pieces import initializer
 from fmus.native.tables import tables
-from fmus.native.translator import _drawn, deepest, translated
+from fmus.native.translator import deepest, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
 from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.component import LONGEST_MESSAGE, Component
@@ -448,7 +449,7 @@ def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
     for i in range(60):
         hint = drawn_type(Random(i))
         name, n = emitter.type(type_of(hint)), count_values(hint)
-        text = _drawn(type_of(hint), map("draws[{}]".format, range(n)))
+        text = initializer(type_of(hint), map("draws[{}]".format, range(n)))
         lines += [f"static {name} f{i}(const double draws[]) {{",
                   f"    const {name} it = {text};", "    return it;", "}"]  # fmt: skip
         calls.append(
