@@ -11,9 +11,10 @@ class here, and for each of the operators.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 from fmus.language.mathematics import FUNCTIONS
@@ -374,6 +375,20 @@ def expressions_in(expression: Expression) -> Iterator[Expression]:
     yield expression
     for part in expression.parts:
         yield from expressions_in(part)
+
+
+def functions_from(*functions: Function) -> Collection[Function]:
+    """Functions, and all that they call."""
+    found: dict[Function, None] = {}
+    left = [*functions]
+    while left:
+        function = left.pop()
+        if function not in found:
+            found[function] = None
+            expressions = chain.from_iterable(map(expressions_of, statements_in(function.body)))
+            parts = chain.from_iterable(map(expressions_in, expressions))
+            left += [part.function for part in parts if isinstance(part, Call)]
+    return found
 
 
 def stored_in(statement: Statement) -> list[str]:

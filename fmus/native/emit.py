@@ -172,6 +172,7 @@ class Emitter:
     Attributes:
         structures, constants: their texts, by their names.
         names: of the functions.
+        most_copied: how many numbers are copied; a larger structure has its address passed.
 
     """
 
@@ -184,6 +185,7 @@ class Emitter:
 
         """
         functions = [*functions]
+        self.most_copied = most_copied
         self._addressed = {one: _addressed(one, most_copied) for one in functions}
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
@@ -315,7 +317,9 @@ class _Definition:
 
     def __init__(self, emitter: Emitter, function: Function) -> None:
         self._emitter, self._function = emitter, function
-        self._addressed = emitter.addressed(function)
+        addressed = emitter.addressed(function)
+        self._parts = _large_parts(function, addressed, emitter.most_copied)
+        self._addressed = addressed | self._parts
 
     def text(self) -> str:
         """All of it."""
@@ -546,10 +550,15 @@ class _Definition:
         def alike(value: tuple[str, Expression]) -> tuple[Any, ...]:
             name, made = value
             is_new = name in new
-            is_text = made.type == TEXT and is_new
-            return is_new, is_new and stores[name] == 1, made.type, name if is_text else ""
+            is_apart = name in self._parts or (made.type == TEXT and is_new)
+            return is_new, is_new and stores[name] == 1, made.type, name if is_apart else ""
 
-        for (is_new, is_constant, type_, _), group in groupby(one.values, alike):
+        for (is_new, is_constant, type_, apart), group in groupby(one.values, alike):
+            if apart in self._parts:
+                [(name, value)] = group
+                text = f"const {self._emitter.type(type_)} *{in_c(name)} = {self._address(value)};"
+                yield from lines_of(text, indent)
+                continue
             write = self._initial if is_new else self.expression
             texts = [f"{in_c(name)} = {write(value)}" for name, value in group]
             head = "const " if is_constant and type_ != TEXT else ""
@@ -598,6 +607,23 @@ def _addressed(function: Function, most_copied: float) -> frozenset[str]:
     stored = {name for one in tree.statements_in(function.body) for name in tree.stored_in(one)}
     large = {name for name, type_ in function.arguments.items() if count(type_) > most_copied}
     return frozenset({function.by_address} | (large - stored)) - {""}
+
+
+def _large_parts(
+    function: Function, addressed: frozenset[str], most_copied: float
+) -> frozenset[str]:
+    """The variables that are large parts of such arguments: addresses, too."""
+    stores, found = Counter(_stores(function.body)), {*addressed}
+    for one in function.body:
+        for name, value in one.values if isinstance(one, tree.Store) else ():
+            root = value
+            while isinstance(root, Field):
+                root = root.owner
+            is_part = isinstance(root, Local) and root.name in found
+            is_kept = stores[name] == 1 and name not in function.arguments
+            if is_part and is_kept and count(value.type) > most_copied:
+                found.add(name)
+    return frozenset(found - addressed)
 
 
 def _ends(body: Sequence[Statement]) -> bool:

@@ -25,6 +25,7 @@ class ReducerText:
         program: with its hooks as trees.
         emitter: of all equations.
         name: of its structure, and what its functions begin with.
+        is_alone: whether rows are taken at one place only, where that may stand.
 
     """
 
@@ -32,6 +33,7 @@ class ReducerText:
     program: Program
     emitter: Emitter
     name: str
+    is_alone: bool = False
 
     def structure(self) -> str:
         """Its structure."""
@@ -62,8 +64,9 @@ class ReducerText:
             "it->begun = error->raised ? -1 : 1;",
             *(["it->before = inputs;"] if self._looks_back else []),
         ]
+        how = "WITHIN" if self.is_alone else "APART"
         yield function(
-            f"APART void {self.name}_look({self.name} *it, {row} inputs, int acts_at_end,\n"
+            f"{how} void {self.name}_look({self.name} *it, {row} inputs, int acts_at_end,\n"
             "                 double t, double h, double begin, double end, Error *error)",
             lines,
             ("acts_at_end", "t", "h", "begin", "end"),

@@ -56,6 +56,8 @@ class Kind:
         is_checked: whether each call says whether what it has computed is sound.
         foreseen: outputs that others take before their inputs are known, if only these are wanted
             then.
+        is_alone: whether no other component of the program is of this kind, so that its functions
+            may stand where they are called.
 
     """
 
@@ -67,6 +69,7 @@ class Kind:
     is_tuned: bool
     is_checked: bool
     foreseen: Sequence[str] = ()
+    is_alone: bool = False
 
     def __post_init__(self) -> None:
         said = self.said = self.definition.behaviour
@@ -130,7 +133,8 @@ class Kind:
         return self.emitter.call(called, [known[name] for name in called.arguments])
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
-        head = f"APART void {self.name}_{name}({self.name} *it{arguments}, Error *error)"
+        how = "WITHIN" if self.is_alone and name != "start" else "APART"
+        head = f"{how} void {self.name}_{name}({self.name} *it{arguments}, Error *error)"
         names = re.findall(r"(\w+)(?=,|$)", arguments)
         return function(head, lines, ["error", *filter(None, names)])
 

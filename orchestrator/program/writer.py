@@ -10,9 +10,11 @@ allocated, printed or shared.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 from auv_fmu.paper import euler
@@ -207,6 +209,7 @@ class Equations:
         is_tuned: bool,
         is_quick: bool = False,
         foreseen: Callable[[Definition], Sequence[str]] = lambda _: (),
+        feeding: Callable[[Definition], Iterable[Definition]] = lambda _: (),
     ) -> None:
         """Translate all of them together.
 
@@ -216,11 +219,14 @@ class Equations:
             is_tuned: whether parameters may change after the start.
             is_quick: whether what is computed is checked by the program, if it can wait for that.
             foreseen: outputs that others take before their inputs are known.
+            feeding: definitions of what feeds components.
 
         Raises:
             Unsupported: one is outside the language of equations.
 
         """
+        definitions, reducers = [*definitions], [*reducers]
+        counts = Counter[Any]([*definitions, *map(id, reducers)])
         distinct = [*dict.fromkeys(definitions)]
         hooks = {one: one.behaviour.hooks for one in distinct}
         euler: Any = EULER
@@ -234,28 +240,39 @@ class Equations:
             program.check()
         except Untranslatable as error:
             raise Unsupported(str(error).splitlines()[0]) from None
-        functions = program.functions.values()
+        trees = {
+            one: {name: program.function(hook) for name, hook in hooks[one].items() if hook}
+            for one in distinct
+        }
+        looks = (one.hooks.values() for one in by_identity.values())
         self._is_inlined = is_quick
+        self.is_quick = is_quick and not _wait(map(program.function, chain.from_iterable(looks)))
         # What waits for a number would wait for ever for one that is none.
-        self.is_quick = is_quick and not any(map(_waits, functions))
-        self.emitter = Emitter(functions, _MOST_COPIED)
+        waiting = {one for one in distinct if _wait(trees[one].values())}
+        checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*distinct}
+        self.emitter = Emitter(program.functions.values(), _MOST_COPIED)
         self._euler = {one.__name__: program.function(one) for one in euler}
         self.kinds = {
             one: Kind(
                 one,
-                {name: program.function(hook) for name, hook in hooks[one].items() if hook},
+                trees[one],
                 self.emitter,
                 self.emitter.unused(f"{_lower(one.name)}_component"),
                 self._euler,
                 is_tuned,
-                not self.is_quick,
-                foreseen(one) if self.is_quick else (),
+                one in checked,
+                () if one in checked else foreseen(one),
+                is_quick and counts[one] == 1,
             )
             for one in distinct
         }
         self.reducers = {
             key: ReducerText(
-                one, program, self.emitter, self.emitter.unused(f"{_lower(one.name)}_index")
+                one,
+                program,
+                self.emitter,
+                self.emitter.unused(f"{_lower(one.name)}_index"),
+                is_quick and counts[key] == 1,
             )
             for key, one in by_identity.items()
         }
@@ -384,6 +401,7 @@ class Text:
             self.is_tuned,
             self.is_quick,
             self._foreseen,
+            self._feeding,
         )
         self.is_quick = self.equations.is_quick
         self.emitter, self.kinds = self.equations.emitter, self.equations.kinds
@@ -474,6 +492,14 @@ class Text:
                 and not self.plan.system.components[source.component].has_feedthrough(source.port)
             )
         ]
+
+    def _feeding(self, definition: Definition) -> Iterable[Definition]:
+        """The definitions of what feeds components of one."""
+        return (
+            self.definitions[one.source.component]
+            for one in self.plan.system.connections
+            if self.definitions[one.target.component] is definition
+        )
 
     # The text
 
@@ -879,7 +905,8 @@ class Text:
         """Check outputs and states of all components."""
         tests = ["!error->raised"]
         for name, member in self.members.items():
-            kind = self.kind(name)
+            if (kind := self.kind(name)).is_checked:
+                continue
             tests += filter(None, [kind.are_finite(f"it->{member}.outputs")])
             tests += filter(None, [kind.is_sound(f"it->{member}.state")] * kind.steps)
         lines = [f"int is_sound = {tests[0]};", *(f"is_sound &= {test};" for test in tests[1:])]
@@ -968,13 +995,14 @@ class Text:
             yield "}"
         else:
             yield call
-        if not self.is_quick:
+        if kind.is_checked:
             yield self._refusal(name, STEP)
 
     def evaluated(self, name: str, how: str = "evaluate") -> Iterator[str]:
         """Compute the outputs of a component."""
-        yield f"{self.kind(name).name}_{how}(&it->{self.members[name]}, error);"
-        if not self.is_quick:
+        kind = self.kind(name)
+        yield f"{kind.name}_{how}(&it->{self.members[name]}, error);"
+        if kind.is_checked:
             yield self._refusal(name, OUTPUTS)
 
     def reads(self, visit: Visit) -> bool:
@@ -993,9 +1021,10 @@ class Text:
         return bool(types)
 
 
-def _waits(function: tree.Function) -> bool:
-    """Whether a function may go round in a loop for ever."""
-    statements = tree.statements_in(function.body)
+def _wait(functions: Iterable[tree.Function]) -> bool:
+    """Whether functions, or what they call, may go round in a loop for ever."""
+    bodies = (one.body for one in tree.functions_from(*functions))
+    statements = chain.from_iterable(map(tree.statements_in, bodies))
     return any(isinstance(one, tree.While) for one in statements)
 
 

@@ -10,7 +10,7 @@
 #include <stdint.h>
 #include <string.h>
 
-enum { GENERATOR_WORDS = 624, SHIFT = 397 };
+enum { GENERATOR_WORDS = 624, SHIFT = 397, PAIR = 4 /* words of two normal numbers */ };
 
 typedef struct {
     uint32_t place; /* of the next word; GENERATOR_WORDS: all are used up */
@@ -48,28 +48,29 @@ static inline void copy_for(generator *copy, const generator *it, uint32_t n) {
     if (it->place + 2 * (n + 1) > GENERATOR_WORDS) memcpy(copy->words, it->words, sizeof it->words);
 }
 
-static void renew_words(uint32_t x[]) {
-    for (uint32_t i = 0; i < GENERATOR_WORDS; i++) {
-        uint32_t both = (x[i] & 0x80000000) | (x[(i + 1) % GENERATOR_WORDS] & 0x7fffffff);
-        x[i] = x[(i + SHIFT) % GENERATOR_WORDS] ^ both >> 1 ^ (both & 1 ? 0x9908b0df : 0);
-    }
+static uint32_t twisted(uint32_t upper, uint32_t lower, uint32_t distant) {
+    uint32_t both = (upper & 0x80000000) | (lower & 0x7fffffff);
+    return distant ^ both >> 1 ^ (-(both & 1) & 0x9908b0df);
 }
 
-static uint32_t next_word(generator *it) {
-    if (it->place >= GENERATOR_WORDS) {
-        renew_words(it->words);
-        it->place = 0;
-    }
-    uint32_t x = it->words[it->place++];
+static void renew_words(uint32_t x[]) {
+    const uint32_t n = GENERATOR_WORDS;
+    uint32_t i;
+    for (i = 0; i < n - SHIFT; i++) x[i] = twisted(x[i], x[i + 1], x[i + SHIFT]);
+    for (; i < n - 1; i++) x[i] = twisted(x[i], x[i + 1], x[i + SHIFT - n]);
+    x[i] = twisted(x[i], x[0], x[i + SHIFT - n]);
+}
+
+static uint32_t tempered(uint32_t x) {
     x ^= x >> 11;
     x ^= x << 7 & 0x9d2c5680;
     x ^= x << 15 & 0xefc60000;
     return x ^ x >> 18;
 }
 
-/* Uniform in [0, 1), with 53 bits. */
-static double uniform(generator *it) {
-    uint32_t upper = next_word(it) >> 5, lower = next_word(it) >> 6;
+/* Uniform in [0, 1), with 53 bits of two words. */
+static double uniform(const uint32_t x[]) {
+    uint32_t upper = tempered(x[0]) >> 5, lower = tempered(x[1]) >> 6;
     return (upper * 67108864.0 + lower) * (1.0 / 9007199254740992.0);
 }
 
@@ -78,8 +79,16 @@ static double standard_normal(generator *it) {
     if (it->has_next) {
         it->has_next = 0;
     } else {
-        double angle = uniform(it) * (2.0 * 3.141592653589793);
-        double radius = sqrt(-2.0 * log(1.0 - uniform(it)));
+        const uint32_t *words;
+        double angle, radius;
+        if (it->place > GENERATOR_WORDS - PAIR) {
+            renew_words(it->words);
+            it->place = 0;
+        }
+        words = it->words + it->place;
+        it->place += PAIR;
+        angle = uniform(words) * (2.0 * 3.141592653589793);
+        radius = sqrt(-2.0 * log(1.0 - uniform(words + 2)));
         z = cos(angle) * radius;
         it->next = sin(angle) * radius;
         it->has_next = 1;

@@ -55,10 +55,13 @@ def start(inputs: Inputs, t: float, begin: float, end: float) -> State:
 
 def update(state: State, inputs: Inputs, t: float, begin: float, end: float) -> State:
     """One more row."""
+    is_late = t >= begin + 0.5 * (end - begin)
+    if not is_late and not isnan(state.reached):
+        return state
     distance = norm(error(inputs))
     if isnan(state.reached) and distance <= REACHED:
         state = state._replace(reached=t - begin)
-    if distance > state.late and t >= begin + 0.5 * (end - begin):
+    if is_late and distance > state.late:
         state = state._replace(late=distance)
     return state
 

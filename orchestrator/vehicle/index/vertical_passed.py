@@ -7,6 +7,9 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable
 
+#: A pitch [rad] whose cosine is positive, as that of any smaller one.
+_UPRIGHT = 1.5
+
 
 class Inputs(NamedTuple):
     """The pitch."""
@@ -34,7 +37,8 @@ def start(inputs: Inputs, t: float) -> State:
 
 def update(state: State, inputs: Inputs, t: float) -> State:
     """One more row."""
-    if isnan(state.passed) and cos(inputs.pitch) * state.upright <= 0.0:
+    cosine = cos(inputs.pitch) if abs(inputs.pitch) > _UPRIGHT else 1.0
+    if isnan(state.passed) and cosine * state.upright <= 0.0:
         return State(state.upright, t)
     return state
 
