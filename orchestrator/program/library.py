@@ -28,6 +28,7 @@ _TOGETHER = ("-fno-builtin-sin", "-fno-builtin-cos")
 #: How programs are compiled: no number depends on it, nor on the compiler.
 FLAGS = (
     "-std=c99", "-O3", "-fno-math-errno", *(flag for flag in SAME_NUMBERS if flag not in _TOGETHER),
+    "-fomit-frame-pointer", "-fno-stack-protector", "-fno-plt",
     "-fPIC", "-fvisibility=hidden", "-shared", "-s", "-w",
     *EXPORTED,
 )  # fmt: skip
