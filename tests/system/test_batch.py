@@ -373,6 +373,66 @@ def test_what_fmus_refuse_is_refused(name, values, order):
         engines(name)[0].table(point)
 
 
+SCALED = """
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+
+
+class Parameters(NamedTuple):
+    k: Annotated[float, Variable("1", "Factor")] = 3.0
+
+
+class Inputs(NamedTuple):
+    x: Annotated[float, Variable("m", "A number")]
+
+
+class Outputs(NamedTuple):
+    y: Annotated[float, Variable("m", "The same, scaled")]
+
+
+def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
+    return Outputs(parameters.k * inputs.x)
+"""
+
+HALVED = """
+from typing import Annotated, NamedTuple
+
+from auv_fmu import Variable
+
+
+class Inputs(NamedTuple):
+    x: Annotated[float, Variable("m", "A number")]
+
+
+class Outputs(NamedTuple):
+    small: Annotated[float, Variable("m", "The same, halved until it is small")]
+
+
+def outputs(inputs: Inputs) -> Outputs:
+    x = inputs.x
+    while abs(x) > 1.0:
+        x = x / 2.0
+    return Outputs(x)
+"""
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_what_a_loop_would_never_end_with_is_refused_before(workplace, order):
+    for name, text in (("scaled", SCALED), ("halved", HALVED)):
+        Path(f"{name}.py").write_text(text)
+        assert main(["build", f"{name}.py", "--kind", KIND]) == 0
+    Path("own.toml").write_text(
+        '[components]\nscaled = "Scaled.fmu"\nhalved = "Halved.fmu"\n'
+        '[wires]\n"scaled.x" = "planner.y_d.x"\n"halved.x" = "scaled.y"\n'
+    )
+    path = str(Path("own.toml").resolve())
+    compare_with_fmus(path, Point(0, "", {}, 4.01, 0.02, order))
+    # The reference comes beyond x = 1.1 m after 5.4 s.
+    point = Point(0, path, {"scaled.k": 1.7e308}, 20.0, 0.02, order)
+    assert [*BatchEngine({path: load(path, KIND)}).outcomes([point])] == [(0, {}, REFUSED, None)]
+
+
 def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     values = {"planner.tau_d.q": [1.0, 40.0, 45.0], "plant.noise.std": [0.0, 0.001]}
