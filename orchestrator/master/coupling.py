@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from ctypes import c_double
 from dataclasses import replace
 
@@ -209,10 +209,9 @@ class Coupling:
             settling.hand_on(everything=True)
             settling.settle()
             self._check_finite()
-        idle = self._idle()
         for instance in instances.values():
             instance.exit_initialization()
-        order = self._order_taken(idle)
+        order = self._order_taken()
         self.plan = replace(self.plan, experiment=replace(self._experiment, order=order))
         self._solved = self._solvable(order)
         self.sequence = self._in_stages(order, self._solved)
@@ -251,24 +250,8 @@ class Coupling:
             and has_feedthrough(self._system, connection)
         ]
 
-    def _idle(self) -> set[str]:
-        """Our components none of whose outputs follow an input, like a sea without waves.
-
-        In initialisation mode those of all our FMUs do, if anything depends on an input.
-        """
-        if self._experiment.order not in (None, FEEDTHROUGH):
-            return set()
-        return {
-            name
-            for name, component in self._system.components.items()
-            if component.is_ours and why_not_following(component, self._instances[name], self._row)
-        }
-
-    def _order_taken(self, idle: Collection[str]) -> Order:
+    def _order_taken(self) -> Order:
         """The order that is asked for, or else the best one that the FMUs allow.
-
-        Args:
-            idle: components that there is nothing to ask about.
 
         Raises:
             InputError: values cannot pass through an FMU, and no other order will do.
@@ -282,7 +265,8 @@ class Coupling:
         tried: set[str] = set()
         for connection in self._system.connections:
             component = self._system.components[connection.source.component]
-            if component.name in idle or component.digest in tried:
+            # Ours do what they declare, also where nothing happens to follow, as in a calm sea.
+            if component.is_ours or component.digest in tried:
                 continue
             if not has_feedthrough(self._system, connection):
                 continue

@@ -1,8 +1,8 @@
 """The plan of a run, checked before any FMU is loaded; its stages, and its identity.
 
-Every communication step has stages; which ones, the loaded FMUs decide where no order is stated or
-rings are solved. Before a stage is stepped its inputs are gathered; the outputs of a component are
-read as soon as it was stepped.
+Every communication step has stages; which ones, loaded FMUs decide where rings are solved, and
+those of other tools where no order is stated. Before a stage is stepped its inputs are gathered;
+the outputs of a component are read as soon as it was stepped.
 
 - `feedthrough`: two parts. First values of t_k pass: a component whose outputs have direct
   feedthrough takes its inputs and is read without a step, before those it feeds. The row shows

@@ -97,6 +97,8 @@ class Kind:
 
     def text(self) -> Iterator[str]:
         """Its functions."""
+        if self.said.draws:
+            yield self._draw()
         yield self._evaluate()
         if self.foreseen:
             yield self._foresee()
@@ -153,8 +155,9 @@ class Kind:
             rows += ["double restarted; /* when its state first was [s] */", "int has_restarted;"]
         if self.said.draws:
             rows.append(f"double draws[{self.said.draws}];")
-            rows.append("int is_noisy; /* whether it makes a difference what is drawn */")
-            rows += ["int is_seeded;", "generator noise;"]
+            rows.append("int is_noisy; /* whether each draw makes a difference */")
+            rows.append("int is_seeded, undrawn; /* how often numbers are still to be drawn */")
+            rows.append("generator noise;")
         body = "\n".join(f"    {row}" for row in rows)
         return (
             f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
@@ -192,7 +195,19 @@ class Kind:
         lines.append(f"{self._type('outputs')} outputs = {self.call('outputs', state=state)};")
         if self.said.draws:
             group = f"outputs.{in_c(self.said.noisy)}"
-            lines.append(f"{group} = {self._measured('it->draws', group)};")
+            type_ = self.functions["measured"].returns
+            lines.append(f"const {self.emitter.type(type_)} exact = {group};")
+            measured = f"{group} = {self._measured('it->draws', 'exact')};"
+            lines.append(measured)
+            if self._may_skip:
+                # Noise of zero may still change the sign of a zero.
+                zeros = " || ".join(f"{place.text} == 0.0" for place in scalars(type_, group))
+                lines += [
+                    f"if (it->undrawn > 0 && ({zeros})) {{",
+                    f"    {self.name}_draw(it);",
+                    f"    {measured}",
+                    "}",
+                ]
         return lines
 
     def _evaluate(self) -> str:
@@ -235,8 +250,14 @@ class Kind:
             lines.append(f"if (!({finite})) {_NOT_FINITE}")
         return self._function("start", ", double t", lines)
 
+    @cached_property
+    def _may_skip(self) -> bool:
+        """Whether noise that is multiplied by zero need not be drawn."""
+        # Parameters that change may let it count, and so may what is measured.
+        return not self.is_tuned and is_added(self.functions["measured"], "n", self.said.noisy)
+
     def _seed(self) -> list[str]:
-        """What begins the noise, unless it is multiplied by zero: then none need be drawn."""
+        """What begins the noise, and finds whether it counts."""
         n, type_ = self.said.draws, self.functions["measured"].returns
         name = self.emitter.type(type_)
         # They differ, or their difference would not show.
@@ -249,20 +270,32 @@ class Kind:
             f"const {name} all = {self._measured('large', 'none')};",
             "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
         ]
-        is_tried = not self.is_tuned and is_added(self.functions["measured"], "n", self.said.noisy)
         return [
             "it->is_seeded = 1;",
-            # Parameters that change may let it count, and so may what is measured.
+            "it->noise.place = 0; /* not seeded yet */",
+            "it->undrawn = 1;",
             *(
                 ["{", *(f"    {line}" for line in noisy), "}"]
-                if is_tried
+                if self._may_skip
                 else ["it->is_noisy = 1;"]
             ),
-            "if (it->is_noisy) {",
-            f"    seed_generator(&it->noise, (uint32_t){self.call('seed')});",
-            f"    draw_normals(&it->noise, it->draws, {n});",
-            "}",
+            f"if (it->is_noisy) {self.name}_draw(it);",
         ]
+
+    def _draw(self) -> str:
+        """What draws all that is still to be drawn."""
+        return function(
+            f"static inline void {self.name}_draw({self.name} *it)",
+            [
+                "if (it->noise.place == 0) {",
+                f"    seed_generator(&it->noise, (uint32_t){self.call('seed')});",
+                "}",
+                "for (; it->undrawn > 0; it->undrawn--) {",
+                f"    draw_normals(&it->noise, it->draws, {self.said.draws});",
+                "}",
+            ],
+            (),
+        )
 
     def _advance(self) -> str:
         said, lines = self.said, list[str]()
@@ -301,7 +334,7 @@ class Kind:
             if said.takes("derive", "t") and not self.steps:
                 lines.append("it->underived = 1;")
         if said.draws:
-            lines.append(f"if (it->is_noisy) draw_normals(&it->noise, it->draws, {said.draws});")
+            lines += ["it->undrawn++;", f"if (it->is_noisy) {self.name}_draw(it);"]
         if not said.is_sampled and not self.follows_inputs:
             lines.append(f"{self.name}_evaluate(it, error);")
         return self._function("advance", ", double t, double h, double end", lines)
