@@ -1,6 +1,6 @@
-"""The modules of the live page: programs of systems, compiled to WebAssembly.
+"""The modules of the live page: programs of systems and indices, compiled to WebAssembly.
 
-A module has several programs, each with a number before the names of its functions.
+The functions of each have its name before theirs.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from fmus.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
 from fmus.discovery import package_folder
-from orchestrator.live.programs import EQUATIONS, Programs
+from orchestrator.live.programs import Programs
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
@@ -47,14 +47,6 @@ _SHARED = ("-DAPART=",)
 _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
 _FREE = "__heap_base"
 
-#: Functions of a program that the page calls.
-_FUNCTIONS = (
-    "size_of_simulation", "begin", "run_with_events", "rows_shown", "failure", "restarts",
-)  # fmt: skip
-
-#: Others that each program has.
-_OTHERS = ("run", "set")
-
 
 def live_module(
     programs: Programs, hear: Callable[[str], None] = lambda line: None
@@ -79,11 +71,11 @@ def live_module(
 
 def key_of(programs: Programs) -> str:
     """Key in the cache: digest of the sources and the flags."""
-    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(len(programs)))
+    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(programs))
     made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *flags)
     digest = sha256("\0".join(made_of).encode())
-    for name, text in programs.sources.items():
-        digest.update(f"\0{name}\0{text}".encode())
+    for name, source in programs.sources.items():
+        digest.update(f"\0{name}\0{source.text}\0{source.others}".encode())
     return digest.hexdigest()[:16]
 
 
@@ -111,17 +103,15 @@ def compiled(
         folder = Path(temporary)
 
         def compile_source(name: str) -> str:
-            made, number = f"{name}.o", Path(name).stem
-            functions = () if name == EQUATIONS else (*_FUNCTIONS, *_OTHERS)
-            names = (f"-D{one}={_name(number, one)}" for one in functions)
-            _zig(folder, *_FLAGS, *_SHARED, *names, "-c", name, "-o", made)
+            made, (text, called, others) = f"{name}.o", programs.sources[name]
+            (folder / f"{name}.c").write_text(text, encoding="utf-8")
+            names = (f"-D{one}={name}_{one}" for one in (*called, *others))
+            _zig(folder, *_FLAGS, *_SHARED, *names, "-c", f"{name}.c", "-o", made)
             return made
 
-        for name, text in programs.sources.items():
-            (folder / name).write_text(text, encoding="utf-8")
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             objects = list(pool.map(compile_source, programs.sources))
-        exports = [f"-Wl,--export={name}" for name in _exports(len(programs))]
+        exports = [f"-Wl,--export={name}" for name in _exports(programs)]
         _zig(folder, *_LINKED, *exports, *objects, "-o", MODULE)
         return {MODULE: (folder / MODULE).read_bytes(), LICENCES: _licences().encode()}
 
@@ -143,12 +133,7 @@ def _zig(folder: Path, *arguments: str) -> None:
         raise OSError(f"ziglang: {(errors or [last_line(process.stderr)])[0]}")
 
 
-def _exports(programs: int) -> Iterator[str]:
+def _exports(programs: Programs) -> Iterator[str]:
     yield _FREE
-    for number in range(programs):
-        yield from (_name(number, one) for one in _FUNCTIONS)
-
-
-def _name(number: object, function: str) -> str:
-    """The name of a program's function in the module."""
-    return f"p{number}_{function}"
+    for name, source in programs.sources.items():
+        yield from (f"{name}_{one}" for one in source.called)

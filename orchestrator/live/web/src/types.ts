@@ -84,6 +84,8 @@ export interface LoopData {
   readonly scenario?: string;
   /** At least one. */
   readonly vehicles: readonly VehicleData[];
+  /** Of each vehicle, the place in `Data.sources`. */
+  readonly measured: readonly number[];
   /** FMUs by the names of the components. */
   readonly components: Readonly<Record<string, string>>;
   /** Entries of a scenario file with this loop. */
@@ -149,18 +151,33 @@ export interface IndexData {
   readonly meaning: string;
 }
 
+/** What makes indices of rows. */
+export interface ReducerData {
+  /** How many numbers each index is, by its name, in their order. */
+  readonly results: Readonly<Record<string, number>>;
+  /** Only the rows of so many seconds before the last one count [s]; absent: all. */
+  readonly last?: number;
+}
+
+/**
+ * What there is of `Data.reducers` for a vehicle: where the numbers that each takes come from,
+ * columns and parameters by their names, and what never changes.
+ */
+export type Sources = Readonly<Record<string, readonly (string | number)[]>>;
+
 /** All that Python writes into the page, besides script and modules. */
 export interface Data {
   /** The preset that is shown first. */
   readonly opened: string;
   /** Rows of more steps than this, of all vehicles together, do not fit into a page. */
   readonly mostSteps: number;
-  /** T_L of section 4.2 [s]. */
-  readonly lastSeconds: number;
   /** Of the groups of signals that have charts. */
   readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
   readonly presets: readonly Preset[];
   readonly indices: readonly IndexData[];
+  /** What makes them of rows, by names that programs have for it. */
+  readonly reducers: Readonly<Record<string, ReducerData>>;
+  readonly sources: readonly Sources[];
 }
 
 /** Something that has happened in a run. */
@@ -193,6 +210,8 @@ export interface Result {
   /** Values of all parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
+  /** Indices of each vehicle; what is not there is absent. */
+  readonly metrics: readonly Metrics[];
   /** What components say, `controller: ...`. */
   readonly messages: readonly string[];
   /** Why the run has not come to its end; the rows before that are there. */
