@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fmus.language.build import Program
 from fmus.language.types import type_of
-from fmus.native.emit import Emitter
+from fmus.native.emit import Emitter, number_in_c
 from fmus.native.pieces import function, initializer, scalars
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
@@ -89,6 +89,12 @@ class ReducerText:
         row = self.row(lambda port: _PLACE.format(places[port.name]))
         return _ROWS.format(name=self.name, row=row)
 
+    def over_run(self) -> str:
+        """What gives the numbers of a run whose rows are all there."""
+        last = self.reducer.last
+        since = "-INFINITY" if last is None else f"rows[(n - 1) * width] - {number_in_c(last)}"
+        return f"{self.over_rows()}\n{_RUN.format(since=since)}"
+
     @property
     def _looks_back(self) -> bool:
         """Whether it takes the row before."""
@@ -135,6 +141,20 @@ EXPORTED int take_rows(kept *it, const double rows[], int n, int width, const in
 EXPORTED int give_numbers(kept *it, double begin, double end, double found[]) {{
     {name}_give(&it->of, it->time, begin, end, found, &it->error);
     return it->error.raised;
+}}
+"""
+
+_RUN = """\
+/* Gives the numbers of n rows; whether something has raised. */
+EXPORTED int reduce(const double rows[], int n, int width, const int from[],
+                    const double constants[], int acts_at_end, double begin, double end,
+                    double found[]) {{
+    kept it;
+    const double since = n > 0 ? {since} : 0.0;
+    memset(&it, 0, sizeof it);
+    for (; n > 0 && rows[0] < since; n--) rows += width;
+    take_rows(&it, rows, n, width, from, constants, acts_at_end, begin, end);
+    return give_numbers(&it, begin, end, found);
 }}
 """
 

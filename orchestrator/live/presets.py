@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
-from fmus.ports.reducer import Reducer
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
@@ -107,11 +106,11 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
         run.run([])
     others = [preset(name)[0] for name in names() if name != first["name"]]
     presets = sorted([first, *others], key=itemgetter("name"))
-    sources: list[Plain] = []
+    measured: list[list[Plain]] = []
     for loop in (loop for one in presets for loop in one["loops"]):
         # Most vehicles have the same.
-        sources += [one for one in loop["measured"] if one not in sources]
-        loop["measured"] = [sources.index(one) for one in loop["measured"]]
+        measured += [one for one in loop["measured"] if one not in measured]
+        loop["measured"] = [measured.index(one) for one in loop["measured"]]
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
@@ -123,8 +122,7 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
             for one in metrics()
         ]
         + [_TOGETHER],
-        "reducers": {one.name: _reducer(one) for one in REDUCERS},
-        "sources": sources,
+        "measured": measured,
     }
     return data, modules
 
@@ -301,21 +299,20 @@ def _vehicle(loop: Loop) -> dict[str, str]:
     return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
-def _measured(text: Text, loop: Loop) -> dict[str, list[str | float]]:
-    """What each index of a vehicle takes: columns, parameters, and what never changes."""
-    return {
-        one.reducer.name: [
-            # JSON has nothing infinite.
-            str(source) if isinstance(source, PortName) else min(source, sys.float_info.max)
-            for source in one.sources
-        ]
-        for one in looking_at(text.plan.system, loop, REDUCERS)
-    }
-
-
-def _reducer(reducer: Reducer) -> Plain:
-    last = {} if reducer.last is None else {"last": reducer.last}
-    return {"results": {name: len(ports) for name, ports in reducer.results.items()}, **last}
+def _measured(text: Text, loop: Loop) -> list[Plain]:
+    """What makes the indices of a vehicle, and where it takes its numbers from."""
+    return [
+        {
+            "name": reducer.name,
+            "takes": [
+                # JSON has nothing infinite.
+                str(one) if isinstance(one, PortName) else min(one, sys.float_info.max)
+                for one in sources
+            ],
+            "gives": [name for name, ports in reducer.results.items() for _ in ports],
+        }
+        for reducer, sources in looking_at(text.plan.system, loop, REDUCERS)
+    ]
 
 
 def _ports(text: Text, name: str) -> dict[str, list[str]]:

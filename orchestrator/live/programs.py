@@ -40,7 +40,7 @@ _OF_PROGRAM = (
     ("size_of_simulation", "begin", "run_with_events", "rows_shown", "failure", "restarts"),
     ("run", "set"),
 )
-_OF_INDEX = ("size_of_rows", "take_rows", "give_numbers")
+_OF_INDEX = ("reduce",), ("size_of_rows", "take_rows", "give_numbers")
 
 
 class Programs:
@@ -76,15 +76,14 @@ class Programs:
         """The sources by their names: of the equations, of each program, and of each index."""
         equations = self._equations
         indices = {
-            one.name: "\n\n".join(
-                (equations.header, EXPORTED, equations.reducers[id(one)].over_rows())
-            )
+            one.name: "\n\n".join((equations.header, EXPORTED, reducer.over_run()))
             for one in REDUCERS
+            for reducer in [equations.reducers[id(one)]]
         }
         return {
             "equations": Source(equations.apart()),
             **{f"p{n}": Source(text, *_OF_PROGRAM) for text, n in self._numbers.items()},
-            **{name: Source(text, _OF_INDEX) for name, text in indices.items()},
+            **{name: Source(text, *_OF_INDEX) for name, text in indices.items()},
         }
 
     def find(self, run: Prepared) -> tuple[int, Text] | None:

@@ -41,18 +41,16 @@ export interface Agenda {
   readonly listed: number;
 }
 
-/** An index of the rows of a run. */
+/** What makes indices of the rows of a run. */
 export interface Reducer {
   readonly name: string;
-  /** Where in a row each number is that it takes; -1: among the constants. */
+  /** Where in a row each number is that it takes; -1: it is a constant. */
   readonly from: readonly number[];
   readonly constants: readonly number[];
   /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
   readonly actingRow: number;
-  /** Only the rows of so many seconds before the last one count [s]. */
-  readonly last: number;
-  /** How many numbers each of its indices is, by its name. */
-  readonly results: Readonly<Record<string, number>>;
+  /** The index that each number is a member of, by its name. */
+  readonly gives: readonly string[];
 }
 
 /** What a run has left. */
@@ -72,19 +70,6 @@ export interface Run {
 }
 
 type Function = (...args: number[]) => number;
-
-function sum(numbers: readonly number[]): number {
-  return numbers.reduce((a, b) => a + b, 0);
-}
-
-/** Addresses one after the other for so many doubles each. */
-function addresses(from: number, sizes: readonly number[]): number[] {
-  let end = from;
-  return sizes.map((n) => {
-    end += n * REAL;
-    return end - n * REAL;
-  });
-}
 
 /** A module with several programs, of which one at a time uses its memory. */
 export class Module {
@@ -106,14 +91,17 @@ export class Module {
     agenda: Agenda,
     vehicles: readonly (readonly Reducer[])[],
   ): Run {
-    const call = (name: string) => this.call(`p${number}_${name}`);
+    const call = (name: string) => this.exports[`p${number}_${name}`] as Function;
     const size = Math.ceil(call("size_of_simulation")() / REAL);
     const { n, events, actions, listed } = agenda;
+    const room = Math.max(
+      0,
+      ...vehicles.flat().map(({ from, gives }) => from.length + gives.length),
+    );
     const sizes = [size, size, 2, components, values.length, events.length, actions.length, listed];
-    const room = Math.max(0, ...vehicles.flat().map((one) => sum(this.sizesFor(one))));
-    const places = this.lay([...sizes, room, (steps + 1) * width]);
-    const [simulation, ahead, failure, restarts, given, first, second, happened, free, rows] =
-      places;
+    const places = this.lay([...sizes, room, room, room, (steps + 1) * width]);
+    const [simulation, ahead, failure, restarts, given, first, second, happened, ...rest] = places;
+    const [from, constants, found, rows] = rest;
     this.doubles(given, values.length).set(values);
     this.doubles(first, events.length).set(events);
     this.doubles(second, actions.length).set(actions);
@@ -127,56 +115,25 @@ export class Module {
     const [component, kind, port, made] = new Int32Array(this.memory.buffer, failure, 4);
     call("restarts")(simulation, restarts);
     const shown = call("rows_shown")(simulation);
-    const table = this.doubles(rows, shown * width);
-    const metrics = vehicles.map((reducers) =>
-      reducers.map((one) => this.reduced(one, table, width, stopTime, free)),
-    );
+    const reduce = (one: Reducer) => {
+      new Int32Array(this.memory.buffer, from, one.from.length).set(one.from);
+      this.doubles(constants, one.constants.length).set(one.constants);
+      const agreed = [from, constants, one.actingRow, 0, stopTime, found];
+      const reducer = this.exports[`${one.name}_reduce`] as Function;
+      if (reducer(rows, shown, width, ...agreed)) return [];
+      return one.gives.map(
+        (index, i) => [index, this.doubles(found, one.gives.length)[i]] as const,
+      );
+    };
     return {
       outcome: OUTCOMES[outcome],
       refused: { component, call: CALLS[kind], port, made },
       rows: shown,
-      table,
+      table: this.doubles(rows, shown * width),
       happened: this.doubles(happened, listed),
       restarts: this.doubles(restarts, components),
-      metrics: metrics.map((found) => Object.assign({}, ...found)),
+      metrics: vehicles.map((reducers) => named(reducers.flatMap(reduce))),
     };
-  }
-
-  private call(name: string): Function {
-    return this.exports[name] as Function;
-  }
-
-  /** Doubles for what an index keeps, where its numbers come from, constants, and what it gives. */
-  private sizesFor({ name, from, constants, results }: Reducer): number[] {
-    const kept = Math.ceil(this.call(`${name}_size_of_rows`)() / REAL);
-    return [kept, from.length, constants.length, sum(Object.values(results))];
-  }
-
-  /** The indices that are made of rows in the memory, with room for what that takes. */
-  private reduced(
-    reducer: Reducer,
-    table: Float64Array,
-    width: number,
-    end: number,
-    free: number,
-  ): Metrics {
-    const { name, from, constants, actingRow, last, results } = reducer;
-    const sizes = this.sizesFor(reducer);
-    const [kept, sources, fixed, given] = addresses(free, sizes);
-    this.doubles(kept, sizes[0]).fill(0);
-    new Int32Array(this.memory.buffer, sources, from.length).set(from);
-    this.doubles(fixed, constants.length).set(constants);
-    const since = table[table.length - width] - last;
-    let first = 0;
-    while (table[first] < since) first += width;
-    const rows = [table.byteOffset + REAL * first, (table.length - first) / width, width];
-    this.call(`${name}_take_rows`)(kept, ...rows, sources, fixed, actingRow, 0, end);
-    if (this.call(`${name}_give_numbers`)(kept, 0, end, given)) return {};
-    const numbers = [...this.doubles(given, sizes[3])];
-    const found = Object.entries(results).map(
-      ([index, n]) => [index, numbers.splice(0, n)] as const,
-    );
-    return Object.fromEntries(found.filter(([, values]) => !values.every(Number.isNaN)));
   }
 
   private get memory(): WebAssembly.Memory {
@@ -190,11 +147,23 @@ export class Module {
 
   /** Addresses for so many doubles each, where nothing else is. */
   private lay(sizes: readonly number[]): number[] {
-    const base = (this.exports.__heap_base as WebAssembly.Global).value as number;
-    const found = addresses(Math.ceil(base / REAL) * REAL, [...sizes, 0]);
-    const end = found.pop() as number;
+    let end = (this.exports.__heap_base as WebAssembly.Global).value as number;
+    end = Math.ceil(end / REAL) * REAL;
+    const addresses = sizes.map((n) => {
+      end += n * REAL;
+      return end - n * REAL;
+    });
     const missing = Math.ceil((end - this.memory.buffer.byteLength) / PAGE);
     if (missing > 0) this.memory.grow(missing);
-    return found;
+    return addresses;
   }
+}
+
+/** The members of each index that is there. */
+function named(members: readonly (readonly [string, number])[]): Metrics {
+  const found: Record<string, number[]> = {};
+  for (const [index, value] of members) found[index] = [...(found[index] ?? []), value];
+  return Object.fromEntries(
+    Object.entries(found).filter(([, values]) => !values.every(Number.isNaN)),
+  );
 }

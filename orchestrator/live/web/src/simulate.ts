@@ -84,14 +84,13 @@ export class Engine {
     values: readonly number[],
     actingRow: number,
   ): Reducer[] {
-    return Object.entries(this.data.sources[place]).map(([name, sources]) => ({
+    return this.data.measured[place].map(({ name, takes, gives }) => ({
       name,
       // A row begins with the time.
-      from: sources.map((one) => 1 + (columns.get(`${one}`) ?? -2)),
-      constants: sources.map((one) => values[parameters.get(`${one}`) ?? -1] ?? Number(one)),
+      from: takes.map((one) => 1 + (columns.get(`${one}`) ?? -2)),
+      constants: takes.map((one) => values[parameters.get(`${one}`) ?? -1] ?? Number(one)),
       actingRow,
-      last: Infinity,
-      ...this.data.reducers[name],
+      gives,
     }));
   }
 

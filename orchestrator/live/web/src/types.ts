@@ -84,7 +84,7 @@ export interface LoopData {
   readonly scenario?: string;
   /** At least one. */
   readonly vehicles: readonly VehicleData[];
-  /** Of each vehicle, the place in `Data.sources`. */
+  /** What is measured of each vehicle, by its place in `Data.measured`. */
   readonly measured: readonly number[];
   /** FMUs by the names of the components. */
   readonly components: Readonly<Record<string, string>>;
@@ -151,19 +151,15 @@ export interface IndexData {
   readonly meaning: string;
 }
 
-/** What makes indices of rows. */
+/** What makes indices of the rows of a vehicle. */
 export interface ReducerData {
-  /** How many numbers each index is, by its name, in their order. */
-  readonly results: Readonly<Record<string, number>>;
-  /** Only the rows of so many seconds before the last one count [s]; absent: all. */
-  readonly last?: number;
+  /** In the module. */
+  readonly name: string;
+  /** Columns and parameters by their names, and what never changes. */
+  readonly takes: readonly (string | number)[];
+  /** The index that each number is a member of, by its name. */
+  readonly gives: readonly string[];
 }
-
-/**
- * What there is of `Data.reducers` for a vehicle: where the numbers that each takes come from,
- * columns and parameters by their names, and what never changes.
- */
-export type Sources = Readonly<Record<string, readonly (string | number)[]>>;
 
 /** All that Python writes into the page, besides script and modules. */
 export interface Data {
@@ -175,9 +171,8 @@ export interface Data {
   readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
   readonly presets: readonly Preset[];
   readonly indices: readonly IndexData[];
-  /** What makes them of rows, by names that programs have for it. */
-  readonly reducers: Readonly<Record<string, ReducerData>>;
-  readonly sources: readonly Sources[];
+  /** For vehicles. */
+  readonly measured: readonly (readonly ReducerData[])[];
 }
 
 /** Something that has happened in a run. */

@@ -148,6 +148,5 @@ export const data = {
   units: { e: {}, tau: {}, dy: {}, theta_hat: {} },
   presets: [preset, fleet],
   indices: [],
-  reducers: {},
-  sources: [],
+  measured: [],
 };
