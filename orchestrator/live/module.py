@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.util import find_spec
@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from fmus.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
 from fmus.discovery import package_folder
-from orchestrator.live.programs import Programs
+from orchestrator.live.programs import Source
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
@@ -49,12 +49,12 @@ _FREE = "__heap_base"
 
 
 def live_module(
-    programs: Programs, hear: Callable[[str], None] = lambda line: None
+    sources: Mapping[str, Source], hear: Callable[[str], None] = lambda line: None
 ) -> dict[str, Path]:
     """The files by their names, compiled unless they are in the cache.
 
     Args:
-        programs: that the module has.
+        sources: of the module, by their names.
         hear: called with a line before the module is compiled.
 
     Raises:
@@ -62,30 +62,30 @@ def live_module(
 
     """
     try:
-        return made_once(CATEGORY, key_of(programs), lambda: compiled(programs, hear))
+        return made_once(CATEGORY, key_of(sources), lambda: compiled(sources, hear))
     except OSError as error:
         raise InputError(
             f"the module of the live page cannot be compiled: {reason(error)}"
         ) from error
 
 
-def key_of(programs: Programs) -> str:
+def key_of(sources: Mapping[str, Source]) -> str:
     """Key in the cache: digest of the sources and the flags."""
-    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(programs))
+    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(sources))
     made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *flags)
     digest = sha256("\0".join(made_of).encode())
-    for name, source in programs.sources.items():
+    for name, source in sources.items():
         digest.update(f"\0{name}\0{source.text}\0{source.others}".encode())
     return digest.hexdigest()[:16]
 
 
 def compiled(
-    programs: Programs, hear: Callable[[str], None] = lambda line: None
+    sources: Mapping[str, Source], hear: Callable[[str], None] = lambda line: None
 ) -> dict[str, bytes]:
     """The contents of the files by their names, compiled now.
 
     Args:
-        programs: that the module has.
+        sources: of the module, by their names.
         hear: called with a line before the module is compiled.
 
     Raises:
@@ -103,15 +103,15 @@ def compiled(
         folder = Path(temporary)
 
         def compile_source(name: str) -> str:
-            made, (text, called, others) = f"{name}.o", programs.sources[name]
+            made, (text, called, others) = f"{name}.o", sources[name]
             (folder / f"{name}.c").write_text(text, encoding="utf-8")
             names = (f"-D{one}={name}_{one}" for one in (*called, *others))
             _zig(folder, *_FLAGS, *_SHARED, *names, "-c", f"{name}.c", "-o", made)
             return made
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            objects = list(pool.map(compile_source, programs.sources))
-        exports = [f"-Wl,--export={name}" for name in _exports(programs)]
+            objects = list(pool.map(compile_source, sources))
+        exports = [f"-Wl,--export={name}" for name in _exports(sources)]
         _zig(folder, *_LINKED, *exports, *objects, "-o", MODULE)
         return {MODULE: (folder / MODULE).read_bytes(), LICENCES: _licences().encode()}
 
@@ -133,7 +133,7 @@ def _zig(folder: Path, *arguments: str) -> None:
         raise OSError(f"ziglang: {(errors or [last_line(process.stderr)])[0]}")
 
 
-def _exports(programs: Programs) -> Iterator[str]:
+def _exports(sources: Mapping[str, Source]) -> Iterator[str]:
     yield _FREE
-    for name, source in programs.sources.items():
+    for name, source in sources.items():
         yield from (f"{name}_{one}" for one in source.called)

@@ -36,7 +36,7 @@ class Source(NamedTuple):
 
 
 #: Functions of a program, and of an index.
-_OF_PROGRAM = (
+OF_PROGRAM = (
     ("size_of_simulation", "begin", "run_with_events", "rows_shown", "failure", "restarts"),
     ("run", "set"),
 )
@@ -82,7 +82,7 @@ class Programs:
         }
         return {
             "equations": Source(equations.apart()),
-            **{f"p{n}": Source(text, *_OF_PROGRAM) for text, n in self._numbers.items()},
+            **{f"p{n}": Source(text, *OF_PROGRAM) for text, n in self._numbers.items()},
             **{name: Source(text, *_OF_INDEX) for name, text in indices.items()},
         }
 

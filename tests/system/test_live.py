@@ -90,7 +90,7 @@ def made(engine: Path, opened: str, folder: Path, alone: bool = False) -> Parts:
     if alone:
         data["presets"] = [one for one in data["presets"] if one["name"] == data["opened"]]
     (folder / "data.json").write_text(json.dumps(data))
-    modules = [live_module(one)[module.MODULE] for one in programs]
+    modules = [live_module(one.sources)[module.MODULE] for one in programs]
     return Parts(engine, modules, folder / "data.json")
 
 
@@ -176,7 +176,7 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
     """With the same sine and its like in both, all rows and indices are the same bit for bit."""
     with monkeypatch.context() as patch:
         patch.setattr(module, "_FLAGS", (*module._FLAGS, "-include", str(SAME_FUNCTIONS)))
-        content = module.compiled(presets.bundled())[module.MODULE]
+        content = module.compiled(presets.bundled().sources)[module.MODULE]
     (tmp_path / "same.wasm").write_bytes(content)
     said = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
@@ -525,7 +525,7 @@ def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, ca
     ("make", "lacking", "wanted"),
     [
         (
-            lambda: module.compiled(presets.bundled()),
+            lambda: module.compiled(presets.bundled().sources),
             "module.find_spec",
             r"pip install 'auv-fmu\[native\]'",
         ),
