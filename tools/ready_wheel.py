@@ -43,9 +43,9 @@ def write_ready(folder: Path) -> None:
     with loader_for_any_linux():
         place = folder / bundle.CATEGORY / bundle.key_of(PYTHON, FMI_VERSIONS[0])
         bundle.run_fmus("build", place, "--kind", PYTHON, "--loader", "native")
-    programs = bundled()
+    sources = bundled().sources
     for category, key, files in (
-        (module.CATEGORY, module.key_of(programs), module.compiled(programs)),
+        (module.CATEGORY, module.key_of(sources), module.compiled(sources)),
         (assembly.CATEGORY, assembly.key_of(), assembly.bundled()),
     ):
         place = folder / category / key

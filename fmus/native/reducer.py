@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fmus.language.build import Program
 from fmus.language.types import type_of
-from fmus.native.emit import Emitter
+from fmus.native.emit import Emitter, number_in_c
 from fmus.native.pieces import function, initializer, scalars
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
@@ -86,6 +86,18 @@ class ReducerText:
             ("t", "begin", "end", "error"),
         )
 
+    def over_rows(self) -> str:
+        """What takes rows of any run: which columns it takes, the caller says."""
+        places = {port.name: k for k, port in enumerate(self.reducer.ports)}
+        row = self.row(lambda port: _PLACE.format(places[port.name]))
+        return _ROWS.format(name=self.name, row=row)
+
+    def over_run(self) -> str:
+        """What gives the numbers of a run whose rows are all there."""
+        last = self.reducer.last
+        since = "-INFINITY" if last is None else f"rows[(n - 1) * width] - {number_in_c(last)}"
+        return f"{self.over_rows()}\n{_RUN.format(since=since)}"
+
     @property
     def _looks_back(self) -> bool:
         """Whether it takes the row before."""
@@ -110,40 +122,53 @@ _ROWS = """\
 typedef struct {{
     {name} of;
     double time;
+    Error error;
 }} kept;
 
 EXPORTED size_t size_of_rows(void) {{ return sizeof(kept); }}
 
-EXPORTED size_t size_of_error(void) {{ return sizeof(Error); }}
-
-EXPORTED const char *why(const Error *error) {{ return error->why.text; }}
-
 /* Takes n rows of a width; how many were taken before one raised. */
-EXPORTED int take(kept *it, const double rows[], int n, int width, const int from[],
-                  const double constants[], int acts_at_end, double begin, double end,
-                  Error *error) {{
-    error->raised = 0;
+EXPORTED int take_rows(kept *it, const double rows[], int n, int width, const int from[],
+                       const double constants[], int acts_at_end, double begin, double end) {{
     for (int k = 0; k < n; k++, rows += width) {{
         const double t = rows[0], h = t - it->time;
         {name}_look(&it->of, {row},
-            acts_at_end, t, h, begin, end, error);
-        if (error->raised) return k;
+            acts_at_end, t, h, begin, end, &it->error);
+        if (it->error.raised) return k;
         it->time = t;
     }}
     return n;
 }}
 
 /* Gives the numbers; whether that raised. */
-EXPORTED int give(const kept *it, double begin, double end, double found[], Error *error) {{
-    error->raised = 0;
-    {name}_give(&it->of, it->time, begin, end, found, error);
-    return error->raised;
+EXPORTED int give_numbers(kept *it, double begin, double end, double found[]) {{
+    {name}_give(&it->of, it->time, begin, end, found, &it->error);
+    return it->error.raised;
 }}
 """
 
+_RUN = """\
+/* Gives the numbers of n rows; whether something has raised. */
+EXPORTED int reduce(const double rows[], int n, int width, const int from[],
+                    const double constants[], int acts_at_end, double begin, double end,
+                    double found[]) {{
+    kept it;
+    const double since = n > 0 ? {since} : 0.0;
+    memset(&it, 0, sizeof it);
+    for (; n > 0 && rows[0] < since; n--) rows += width;
+    take_rows(&it, rows, n, width, from, constants, acts_at_end, begin, end);
+    return give_numbers(&it, begin, end, found);
+}}
+"""
+
+#: A value of a row, or one that never changes.
+_PLACE = "from[{0}] < 0 ? constants[{0}] : rows[from[{0}]]"
+
+_WHY = "EXPORTED const char *why(const kept *it) { return it->error.why.text; }\n"
+
 
 def text_over_rows(reducer: Reducer) -> str:
-    """An index in C over rows of any run: which columns it takes, the caller says.
+    """An index in C over rows of any run, as a source of its own.
 
     Raises:
         Untranslatable: it is outside the language of equations.
@@ -153,13 +178,6 @@ def text_over_rows(reducer: Reducer) -> str:
     program.check()
     emitter = Emitter(program.functions.values())
     one = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
-    places = {port.name: k for k, port in enumerate(reducer.ports)}
-    row = one.row(lambda port: _PLACE.format(places[port.name]))
-    functions = [*one.text()]
+    functions, rows = [*one.text()], one.over_rows()
     head = '#include "arithmetic.h"\n\n#define APART static'
-    rows = _ROWS.format(name=one.name, row=row)
-    return "\n\n".join([head, emitter.text(), one.structure(), *functions, rows])
-
-
-#: A value of a row, or one that never changes.
-_PLACE = "from[{0}] < 0 ? constants[{0}] : rows[from[{0}]]"
+    return "\n\n".join([head, emitter.text(), one.structure(), *functions, rows, _WHY])

@@ -66,7 +66,7 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
     """
     data, programs = page_data(opened)
     parts = {name: path.read_text(encoding="utf-8") for name, path in live_script(hear).items()}
-    modules = [live_module(one, hear) for one in programs]
+    modules = [live_module(one.sources, hear) for one in programs]
     linked = modules[0][MODULE_LICENCES].read_text(encoding="utf-8")
     titles = {one["name"]: one["title"] for one in data["presets"]}
     fields = {

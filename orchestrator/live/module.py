@@ -1,13 +1,13 @@
-"""The modules of the live page: programs of systems, compiled to WebAssembly.
+"""The modules of the live page: programs of systems and indices, compiled to WebAssembly.
 
-A module has several programs, each with a number before the names of its functions.
+The functions of each have its name before theirs.
 """
 
 from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from importlib.util import find_spec
@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from fmus.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
 from fmus.discovery import package_folder
-from orchestrator.live.programs import EQUATIONS, Programs
+from orchestrator.live.programs import Source
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
@@ -47,22 +47,14 @@ _SHARED = ("-DAPART=",)
 _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
 _FREE = "__heap_base"
 
-#: Functions of a program that the page calls.
-_FUNCTIONS = (
-    "size_of_simulation", "begin", "run_with_events", "rows_shown", "failure", "restarts",
-)  # fmt: skip
-
-#: Others that each program has.
-_OTHERS = ("run", "set")
-
 
 def live_module(
-    programs: Programs, hear: Callable[[str], None] = lambda line: None
+    sources: Mapping[str, Source], hear: Callable[[str], None] = lambda line: None
 ) -> dict[str, Path]:
     """The files by their names, compiled unless they are in the cache.
 
     Args:
-        programs: that the module has.
+        sources: of the module, by their names.
         hear: called with a line before the module is compiled.
 
     Raises:
@@ -70,30 +62,30 @@ def live_module(
 
     """
     try:
-        return made_once(CATEGORY, key_of(programs), lambda: compiled(programs, hear))
+        return made_once(CATEGORY, key_of(sources), lambda: compiled(sources, hear))
     except OSError as error:
         raise InputError(
             f"the module of the live page cannot be compiled: {reason(error)}"
         ) from error
 
 
-def key_of(programs: Programs) -> str:
+def key_of(sources: Mapping[str, Source]) -> str:
     """Key in the cache: digest of the sources and the flags."""
-    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(len(programs)))
+    flags = (*_TARGET, *_FLAGS, *_SHARED, *_LINKED, *_exports(sources))
     made_of = (*FILES, *_NOTICES, *_NOTICES.values(), *flags)
     digest = sha256("\0".join(made_of).encode())
-    for name, text in programs.sources.items():
-        digest.update(f"\0{name}\0{text}".encode())
+    for name, source in sources.items():
+        digest.update(f"\0{name}\0{source.text}\0{source.others}".encode())
     return digest.hexdigest()[:16]
 
 
 def compiled(
-    programs: Programs, hear: Callable[[str], None] = lambda line: None
+    sources: Mapping[str, Source], hear: Callable[[str], None] = lambda line: None
 ) -> dict[str, bytes]:
     """The contents of the files by their names, compiled now.
 
     Args:
-        programs: that the module has.
+        sources: of the module, by their names.
         hear: called with a line before the module is compiled.
 
     Raises:
@@ -111,17 +103,15 @@ def compiled(
         folder = Path(temporary)
 
         def compile_source(name: str) -> str:
-            made, number = f"{name}.o", Path(name).stem
-            functions = () if name == EQUATIONS else (*_FUNCTIONS, *_OTHERS)
-            names = (f"-D{one}={_name(number, one)}" for one in functions)
-            _zig(folder, *_FLAGS, *_SHARED, *names, "-c", name, "-o", made)
+            made, (text, called, others) = f"{name}.o", sources[name]
+            (folder / f"{name}.c").write_text(text, encoding="utf-8")
+            names = (f"-D{one}={name}_{one}" for one in (*called, *others))
+            _zig(folder, *_FLAGS, *_SHARED, *names, "-c", f"{name}.c", "-o", made)
             return made
 
-        for name, text in programs.sources.items():
-            (folder / name).write_text(text, encoding="utf-8")
         with ThreadPoolExecutor(os.cpu_count()) as pool:
-            objects = list(pool.map(compile_source, programs.sources))
-        exports = [f"-Wl,--export={name}" for name in _exports(len(programs))]
+            objects = list(pool.map(compile_source, sources))
+        exports = [f"-Wl,--export={name}" for name in _exports(sources)]
         _zig(folder, *_LINKED, *exports, *objects, "-o", MODULE)
         return {MODULE: (folder / MODULE).read_bytes(), LICENCES: _licences().encode()}
 
@@ -143,12 +133,7 @@ def _zig(folder: Path, *arguments: str) -> None:
         raise OSError(f"ziglang: {(errors or [last_line(process.stderr)])[0]}")
 
 
-def _exports(programs: int) -> Iterator[str]:
+def _exports(sources: Mapping[str, Source]) -> Iterator[str]:
     yield _FREE
-    for number in range(programs):
-        yield from (_name(number, one) for one in _FUNCTIONS)
-
-
-def _name(number: object, function: str) -> str:
-    """The name of a program's function in the module."""
-    return f"p{number}_{function}"
+    for name, source in sources.items():
+        yield from (f"{name}_{one}" for one in source.called)

@@ -7,6 +7,7 @@ program makes its steps, which parameters a comparison shares, and to which inpu
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import cache
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
-from orchestrator.live.programs import Programs
+from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import LINEAR
 from orchestrator.master.hooks.events import (
@@ -29,6 +30,7 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
+from orchestrator.program.reducing import looking_at
 from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
@@ -42,7 +44,6 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
-from orchestrator.vehicle.index.final_error import LAST as LAST_SECONDS
 from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
@@ -104,18 +105,24 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
         # What a component refuses is refused here, before there is a page.
         run.run([])
     others = [preset(name)[0] for name in names() if name != first["name"]]
+    presets = sorted([first, *others], key=itemgetter("name"))
+    measured: list[list[Plain]] = []
+    for loop in (loop for one in presets for loop in one["loops"]):
+        # Most vehicles have the same.
+        measured += [one for one in loop["measured"] if one not in measured]
+        loop["measured"] = [measured.index(one) for one in loop["measured"]]
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
-        "lastSeconds": LAST_SECONDS,
         "units": {group: _printed(units) for group, units in _CHARTS.items()},
-        "presets": sorted([first, *others], key=itemgetter("name")),
+        "presets": presets,
         "indices": [
             {"name": one.name, "label": one.label, "meaning": one.meaning}
             | {"units": _printed(one.units)}
             for one in metrics()
         ]
         + [_TOGETHER],
+        "measured": measured,
     }
     return data, modules
 
@@ -269,6 +276,7 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
         "vehicles": list(map(_vehicle, prepared.loops)),
+        "measured": [_measured(text, one) for one in prepared.loops],
         "components": {name: _type(part) for name, part in system.components.items()},
         "head": {
             "order": scenario.order,
@@ -289,6 +297,22 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
 
 def _vehicle(loop: Loop) -> dict[str, str]:
     return {"name": loop.name, "allocation": "", **asdict(loop)}
+
+
+def _measured(text: Text, loop: Loop) -> list[Plain]:
+    """What makes the indices of a vehicle, and where it takes its numbers from."""
+    return [
+        {
+            "name": reducer.name,
+            "takes": [
+                # JSON has nothing infinite.
+                str(one) if isinstance(one, PortName) else min(one, sys.float_info.max)
+                for one in sources
+            ],
+            "gives": [name for name, ports in reducer.results.items() for _ in ports],
+        }
+        for reducer, sources in looking_at(text.plan.system, loop, REDUCERS)
+    ]
 
 
 def _ports(text: Text, name: str) -> dict[str, list[str]]:

@@ -55,7 +55,8 @@ _INCLUDES = """\
 #include <stddef.h>
 #include <stdint.h>"""
 
-_EXPORTED = """\
+#: What stands before functions that others call.
+EXPORTED = """\
 #ifndef EXPORTED
 #define EXPORTED
 #endif"""
@@ -527,7 +528,7 @@ class Text:
         """What a host calls."""
         return [
             *([tables_of(self)] if self.alters else []),
-            _EXPORTED,
+            EXPORTED,
             self._begin(),
             f"enum {{ WIDTH = {1 + len(self.columns)} }};",
             self.show(),

@@ -66,12 +66,12 @@ def _compiled(text: str) -> bytes:
 
 def _loaded(place: Path) -> CDLL:
     library = CDLL(str(place))
-    library.size_of_error.restype = library.size_of_rows.restype = c_size_t
+    library.size_of_rows.restype = c_size_t
     library.why.argtypes, library.why.restype = (c_void_p,), c_char_p
-    library.take.argtypes = (
-        c_void_p, c_void_p, c_int, c_int, c_void_p, c_void_p, c_int, c_double, c_double, c_void_p,
+    library.take_rows.argtypes = (
+        c_void_p, c_void_p, c_int, c_int, c_void_p, c_void_p, c_int, c_double, c_double,
     )  # fmt: skip
-    library.give.argtypes = (c_void_p, c_double, c_double, c_void_p, c_void_p)
+    library.give_numbers.argtypes = (c_void_p, c_double, c_double, c_void_p)
     return library
 
 
@@ -98,7 +98,6 @@ class CompiledReduction:
         """
         self._library, self._reducer, self._run = library, reducer, run
         self._memory = create_string_buffer(library.size_of_rows())
-        self._error = create_string_buffer(library.size_of_error())
         names = [port.name for port in reducer.ports]
         self._from = np.array([places.get(name, -1) for name in names], dtype=np.intc)
         self._constants = np.array([float(constants.get(name, 0.0)) for name in names])
@@ -111,13 +110,13 @@ class CompiledReduction:
 
         """
         rows = np.ascontiguousarray(rows)
-        taken = self._library.take(
+        taken = self._library.take_rows(
             self._memory, rows.ctypes.data, len(rows), rows.shape[1], self._from.ctypes.data,
             self._constants.ctypes.data, self._run.acting_row, self._run.start_time,
-            self._run.stop_time, self._error,
+            self._run.stop_time,
         )  # fmt: skip
         if taken < len(rows):
-            raise Raised(self._library.why(self._error).decode(), float(rows[taken, 0]))
+            raise Raised(self._library.why(self._memory).decode(), float(rows[taken, 0]))
 
     def found(self) -> list[float]:
         """The numbers of its results, in their order.
@@ -128,9 +127,9 @@ class CompiledReduction:
         """
         found = np.empty(sum(1 for _ in chain(*self._reducer.results.values())))
         run = self._run
-        if self._library.give(
-            self._memory, run.start_time, run.stop_time, found.ctypes.data, self._error
+        if self._library.give_numbers(
+            self._memory, run.start_time, run.stop_time, found.ctypes.data
         ):
-            raise Raised(self._library.why(self._error).decode(), run.stop_time)
+            raise Raised(self._library.why(self._memory).decode(), run.stop_time)
         numbers: list[float] = found.tolist()
         return numbers

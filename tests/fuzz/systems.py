@@ -56,7 +56,7 @@ from fuzz.components import (
 )
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
-from orchestrator.live.programs import EQUATIONS
+from orchestrator.live.programs import OF_PROGRAM, Source
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import ORDERS, Experiment
 from orchestrator.master.observers.table import Table
@@ -558,21 +558,11 @@ def _loaded(path: Path) -> ctypes.CDLL:
 # The page
 
 
-class Module(NamedTuple):
-    """The sources of programs that share their equations, as those of the page are."""
-
-    sources: Mapping[str, str]
-
-    def __len__(self) -> int:
-        """How many programs there are."""
-        return len(self.sources) - 1
-
-
 def runs_in_node(texts: Sequence[Text], folder: Path) -> list[Run]:
     """Runs of programs as a module of the page, all of the same equations."""
-    sources = {EQUATIONS: texts[0].equations.apart()}
-    sources |= {f"{i}.c": text.apart() for i, text in enumerate(texts)}
-    (folder / MODULE).write_bytes(module.compiled(Module(sources))[MODULE])
+    sources = {"equations": Source(texts[0].equations.apart())}
+    sources |= {f"p{i}": Source(text.apart(), *OF_PROGRAM) for i, text in enumerate(texts)}
+    (folder / MODULE).write_bytes(module.compiled(sources)[MODULE])
     given = [
         {
             "number": i,

@@ -7,7 +7,7 @@ import re
 import shutil
 import subprocess
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -28,6 +28,7 @@ from orchestrator.runs import bundle
 from orchestrator.runs.own_components import new_controller
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import names
+from orchestrator.vehicle import compiled_reducers
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
 from support.live import TOLERANCE, needs_npm, needs_zig
@@ -83,11 +84,13 @@ def parts(script: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
     return made(script[ENGINE], "fig4", folder)
 
 
-def made(engine: Path, opened: str, folder: Path) -> Parts:
-    """The parts of a page."""
+def made(engine: Path, opened: str, folder: Path, alone: bool = False) -> Parts:
+    """The parts of a page, with the scenario that it opens alone or with all."""
     data, programs = page_data(opened)
+    if alone:
+        data["presets"] = [one for one in data["presets"] if one["name"] == data["opened"]]
     (folder / "data.json").write_text(json.dumps(data))
-    modules = [live_module(one)[module.MODULE] for one in programs]
+    modules = [live_module(one.sources)[module.MODULE] for one in programs]
     return Parts(engine, modules, folder / "data.json")
 
 
@@ -131,16 +134,35 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows
         difference = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted))
         tolerance = LARGER.get(run.scenario.name, TOLERANCE)
         assert difference[looked_at].max() <= tolerance
-        if until < table.time[-1]:
-            continue
-        metrics = metrics_of(table, run.loops)
-        together = {name: [value] for name, value in metrics.together.items()}
-        assert len(together) == (len(run.loops) > 1)
-        for loop, measured in zip(run.loops, said["metrics"], strict=True):
-            wanted = metrics.found(loop) | together
-            assert measured.keys() == wanted.keys()
-            for index, values in wanted.items():
-                assert measured[index] == pytest.approx(values, rel=tolerance, abs=tolerance)
+        compare_indices(run, table, found, said, OF_SINES)
+
+
+#: Indices that sines and the like go into.
+OF_SINES = ("final_error",)
+
+
+def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, near: Sequence[str]):
+    """Compare the indices of rows in Node with those that the master has of the same rows.
+
+    Args:
+        run: that was made.
+        table: of the master.
+        found: the rows in Node.
+        said: of them.
+        near: the indices that need not be the same bit for bit.
+
+    """
+    rows = table.rows.copy()
+    rows[:, places(table)] = found
+    metrics = metrics_of(Table.of(table.header, rows), run.loops)
+    together = {name: [value] for name, value in metrics.together.items()}
+    assert len(together) == (len(run.loops) > 1)
+    for loop, measured in zip(run.loops, said["metrics"], strict=True):
+        wanted = metrics.found(loop) | together
+        assert measured.keys() == wanted.keys()
+        for index, values in wanted.items():
+            tolerance = TOLERANCE if index in near else 0.0
+            assert measured[index] == pytest.approx(values, rel=tolerance, abs=tolerance), index
 
 
 def places(table: Table) -> list[int]:
@@ -151,13 +173,15 @@ def places(table: Table) -> list[int]:
 @pytest.mark.slow
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path, monkeypatch):
-    """With the same sine and its like in both, all rows are the same bit for bit."""
+    """With the same sine and its like in both, all rows and indices are the same bit for bit."""
     with monkeypatch.context() as patch:
         patch.setattr(module, "_FLAGS", (*module._FLAGS, "-include", str(SAME_FUNCTIONS)))
-        content = module.compiled(presets.bundled())[module.MODULE]
+        content = module.compiled(presets.bundled().sources)[module.MODULE]
     (tmp_path / "same.wasm").write_bytes(content)
     said = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
+    monkeypatch.setattr(compiled_reducers, "FLAGS", (*FLAGS, "-include", str(SAME_FUNCTIONS)))
+    compiled_reducers.library_of.cache_clear()
     for room in ("runs.loading", "runs.preparation"):
         monkeypatch.setattr(f"orchestrator.{room}.current_fmus", lambda *_: fmus)
     for name in names():
@@ -168,6 +192,8 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
             found = np.fromfile(tmp_path / f"{name}.{i}").reshape(wanted.shape)
             assert found.tobytes() == wanted.tobytes(), (name, i)
             assert said[f"{name}.{i}"].get("failure") == ending.failure
+            compare_indices(run, table, found, said[f"{name}.{i}"], ())
+    compiled_reducers.library_of.cache_clear()
     # They are not the rows of any C library.
     assert (tmp_path / "fig4.0").read_bytes() != (rows.folder / "fig4.0").read_bytes()
 
@@ -258,7 +284,7 @@ override = { plant.water.z = 0.0 }
 )
 def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
     said, run = both(EVENTS.replace("LAST", last), parts, tmp_path)
-    ending, table = compare(run, tmp_path)
+    ending, table = compare(run, said, tmp_path)
     assert table.time[-1] == pytest.approx(end)
     assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
     assert len(ending.events) > 12
@@ -272,7 +298,7 @@ def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Par
 
 def test_vehicles_have_any_names_and_may_have_no_controller(parts: Parts, tmp_path):
     said, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
-    compare(run, tmp_path)
+    compare(run, said, tmp_path)
     one, other = said["metrics"]
     assert one.keys() - other.keys() == {"final_error"}
     assert other["peak_command"] == [0.0, 0.0, 0.0]
@@ -282,22 +308,18 @@ def both(text: str, parts: Parts, folder: Path) -> tuple[Any, Prepared]:
     """What a scenario's run in Node says, and the run itself."""
     scenario = folder / "mine.toml"
     scenario.write_text(text)
-    data = json.loads(parts.data.read_text())
-    plain, programs = preset(str(scenario))
-    (folder / "data.json").write_text(json.dumps(data | {"presets": [plain]}))
-    modules = [live_module(one)[module.MODULE] for one in programs]
-    mine = parts._replace(modules=modules, data=folder / "data.json")
-    said = mine.node("rows.mjs", str(folder))
-    return said[f"{plain['name']}.0"], runs_of(str(scenario))[0]
+    said = made(parts.engine, str(scenario), folder, alone=True).node("rows.mjs", str(folder))
+    return said["mine.0"], runs_of(str(scenario))[0]
 
 
-def compare(run: Prepared, folder: Path) -> tuple[Ending, Table]:
-    """Compare the rows of a scenario's run in Node with the run itself."""
+def compare(run: Prepared, said: Any, folder: Path) -> tuple[Ending, Table]:
+    """Compare rows and indices of a scenario's run in Node with the run itself."""
     table = Table()
     ending = run.run([table])
     wanted = table.rows[:, places(table)]
     found = np.fromfile(folder / "mine.0").reshape(wanted.shape)
     assert found == pytest.approx(wanted, rel=TOLERANCE, abs=TOLERANCE)
+    compare_indices(run, table, found, said, OF_SINES)
     return ending, table
 
 
@@ -324,7 +346,7 @@ def test_systems_of_a_users_own_run_in_the_page(text, parts: Parts, tmp_path):
     if "MyLaw" in text:
         new_controller("my_law", tmp_path / "law")
     said, run = both(text, parts, tmp_path)
-    ending, _ = compare(run, tmp_path)
+    ending, _ = compare(run, said, tmp_path)
     assert said.get("failure") == ending.failure is None
 
 
@@ -503,7 +525,7 @@ def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, ca
     ("make", "lacking", "wanted"),
     [
         (
-            lambda: module.compiled(presets.bundled()),
+            lambda: module.compiled(presets.bundled().sources),
             "module.find_spec",
             r"pip install 'auv-fmu\[native\]'",
         ),

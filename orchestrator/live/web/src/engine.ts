@@ -10,7 +10,7 @@ export {
   reference,
   smallestDistance,
   trackingError,
-} from "./indices";
+} from "./signals";
 export { Engine } from "./simulate";
 export { csv } from "./text";
 export type * from "./types";

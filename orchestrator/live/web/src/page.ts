@@ -343,7 +343,7 @@ export class Page {
   }
 
   #draw(): void {
-    const { lastSeconds, units } = this.#data;
+    const { units } = this.#data;
     const place = Math.max(
       0,
       this.#results.findIndex((result) => result),
@@ -391,8 +391,8 @@ export class Page {
       this.#results.flatMap((result, place) => {
         if (!result) return [];
         const { label } = this.#loops[place];
-        const { vehicle, fleet } = chosen[place];
-        return [{ label, place, metrics: metrics(result, vehicle, fleet, lastSeconds) }];
+        const { fleet } = chosen[place];
+        return [{ label, place, metrics: metrics(result, this.#chosen, fleet) }];
       }),
     );
     this.#player.set(end, marks);

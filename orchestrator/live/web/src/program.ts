@@ -1,5 +1,7 @@
 // A program in a module: its memory, its functions, and what it has refused.
 
+import type { Metrics } from "./types";
+
 /** Bytes of a double. */
 export const REAL = 8;
 /** Bytes of a page of memory. */
@@ -39,6 +41,18 @@ export interface Agenda {
   readonly listed: number;
 }
 
+/** What makes indices of the rows of a run. */
+export interface Reducer {
+  readonly name: string;
+  /** Where in a row each number is that it takes; -1: it is a constant. */
+  readonly from: readonly number[];
+  readonly constants: readonly number[];
+  /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
+  readonly actingRow: number;
+  /** The index that each number is a member of, by its name. */
+  readonly gives: readonly string[];
+}
+
 /** What a run has left. */
 export interface Run {
   readonly outcome: Outcome;
@@ -51,6 +65,8 @@ export interface Run {
   readonly happened: Float64Array;
   /** When the guards of components first started their states over; less than 0: none did. */
   readonly restarts: Float64Array;
+  /** Indices of each vehicle. */
+  readonly metrics: readonly Metrics[];
 }
 
 type Function = (...args: number[]) => number;
@@ -73,13 +89,19 @@ export class Module {
     width: number,
     components: number,
     agenda: Agenda,
+    vehicles: readonly (readonly Reducer[])[],
   ): Run {
     const call = (name: string) => this.exports[`p${number}_${name}`] as Function;
     const size = Math.ceil(call("size_of_simulation")() / REAL);
     const { n, events, actions, listed } = agenda;
+    const room = Math.max(
+      0,
+      ...vehicles.flat().map(({ from, gives }) => from.length + gives.length),
+    );
     const sizes = [size, size, 2, components, values.length, events.length, actions.length, listed];
-    const places = this.lay([...sizes, (steps + 1) * width]);
-    const [simulation, ahead, failure, restarts, given, first, second, happened, rows] = places;
+    const places = this.lay([...sizes, room, room, room, (steps + 1) * width]);
+    const [simulation, ahead, failure, restarts, given, first, second, happened, ...rest] = places;
+    const [from, constants, found, rows] = rest;
     this.doubles(given, values.length).set(values);
     this.doubles(first, events.length).set(events);
     this.doubles(second, actions.length).set(actions);
@@ -93,6 +115,16 @@ export class Module {
     const [component, kind, port, made] = new Int32Array(this.memory.buffer, failure, 4);
     call("restarts")(simulation, restarts);
     const shown = call("rows_shown")(simulation);
+    const reduce = (one: Reducer) => {
+      new Int32Array(this.memory.buffer, from, one.from.length).set(one.from);
+      this.doubles(constants, one.constants.length).set(one.constants);
+      const agreed = [from, constants, one.actingRow, 0, stopTime, found];
+      const reducer = this.exports[`${one.name}_reduce`] as Function;
+      if (reducer(rows, shown, width, ...agreed)) return [];
+      return one.gives.map(
+        (index, i) => [index, this.doubles(found, one.gives.length)[i]] as const,
+      );
+    };
     return {
       outcome: OUTCOMES[outcome],
       refused: { component, call: CALLS[kind], port, made },
@@ -100,6 +132,7 @@ export class Module {
       table: this.doubles(rows, shown * width),
       happened: this.doubles(happened, listed),
       restarts: this.doubles(restarts, components),
+      metrics: vehicles.map((reducers) => named(reducers.flatMap(reduce))),
     };
   }
 
@@ -124,4 +157,13 @@ export class Module {
     if (missing > 0) this.memory.grow(missing);
     return addresses;
   }
+}
+
+/** The members of each index that is there. */
+function named(members: readonly (readonly [string, number])[]): Metrics {
+  const found: Record<string, number[]> = {};
+  for (const [index, value] of members) found[index] = [...(found[index] ?? []), value];
+  return Object.fromEntries(
+    Object.entries(found).filter(([, values]) => !values.every(Number.isNaN)),
+  );
 }

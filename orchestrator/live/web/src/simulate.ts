@@ -1,11 +1,12 @@
 // A run of a loop: its parameters, events and times for its program, and its rows.
 import { agendaOf, occurrences, type Places, parted, whyEnded } from "./events";
 import { Experiment, Refusal } from "./experiment";
-import { Module, REAL, type Refused } from "./program";
+import { Module, REAL, type Reducer, type Refused } from "./program";
 import { general } from "./text";
 import type {
   Data,
   LoopData,
+  Metrics,
   Occurrence,
   Options,
   Parameter,
@@ -55,6 +56,7 @@ export class Engine {
       1 + layout.names.length,
       layout.components.size,
       agendaOf(events, layout),
+      loop.measured.map((place) => this.reducers(place, layout, numbers, loop.actingRow)),
     );
     if (found.rows === 0 && found.outcome === "refused")
       throw new Refusal(whyRefused(found.refused, loop));
@@ -66,12 +68,30 @@ export class Engine {
       copied(found.table, spare),
       parameters,
       happened,
+      found.metrics,
       messages(loop, found.restarts),
       found.outcome === "refused"
         ? `stopped at ${last}: ${whyRefused(found.refused, loop)}`
         : undefined,
       found.outcome === "ended" ? `ended at ${last}: ${whyEnded(events, happened)}` : undefined,
     );
+  }
+
+  /** What makes the indices of a vehicle, in numbers. */
+  private reducers(
+    place: number,
+    { columns, parameters }: Layout,
+    values: readonly number[],
+    actingRow: number,
+  ): Reducer[] {
+    return this.data.measured[place].map(({ name, takes, gives }) => ({
+      name,
+      // A row begins with the time.
+      from: takes.map((one) => 1 + (columns.get(`${one}`) ?? -2)),
+      constants: takes.map((one) => values[parameters.get(`${one}`) ?? -1] ?? Number(one)),
+      actingRow,
+      gives,
+    }));
   }
 
   private layoutOf(loop: LoopData): Layout {
@@ -182,6 +202,7 @@ class Table implements Result {
     readonly table: Float64Array,
     readonly parameters: Values,
     readonly happened: readonly Occurrence[],
+    readonly metrics: readonly Metrics[],
     readonly messages: readonly string[],
     failure: string | undefined,
     remark: string | undefined,

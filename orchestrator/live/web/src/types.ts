@@ -84,6 +84,8 @@ export interface LoopData {
   readonly scenario?: string;
   /** At least one. */
   readonly vehicles: readonly VehicleData[];
+  /** What is measured of each vehicle, by its place in `Data.measured`. */
+  readonly measured: readonly number[];
   /** FMUs by the names of the components. */
   readonly components: Readonly<Record<string, string>>;
   /** Entries of a scenario file with this loop. */
@@ -149,18 +151,28 @@ export interface IndexData {
   readonly meaning: string;
 }
 
+/** What makes indices of the rows of a vehicle. */
+export interface ReducerData {
+  /** In the module. */
+  readonly name: string;
+  /** Columns and parameters by their names, and what never changes. */
+  readonly takes: readonly (string | number)[];
+  /** The index that each number is a member of, by its name. */
+  readonly gives: readonly string[];
+}
+
 /** All that Python writes into the page, besides script and modules. */
 export interface Data {
   /** The preset that is shown first. */
   readonly opened: string;
   /** Rows of more steps than this, of all vehicles together, do not fit into a page. */
   readonly mostSteps: number;
-  /** T_L of section 4.2 [s]. */
-  readonly lastSeconds: number;
   /** Of the groups of signals that have charts. */
   readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
   readonly presets: readonly Preset[];
   readonly indices: readonly IndexData[];
+  /** For vehicles. */
+  readonly measured: readonly (readonly ReducerData[])[];
 }
 
 /** Something that has happened in a run. */
@@ -193,6 +205,8 @@ export interface Result {
   /** Values of all parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
+  /** Indices of each vehicle; what is not there is absent. */
+  readonly metrics: readonly Metrics[];
   /** What components say, `controller: ...`. */
   readonly messages: readonly string[];
   /** Why the run has not come to its end; the rows before that are there. */

@@ -71,6 +71,7 @@ const vehicle = (prefix) => ({
 const loop = (label, controller, more) => ({
   label,
   vehicles: [vehicle("")],
+  measured: [],
   components: components(controller),
   head: { order: null, vehicles: null, absent: [], only: [], wires: {} },
   program: [0, 0],
@@ -144,8 +145,8 @@ export const fleet = {
 export const data = {
   opened: "fault",
   mostSteps: 200_000,
-  lastSeconds: 5,
   units: { e: {}, tau: {}, dy: {}, theta_hat: {} },
   presets: [preset, fleet],
   indices: [],
+  measured: [],
 };

@@ -22,9 +22,7 @@ for (const { name, stopTime, step, events, loops } of content.presets) {
       failure,
       remark,
       messages,
-      metrics: loop.vehicles.map((vehicle) =>
-        metrics(result, vehicle, loop.vehicles, content.lastSeconds),
-      ),
+      metrics: loop.vehicles.map((_, place) => metrics(result, place, loop.vehicles)),
     };
   }
 }

@@ -1,7 +1,6 @@
-// The indices of metrics.json; orchestrator/vehicle/indices.py says what each is.
+// What follows from the rows of a run.
 import type { Metrics, Result, VehicleData } from "./types";
 
-const ACTUATORS = ["u", "q", "r"];
 const AXES = ["x", "y", "z"];
 
 type Columns = Float64Array[];
@@ -72,8 +71,8 @@ export function smallestDistance(
   places.forEach(([x, y, z], i) => {
     for (const [a, b, c] of places.slice(i + 1)) {
       for (let k = 0; k < squares.length; k++) {
-        const square = (x[k] - a[k]) ** 2 + (y[k] - b[k]) ** 2 + (z[k] - c[k]) ** 2;
-        squares[k] = Math.min(squares[k], square);
+        const [u, v, w] = [x[k] - a[k], y[k] - b[k], z[k] - c[k]];
+        squares[k] = Math.min(squares[k], u * u + v * v + w * w);
       }
     }
   });
@@ -85,14 +84,6 @@ export function smallestDistance(
 /** What acts in each step, or follows from inputs of its beginning. */
 export function inSteps(result: Result, name: string): Float64Array {
   return result.column(name).subarray(result.actingRow, result.rows - 1 + result.actingRow);
-}
-
-/** What is applied in each step: of actuators with a lag, what they give at its end. */
-function applied(result: Result, { vehicle, allocation }: VehicleData, actuator: string) {
-  const name = `${vehicle}.tau_applied.${actuator}`;
-  const hasLag =
-    allocation !== "" || Number(result.parameters[`${vehicle}.actuator.T.${actuator}`]);
-  return hasLag ? result.column(name).subarray(1) : inSteps(result, name);
 }
 
 /** What is commanded: what the vehicle takes, or the allocation of one that takes no tau. */
@@ -113,48 +104,14 @@ export function limits(
 }
 
 /**
- * The indices of a run that has made a step; of none, nothing.
+ * The indices of a run.
  *
- * @param vehicle that they are of.
+ * @param place of the vehicle that they are of.
  * @param fleet all vehicles, for what there is of several together.
- * @param lastSeconds the end of the run [s].
  */
-export function metrics(
-  result: Result,
-  vehicle: VehicleData,
-  fleet: readonly VehicleData[],
-  lastSeconds: number,
-): Metrics {
-  const { time, rows } = result;
-  const steps = rows - 1;
-  if (steps === 0) return {};
-  const end = time[steps];
-  const [square, peak, outside, variation] = [0, 0, 0, 0].map(() => new Array<number>(3).fill(0));
-  ACTUATORS.forEach((actuator, i) => {
-    const force = applied(result, vehicle, actuator);
-    const commanded = inSteps(result, commandName(result, vehicle, actuator));
-    const [lower, upper] = limits(result, vehicle, actuator) ?? [-Infinity, Infinity];
-    for (let k = 0; k < steps; k++) {
-      square[i] += force[k] ** 2 * (time[k + 1] - time[k]);
-      peak[i] = Math.max(peak[i], Math.abs(commanded[k]));
-      if (commanded[k] < lower || commanded[k] > upper) outside[i] += 1;
-      // Before the first step nothing was applied.
-      if (k > 0) variation[i] += Math.abs(force[k] - force[k - 1]);
-    }
-  });
-  const error = trackingError(result, vehicle);
+export function metrics(result: Result, place: number, fleet: readonly VehicleData[]): Metrics {
+  const found = result.metrics[place];
   const apart = smallestDistance(result, fleet);
-  const late = (values: Float64Array) => values.filter((_, k) => time[k] >= end - lastSeconds);
-  const largest = (values: Float64Array) => values.reduce((a, b) => Math.max(a, Math.abs(b)), 0);
-  return {
-    l2_effort: square.map(Math.sqrt),
-    rms_effort: square.map((sum) => Math.sqrt(sum / end)),
-    peak_command: peak,
-    ...(limits(result, vehicle, ACTUATORS[0])
-      ? { saturated_fraction: outside.map((n) => n / steps) }
-      : {}),
-    total_variation: variation,
-    ...(error === undefined ? {} : { final_error: error.map((values) => largest(late(values))) }),
-    ...(apart === undefined ? {} : { smallest_distance: [apart.reduce((a, b) => Math.min(a, b))] }),
-  };
+  if (apart === undefined) return found;
+  return { ...found, smallest_distance: [apart.reduce((a, b) => Math.min(a, b))] };
 }
