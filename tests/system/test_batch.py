@@ -48,7 +48,7 @@ KIND = "native"
 ORDERS = (FEEDTHROUGH, JACOBI)
 
 #: The ready studies of one vehicle.
-STUDIES = [name for name in ready_studies() if read_study(name).engine == "batch"]
+STUDIES = [name for name in ready_studies() if name != "formation"]
 
 #: How many runs of each study are tried, and how many steps of each.
 SAMPLES, STEPS = 100, 40
