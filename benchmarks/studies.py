@@ -38,7 +38,7 @@ from orchestrator.vehicle.indices import index_columns
 
 SCENARIO = "fig4"
 
-#: Blocks that each worker makes before anything is timed: by then FMUs are loaded, equations
+#: Blocks that each worker makes before anything is timed: by then FMUs are loaded, programs
 #: compiled, and blocks as long as they shall be.
 _WARM = 3
 
@@ -146,7 +146,7 @@ def main() -> None:
     engines: dict[str, Callable[[], Engine]] = {
         "FMUs in Python": lambda: FmuEngine({SCENARIO: prepared("python")}),
         "FMUs in C": lambda: FmuEngine({SCENARIO: prepared("native")}),
-        "equations": lambda: BatchEngine({SCENARIO: load_scenario(SCENARIO)[1]}),
+        "batch engine": lambda: BatchEngine({SCENARIO: load_scenario(SCENARIO)[1]}),
     }
     costs = {}
     for name, make in engines.items():

@@ -3,6 +3,7 @@
 `python tools/benchmarks_page.py [NAME...]` runs the command that the page has between
 `<!-- filled: NAME -->` and `<!-- / -->`, and writes its output there, with the date, the machine
 and its load. Without a name it runs all commands, which takes an hour or two of an idle machine.
+Where a command fails, the page keeps what it has, and the exit status is 1.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ PAGE = ROOT / "docs" / "reference" / "benchmarks.md"
 _PLACE = re.compile(r"<!-- filled: (\w+) -->\n`python (.+?)`.*?<!-- / -->", re.DOTALL)
 
 
-def main() -> None:
+def main() -> int:
     """Run commands of the page, and write what they print into it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     places = dict(_PLACE.findall(PAGE.read_text(encoding="utf-8")))
@@ -32,8 +33,18 @@ def main() -> None:
     names = parser.parse_args().name or list(places)
     if unknown := set(names) - places.keys():
         parser.error(f"{', '.join(sorted(unknown))}: choose from {', '.join(places)}")
-    for name in names:
-        write_part(name, measured(name, places[name]))
+    failed = [name for name in names if not is_written(name, places[name])]
+    return 1 if failed else 0
+
+
+def is_written(name: str, command: str) -> bool:
+    """Whether a command runs to its end, and the page has what it prints."""
+    try:
+        write_part(name, measured(name, command))
+    except subprocess.CalledProcessError as error:
+        print(f"{name} stays as it is: {command}: exit status {error.returncode}", file=sys.stderr)
+        return False
+    return True
 
 
 def measured(name: str, command: str) -> str:
@@ -75,4 +86,4 @@ def write_part(name: str, part: str) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -6,6 +6,7 @@ import argparse
 import os
 from collections.abc import Mapping
 from datetime import datetime
+from importlib.util import find_spec
 from pathlib import Path
 
 from fmus.kinds import NATIVE, PYTHON
@@ -221,6 +222,8 @@ def _next_steps(files: list[Path]) -> int:
     script, tests = files[0], [path for path in files[1:] if path.suffix == ".py"]
     [scenario] = [path for path in files if path.suffix == ".toml"]
     show(f"edit {script}, then {'test, ' * len(tests)}build and run it:")
+    if tests and find_spec("pytest") is None:
+        show("  pip install pytest")
     show(*(f"  pytest {test}" for test in tests))
     show(f"  auv-fmu build {script}")
     show(f"  auv-fmu run {scenario} --out {script.parent}{os.sep}results")

@@ -205,7 +205,8 @@ def verify(
     # Of each pair the one that agrees for longer, which is the likelier one.
     n = len(algorithms)
     likelier = (max(pair) for pair in zip(complaints[:n], complaints[n:], strict=True))
-    raise InputError(f"{path}: {'; '.join(text for _, text in likelier)}")
+    other = f"not a run of {system.name}, which --scenario names"
+    raise InputError(f"{path}: {other}: {'; '.join(text for _, text in likelier)}")
 
 
 def _of_one(system: System, outputs: Collection[str], columns: Sequence[str]) -> str:

@@ -112,6 +112,11 @@ class _Known:
         self._found: dict[tuple[Order | None, float], _Ready] = {}
         self._definitions: Mapping[str, Definition] | None = definitions_of(system)
         self._parameters: tuple[Mapping[str, _Parameter], np.ndarray] | None = None
+        self._names = frozenset(
+            str(PortName(name, port))
+            for name, component in system.components.items()
+            for port in component.variables
+        )
 
     def ready(self, order: Order | None, step: float) -> _Ready:
         """The program for an order and a step.
@@ -151,6 +156,14 @@ class _Known:
             names = (name for one in WATCHED for name in one.results)
             watched.append({name: places[name] for name in names if name in places})
         return _Ready(Source.of(text), groups, watched)
+
+    def plain(self, point: Point) -> Point:
+        """A run without names that mean several parameters: stars, and groups of them."""
+        if self._names.issuperset(point.parameters):
+            return point
+        expanded = self.system.expanded(point.parameters)
+        parameters = {str(self.system.named(name)): value for name, value in expanded.items()}
+        return point._replace(parameters=parameters)
 
     def values(self, ready: _Ready, changed: Mapping[str, Value]) -> np.ndarray:
         """The values of all parameters of a run.
@@ -289,14 +302,15 @@ class BatchEngine:
 
     def value(self, point: Point, name: str) -> Value | None:
         """The value of a parameter in a run; None: there is no such parameter."""
-        return self._known[point.scenario].value(point, name)
+        known = self._known[point.scenario]
+        return known.value(known.plain(point), name)
 
     def _ready(self, point: Point) -> _Ready:
         return self._known[point.scenario].ready(point.order, point.step)
 
     def _outcome(self, point: Point) -> Outcome:
         known, ready = self._known[point.scenario], self._ready(point)
-        program = ready.program
+        point, program = known.plain(point), ready.program
         experiment = _experiment(point)
         is_fleet = len(known.loops) > 1
         try:
@@ -328,7 +342,7 @@ class BatchEngine:
 
         """
         known, ready = self._known[point.scenario], self._ready(point)
-        experiment = _experiment(point)
+        point, experiment = known.plain(point), _experiment(point)
         rows = np.empty((experiment.rows, 1 + len(ready.source.columns)))
         try:
             values = known.values(ready, point.parameters)

@@ -30,7 +30,7 @@ from support.markdown import DOCS, blocks
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, EVENTS, EXAMPLES, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE,
+    ACCURACY, BATCH, EVENTS, EXAMPLES, LIBCOSIM, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE,
     TRAJECTORIES,
 ) = (
     DOCS / f"{name}.md"
@@ -39,6 +39,7 @@ pytestmark = pytest.mark.usefixtures("workplace")
         "explanation/batch",
         "how-to/events",
         "reference/examples",
+        "how-to/hosts/libcosim",
         "how-to/change-parameters",
         "how-to/python",
         "reference/scenario-files",
@@ -125,6 +126,19 @@ def test_example_of_a_component_is_built_verified_and_run(workplace):
     python = [sys.executable, "-c", code.text]
     ended = subprocess.run(python, capture_output=True, text=True, check=True)
     assert f"It prints {ended.stdout.strip()}," in EXAMPLES.read_text(encoding="utf-8")
+
+
+@needs("hosts", "libcosimpy")
+@pytest.mark.parametrize(("number", "options"), [(0, []), (1, ["--format", "fmu"])])
+def test_libcosim_moves_the_vehicle_as_the_page_says(workplace, number, options):
+    """It evaluates an archive in another order than one FMU, but neither stays at zero."""
+    assert main(["export", "fig4", *options]) == 0
+    python = [sys.executable, "-c", blocks(LIBCOSIM, "python")[number].text]
+    ended = subprocess.run(python, capture_output=True, text=True, check=True)
+    ours = simulate("fig4", stop_time=10.0)
+    expected = [ours[f"plant.eta.{axis}"][-1] for axis in "xyz"]
+    [answer] = re.findall(r"^\[[-\d., e]+\]$", ended.stdout, re.MULTILINE)
+    assert json.loads(answer) == pytest.approx(expected, abs=[2e-2, 1e-9][number])
 
 
 def test_tests_that_the_page_names_are_there():

@@ -111,8 +111,9 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
     result.rows[60:, result.columns.index("planner.y_d.z") + 1] += 1e-3
     result.rows[80:, result.columns.index("plant.eta.x") + 1] += 1.0
     write(result, tmp_path / "wrong.csv")
-    with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s"):
+    with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s") as told:
         verify(tmp_path / "wrong.csv", system, 1e-6)
+    assert f"wrong.csv: not a run of {system.name}, which --scenario names: in " in str(told.value)
 
 
 class OtherTool:

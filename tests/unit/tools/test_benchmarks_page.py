@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 import shlex
-import subprocess
-
-import pytest
 
 import benchmarks_page
-from benchmarks_page import PAGE, ROOT, measured, write_part
+from benchmarks_page import PAGE, ROOT, is_written
 
 
 def test_every_part_of_the_page_has_a_command_that_is_there():
@@ -29,17 +26,26 @@ def test_a_measurement_takes_its_place(tmp_path, monkeypatch):
     ]
     page.write_text("\n\n".join(parts))
     monkeypatch.setattr(benchmarks_page, "PAGE", page)
-    write_part("second", measured("second", f"{script} --n 3"))
+    assert is_written("second", f"{script} --n 3")
     first, second = page.read_text().split("\n\n<!--")
     assert first == parts[0]
     assert re.search(rf"`python {script} --n 3`, \d{{4}}-\d\d-\d\d, .+:\n", second)
     assert "```text\n1.5 us ['--n', '3']\n```\n<!-- / -->" in second
-    write_part("second", measured("second", f"{script} --n 4"))
+    assert is_written("second", f"{script} --n 4")
     assert page.read_text().count("1.5 us") == 1
 
 
-def test_a_script_that_fails_changes_nothing(tmp_path):
-    script = tmp_path / "script.py"
-    script.write_text("raise SystemExit(3)\n")
-    with pytest.raises(subprocess.CalledProcessError):
-        measured("first", str(script))
+def test_a_script_that_fails_changes_nothing_and_others_run(tmp_path, monkeypatch, capsys):
+    page, bad, good = (tmp_path / name for name in ("page.md", "bad.py", "good.py"))
+    bad.write_text("print('1.5 us'); raise SystemExit(3)\n")
+    good.write_text("print('2.5 us')\n")
+    parts = [
+        f"<!-- filled: {script.stem} -->\n`python {script}`, once:\n\n```text\n0\n```\n<!-- / -->\n"
+        for script in (bad, good)
+    ]
+    page.write_text("".join(parts))
+    monkeypatch.setattr(benchmarks_page, "PAGE", page)
+    monkeypatch.setattr("sys.argv", ["benchmarks_page.py"])
+    assert benchmarks_page.main() == 1
+    assert page.read_text().startswith(parts[0]) and "2.5 us" in page.read_text()
+    assert capsys.readouterr().err == f"bad stays as it is: {bad}: exit status 3\n"

@@ -135,6 +135,14 @@ def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
     ]
 
 
+def test_command_says_where_pytest_is_to_be_had(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("orchestrator.commands.build.find_spec", lambda name: None)
+    assert main(["new", "component", "pid"]) == 0
+    out = capsys.readouterr().out
+    assert "  pip install pytest\n  pytest pid/test_pid.py\n" in out
+
+
 @pytest.mark.parametrize(
     ("options", "tests", "test"),
     [

@@ -258,6 +258,7 @@ def test_formations_are_ten_thousand():
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     study = read_study("formation")
     space = Space(study, {name: load_scenario(name) for name in study.scenario})
+    assert study.engine == BATCH
     assert len(space) == 10_000 and len(space.prepared["formation-lost-link"].loops) == 3
     columns = space.columns, space.has_scenarios, space.indices
     assert read_figures(study.name, study.figures, *columns)
