@@ -139,15 +139,14 @@ EXPORTED int give(const kept *it, double begin, double end, double found[], Erro
 """
 
 
-def text_over_rows(reducer: Reducer) -> str:
+def text_over_rows(reducer: Reducer) -> str | None:
     """An index in C over rows of any run: which columns it takes, the caller says.
 
-    Raises:
-        Untranslatable: it is outside the language of equations.
-
+    None: it is outside the language of equations.
     """
     program = Program(*reducer.hooks.values())
-    program.check()
+    if program.mistakes:
+        return None
     emitter = Emitter(program.functions.values())
     one = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
     places = {port.name: k for k, port in enumerate(reducer.ports)}
