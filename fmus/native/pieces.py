@@ -35,9 +35,16 @@ def initializer(type_: Type, texts: Iterator[str]) -> str:
 
 def function(head: str, lines: Sequence[str], arguments: Sequence[str] = ("error",)) -> str:
     """A function of statements; arguments that it does not use are marked so."""
-    text = "\n".join(line for one in lines for line in _indented(one))
-    unused = [f"    (void){name};\n" for name in arguments if not re.search(rf"\b{name}\b", text)]
-    return f"{head} {{\n{''.join(unused)}{text}\n}}"
+    found = [line for one in lines for line in _indented(one)]
+    text = "\n".join(found)
+    unused = [f"    (void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    return "\n".join([f"{head} {{", *unused, *found, "}"])
+
+
+def structure(name: str, rows: Sequence[str]) -> str:
+    """A structure of members; C has none without."""
+    body = "\n".join(f"    {row}" for row in rows or ["char nothing;"])
+    return f"typedef struct {{\n{body}\n}} {name};"
 
 
 def _indented(line: str) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fmus.language.build import Program
 from fmus.language.types import type_of
 from fmus.native.emit import Emitter
-from fmus.native.pieces import function, initializer, scalars
+from fmus.native.pieces import function, initializer, scalars, structure
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
 
@@ -36,11 +36,9 @@ class ReducerText:
     def structure(self) -> str:
         """Its structure."""
         state, row = map(self._type, (self.reducer.state, self.reducer.inputs))
-        before = f"    {row} before; /* the last row */\n" if self._looks_back else ""
-        return (
-            f"typedef struct {{\n    int begun; /* -1: it has raised */\n    {state} state;\n"
-            f"{before}}} {self.name};"
-        )
+        before = [f"{row} before; /* the last row */"] * self._looks_back
+        rows = ["int begun; /* -1: it has raised */", f"{state} state;", *before]
+        return structure(self.name, rows)
 
     def text(self) -> Iterator[str]:
         """What takes a row, and what gives its numbers."""

@@ -30,6 +30,7 @@ from fmus.language.types import FLOAT, Type, count
 from fmus.native.emit import closed, lines_of, number_in_c, quoted
 from fmus.native.numbers import has_only_doubles, moves
 from fmus.native.packaging import Parts, entries_of
+from fmus.native.pieces import function, structure
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
 from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
@@ -81,6 +82,16 @@ static void model_tell(const simulation *it, Error *error) {
     model_ascribe(error, model_components[it->component]);
 }
 """
+
+_PUT, _TAKE, _SET, _FEED = (
+    f"static void model_{head}"
+    for head in (
+        "put(const simulation *it, double to[])",
+        "take(simulation *it, const double from[])",
+        "set(simulation *it, const model_parameters *parameters, int all, Error *error)",
+        "feed(simulation *it, const model_inputs *inputs)",
+    )
+)
 
 _HEAD = """\
 /* {title}
@@ -363,8 +374,8 @@ class SystemModel:
         n_state = sum(len(part.types) for part in self._state)
         sizes = {"inputs": len(self._open), "outputs": len(outputs), "state": n_state}
         types = [
-            _structure("model_parameters", parameters or ["char nothing;"]),
-            *(_structure(f"model_{what}", [f"double v[{n or 1}];"]) for what, n in sizes.items()),
+            structure("model_parameters", parameters),
+            *(structure(f"model_{what}", [f"double v[{n or 1}];"]) for what, n in sizes.items()),
             "typedef struct {\n    simulation it;\n    int begun; /* whether it has parameters */\n"
             "} model_derived;",
         ]
@@ -442,13 +453,9 @@ class SystemModel:
             *self._names(),
             _TOLD.strip(),
             *([_NOISE.strip()] if text.equations.is_noisy else []),
-            _function("put", "const simulation *it, double to[]", self._moved("put")),
-            _function("take", "simulation *it, const double from[]", self._taken()),
-            _function(
-                "set",
-                "simulation *it, const model_parameters *parameters, int all, Error *error",
-                self._set(),
-            ),
+            function(_PUT, self._moved("put"), ()),
+            function(_TAKE, self._taken(), ()),
+            function(_SET, self._set(), ()),
             *self._feed(),
             constants(answers),
             *defined(bodies),
@@ -516,8 +523,7 @@ class SystemModel:
             said = self.text.kind(name).said
             if said.derived and said.takes("derive", "inputs"):
                 lines.append(f"it->{self.text.members[name]}.underived = 1;")
-        given = "simulation *it, const model_inputs *inputs"
-        return [_function("feed", given, lines)] if lines else []
+        return [function(_FEED, lines, ())] if lines else []
 
     def _feed_call(self) -> list[str]:
         return ["model_feed(it, inputs);"] if self._open else []
@@ -608,9 +614,7 @@ def _numbers(owner: str, type_: Type, hint: Any) -> Part:
         )
 
     def moved(text: str) -> Callable[[int], list[str]]:
-        return lambda at: [
-            line.removeprefix("    ") for line in moves(type_, owner, range(at, at + n), text)
-        ]
+        return lambda at: [*moves(type_, owner, range(at, at + n), text)]
 
     put, take = "to[{place}] = {member};", "{member} = {cast}from[{place}];"
     return Part(owner, [*scalars_of(hint)], moved(put), moved(take))
@@ -640,16 +644,6 @@ def _generator(owner: str) -> Part:
 def _plain(scalar: Any) -> Any:
     """A type of numbers without what its values are called."""
     return int if is_class(scalar, IntEnum) else scalar
-
-
-def _structure(name: str, rows: Sequence[str]) -> str:
-    body = "\n".join(f"    {row}" for row in rows)
-    return f"typedef struct {{\n{body}\n}} {name};"
-
-
-def _function(name: str, arguments: str, body: Sequence[str]) -> str:
-    head = lines_of(f"static void model_{name}({arguments}) {{", "")
-    return "\n".join([*head, *(line for part in body for line in lines_of(part, "    ")), "}"])
 
 
 def _apart(ports: Sequence[Port]) -> Iterator[Port]:
