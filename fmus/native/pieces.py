@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from fmus.language.types import FLOAT, Array, Scalar, Type
@@ -45,6 +45,11 @@ def structure(name: str, rows: Sequence[str]) -> str:
     """A structure of members; C has none without."""
     body = "\n".join(f"    {row}" for row in rows or ["char nothing;"])
     return f"typedef struct {{\n{body}\n}} {name};"
+
+
+def array(head: str, items: Iterable[str]) -> str:
+    """An array of constants."""
+    return "\n".join(lines_of(f"static const {head}[] = {{{', '.join(items)}}};", ""))
 
 
 def _indented(line: str) -> list[str]:
