@@ -119,7 +119,7 @@ def reduced(of: Header, blocks: int = 1, last: float | None = None) -> Reduction
 
 def state(one: Reduction) -> State:
     # These hooks are no equations, so they run in Python.
-    return one._reducing._kept.state
+    return one._reducing._state
 
 
 @pytest.mark.parametrize("blocks", [1, 4, N])
