@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import subprocess
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -32,12 +30,10 @@ from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
-from orchestrator.system.values import items_of
 from support.events import ALL, ENDS
+from support.programs import compiled, play
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
-
-DOUBLES = ctypes.POINTER(ctypes.c_double)
 
 #: Numbers that stand for what an action is, and for a comparison, in events.c.
 OVERRIDE, BIAS, FREEZE, RELEASE, SET, RESET, END = range(7)
@@ -61,34 +57,18 @@ def check(run: Prepared, folder: Path) -> None:
     table = Table()
     ending = run.run([table])
     text = Text(run.plan, definitions_of(run.plan.system), alters=True)
-    library = compiled(text, folder)
-    experiment = text.plan.experiment
-    parameters = (ctypes.c_double * len(text.parameters))(*values_of(text))
-    size = library.size_of_simulation()
-    simulation, ahead = (ctypes.create_string_buffer(size) for _ in range(2))
-    rows = np.zeros((experiment.rows, 1 + len(text.columns)))
-    assert not library.begin(
-        simulation, parameters, experiment.start_time, experiment.step, experiment.stop_time,
-        experiment.full_steps, experiment.rows - 1,
-    )  # fmt: skip
-    events, actions = numbers_of(text, run.events)
+    path = compiled(text.text(), folder / "program.so", "-shared")
     happened = np.zeros(1 + len(run.events) * MOST_LISTED * LISTED)
-    for until in (experiment.rows // 3, experiment.rows - 1):
-        outcome = library.run_with_events(
-            simulation, ahead, until, pointer(rows), parameters, len(run.events),
-            *map(pointer, (events, actions, happened)),
-        )  # fmt: skip
-        if outcome:
-            break
-    assert outcome == (1 if ending.failure else 2 if ending.remark else 0)
+    found = play(text, path, *numbers_of(text, run.events), happened)
+    assert found.outcome == (1 if ending.failure else 2 if ending.remark else 0)
     columns = [i for i, name in enumerate(table.columns) if not name.endswith(".fault")]
     assert [table.columns[i] for i in columns] == [*map(str, text.columns)]
-    rows = rows[: library.rows_shown(simulation)]
+    rows = found.rows
     assert rows[:, 0].tolist() == table.time.tolist()
     wanted = table.rows[:, [0, *(1 + i for i in columns)]]
     for i, name in enumerate(("time", *text.columns)):
         np.testing.assert_array_equal(rows[:, i], wanted[:, i], str(name))
-    assert [*occurrences(run.events, happened, experiment)] == [*ending.events]
+    assert [*occurrences(run.events, happened, text.plan.experiment)] == [*ending.events]
 
 
 def numbers_of(text: Text, events: Sequence[Event]) -> tuple[np.ndarray, np.ndarray]:
@@ -136,39 +116,6 @@ def occurrences(
         listed[number] += 1
         time = experiment.time(step)
         yield occurrence(events[number], number, time, listed[number], ends=bool(ends))
-
-
-def values_of(text: Text) -> list[float]:
-    """What a run begins with."""
-    system, found = text.plan.system, []
-    for name in text.parameters:
-        value = system.value(name)
-        variable = system.components[name.component].variables[name.port]
-        found.append(float(items_of(variable).get(value, value)))
-    return found
-
-
-def pointer(values: np.ndarray) -> Any:
-    """Where they are."""
-    return values.ctypes.data_as(DOUBLES)
-
-
-def compiled(text: Text, folder: Path) -> ctypes.CDLL:
-    """The program as a library."""
-    (folder / "program.c").write_text(text.text())
-    command = [
-        str(machines_compiler()), "-std=c99", "-O1", "-fno-math-errno", "-ffp-contract=off",
-        "-Wall", "-Wextra", "-Wno-unused", "-fPIC", "-shared", "program.c", "-o", "program.so",
-        "-lm",
-    ]  # fmt: skip
-    process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
-    assert process.returncode == 0, process.stderr
-    library = ctypes.CDLL(str(folder / "program.so"))
-    library.size_of_simulation.restype = ctypes.c_size_t
-    library.begin.argtypes = (
-        ctypes.c_void_p, DOUBLES, *[ctypes.c_double] * 3, ctypes.c_int, ctypes.c_int,
-    )  # fmt: skip
-    return library
 
 
 @pytest.mark.parametrize("order", ORDERS)
