@@ -82,11 +82,6 @@ class Seen(NamedTuple):
     vertical: float = inf
 
 
-def watched_columns(loop: Loop) -> tuple[str, str]:
-    """The columns that :class:`Watch` looks at: theta_hat[1], and the pitch."""
-    return loop.theta_hat[0], loop.attitude[1]
-
-
 def values_of(system: System) -> ValueOf:
     """The values of the parameters of a system."""
 
@@ -203,15 +198,6 @@ class Watch:
 def _seen(reductions: Iterable[Reduction]) -> Seen:
     found = {name: value for one in reductions for name, [value] in one.found().items()}
     return Seen(found.get("largest_bound", -inf), found.get("vertical_passed", inf))
-
-
-def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[Caution]:
-    """What a run has shown whose rows are all there."""
-    watch = Watch(loops)
-    watch.begin(table.header)
-    if len(table):
-        watch.take(table.rows)
-    return watch.found()
 
 
 def cautions_seen(seen: Seen, loop: Loop, value: ValueOf, step: float) -> Iterator[Caution]:
