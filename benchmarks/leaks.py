@@ -95,7 +95,7 @@ def be_host(folder: Path, counts: list[int]) -> None:
 def rows(folder: Path) -> Iterator[tuple[str, Path]]:
     """Name and unpacked folder of every FMU that is measured."""
     for loader in ("native", "plain"):
-        bundle.build_bundle(folder / loader, loader)
+        bundle.build_bundle(folder / loader, loader=loader)
         for path in sorted((folder / loader).glob("*.fmu")):
             yield f"{path.stem}, {loader}", Path(fmpy.extract(path, folder / loader / path.stem))
     yield "empty slave of PythonFMU", Path(fmpy.extract(bare(folder), folder / "bare"))

@@ -15,20 +15,23 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from auv_fmu.loop import closed_loop
-from auv_fmu.loop.closed_loop import Scene, Setting, Vehicles
+from auv_fmu.loop.closed_loop import LongestSteps, Scene, Setting, Vehicles
 from auv_fmu.paper import motion_planner, plant
 from auv_fmu.paper.attitude import normalised, rotation_from_quaternion
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import ControllerState
+from fmus.ports.port import H_MAX
 from orchestrator import load, simulate
 from orchestrator.master.observers.table import Table
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
+from orchestrator.program.components import definitions_of
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.system.names import port_name
+from orchestrator.system.names import PortName, port_name
+from orchestrator.system.structure import System
+from orchestrator.system.values import typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
-from parts.straight import setting_of
 
 Values = Mapping[str, Any]
 
@@ -236,6 +239,26 @@ def continuous(setting: Setting, stop: float) -> np.ndarray:
     )
     states = zip(found.t, found.y.T, strict=True)
     return np.array([unpacked(t, x)[2].plant.y for t, x in states])
+
+
+def setting_of(system: System) -> Setting:
+    """The parameters of the components of Fig. 2, as their equations take them."""
+    given = {name: _values(system, name) for name in system.components}
+    of = {
+        name: definition.parameters.of(given[name])
+        for name, definition in definitions_of(system).items()
+    }
+    longest = LongestSteps(*(given[name][H_MAX] for name in LongestSteps._fields))
+    return Setting(of["plant"], of["controller"], of["disturbance"], of["planner"], longest)
+
+
+def _values(system: System, component: str) -> Mapping[str, Any]:
+    """The numbers of all parameters of a component."""
+    found: dict[str, Any] = {}
+    for variable in system.components[component].having("parameter"):
+        name = PortName(component, variable.name)
+        found[variable.name] = typed(str(name), variable, system.value(name))
+    return found
 
 
 def flat(state: Any) -> list[float]:

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 from fmus.language.types import FLOAT, Array, Scalar, Type, count, parts_of
-from fmus.native.emit import members
+from fmus.native.emit import INDENT, members
 
 
 @cache
@@ -34,7 +34,7 @@ def moves(
         depth, place: of the loop that this stands in.
 
     """
-    indent = "    " * (depth + 1)
+    indent = INDENT * depth
     if isinstance(type_, Scalar):
         cast = "" if type_ == FLOAT else "(int)"
         yield indent + text.format(member=member, place=place or places[0], cast=cast)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from fmus.language.types import FLOAT, Array, Scalar, Type
@@ -35,9 +35,21 @@ def initializer(type_: Type, texts: Iterator[str]) -> str:
 
 def function(head: str, lines: Sequence[str], arguments: Sequence[str] = ("error",)) -> str:
     """A function of statements; arguments that it does not use are marked so."""
-    text = "\n".join(line for one in lines for line in _indented(one))
-    unused = [f"    (void){name};\n" for name in arguments if not re.search(rf"\b{name}\b", text)]
-    return f"{head} {{\n{''.join(unused)}{text}\n}}"
+    found = [line for one in lines for line in _indented(one)]
+    text = "\n".join(found)
+    unused = [f"    (void){name};" for name in arguments if not re.search(rf"\b{name}\b", text)]
+    return "\n".join([f"{head} {{", *unused, *found, "}"])
+
+
+def structure(name: str, rows: Sequence[str]) -> str:
+    """A structure of members; C has none without."""
+    body = "\n".join(f"    {row}" for row in rows or ["char nothing;"])
+    return f"typedef struct {{\n{body}\n}} {name};"
+
+
+def array(head: str, items: Iterable[str]) -> str:
+    """An array of constants."""
+    return "\n".join(lines_of(f"static const {head}[] = {{{', '.join(items)}}};", ""))
 
 
 def _indented(line: str) -> list[str]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from fmus.language.build import Program
 from fmus.language.types import type_of
 from fmus.native.emit import Emitter, number_in_c
-from fmus.native.pieces import function, initializer, scalars
+from fmus.native.pieces import function, initializer, scalars, structure
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
 
@@ -38,11 +38,9 @@ class ReducerText:
     def structure(self) -> str:
         """Its structure."""
         state, row = map(self._type, (self.reducer.state, self.reducer.inputs))
-        before = f"    {row} before; /* the last row */\n" if self._looks_back else ""
-        return (
-            f"typedef struct {{\n    int begun; /* -1: it has raised */\n    {state} state;\n"
-            f"{before}}} {self.name};"
-        )
+        before = [f"{row} before; /* the last row */"] * self._looks_back
+        rows = ["int begun; /* -1: it has raised */", f"{state} state;", *before]
+        return structure(self.name, rows)
 
     def text(self) -> Iterator[str]:
         """What takes a row, and what gives its numbers."""
@@ -167,15 +165,14 @@ _PLACE = "from[{0}] < 0 ? constants[{0}] : rows[from[{0}]]"
 _WHY = "EXPORTED const char *why(const kept *it) { return it->error.why.text; }\n"
 
 
-def text_over_rows(reducer: Reducer) -> str:
+def text_over_rows(reducer: Reducer) -> str | None:
     """An index in C over rows of any run, as a source of its own.
 
-    Raises:
-        Untranslatable: it is outside the language of equations.
-
+    None: it is outside the language of equations.
     """
     program = Program(*reducer.hooks.values())
-    program.check()
+    if program.mistakes:
+        return None
     emitter = Emitter(program.functions.values())
     one = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
     functions, rows = [*one.text()], one.over_rows()

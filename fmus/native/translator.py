@@ -29,7 +29,7 @@ from fmus.language.types import (
 from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, quoted
 from fmus.native.names import in_c
 from fmus.native.numbers import has_only_doubles, moves
-from fmus.native.pieces import initializer
+from fmus.native.pieces import function, initializer
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
@@ -166,9 +166,9 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     text = "\n\n".join(parts)
     # One that nothing calls would be a warning.
     moving = [
-        function
+        one
         for form in passages.values()
-        for name, function in zip((form.gather, form.scatter), form.functions)
+        for name, one in zip((form.gather, form.scatter), form.functions)
         if re.search(rf"\b{name}\(", text)
     ]
     head = ["/* What the component calls. */", _types(emitter, said, passages), *moving]
@@ -248,12 +248,9 @@ def defined(bodies: Mapping[str, Sequence[str]]) -> list[str]:
 
 
 def _defined(returns: str, name: str, arguments: str, body: Sequence[str]) -> str:
-    """A function; arguments that it does not use are marked so."""
-    text = " ".join(body)
-    names = [argument.rstrip("[]").split()[-1].lstrip("*") for argument in arguments.split(", ")]
-    unused = [f"(void){n};" for n in names if not re.search(rf"\b{n}\b", text)]
-    lines = [line for part in (*unused, *body) for line in lines_of(part, "    ")]
-    return "\n".join([*lines_of(f"static {returns} model_{name}({arguments}) {{", ""), *lines, "}"])
+    names = re.findall(r"(\w+)(?:\[\])?(?=,|$)", arguments)
+    head = lines_of(f"static {returns} model_{name}({arguments})", "")
+    return function("\n".join(head), body, names)
 
 
 @dataclass
@@ -297,12 +294,12 @@ def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
         order = sorted(places, key=lambda i: scalars[i] != FLOAT)
         places = [order.index(number) for number in range(n)]
     gather, scatter = f"model_{what}_of", f"model_put_{what}"
-    gathered = "\n".join(moves(type_, "it", places, "{member} = {cast}from[{place}];"))
-    scattered = "\n".join(moves(type_, "it", places, "to[{place}] = {member};"))
+    gathered = moves(type_, "it", places, "{member} = {cast}from[{place}];")
+    scattered = moves(type_, "it", places, "to[{place}] = {member};")
+    taken = [f"{name} it;", *gathered, "return it;"]
     functions = (
-        f"static {name} {gather}(const double from[]) {{\n"
-        f"    {name} it;\n{gathered}\n    return it;\n}}",
-        f"static void {scatter}({name} it, double to[]) {{\n{scattered}\n}}",
+        function(f"static {name} {gather}(const double from[])", taken, ()),
+        function(f"static void {scatter}({name} it, double to[])", [*scattered], ()),
     )
     return _Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
 
@@ -319,13 +316,13 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
 
     """
     depths: dict[Function, int] = {}
-    for function in functions:
-        found = [x for one in tree.statements_in(function.body) for x in tree.expressions_of(one)]
+    for called in functions:
+        found = [x for one in tree.statements_in(called.body) for x in tree.expressions_of(one)]
         calls = [x for one in found for x in tree.expressions_in(one) if isinstance(x, Call)]
         own = sum(map(_held, found))
-        own += sum(map(_result, tree.variables_in(function.body).values()))
+        own += sum(map(_result, tree.variables_in(called.body).values()))
         deeper = max((depths[one.function] for one in calls), default=0)
-        depths[function] = _passed(function) + own + deeper
+        depths[called] = _passed(called) + own + deeper
     ends = ((depth + _result(one.returns), one) for one, depth in depths.items())
     return max(ends, key=itemgetter(0), default=(0, None))
 

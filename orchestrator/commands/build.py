@@ -157,33 +157,30 @@ def _build(options: argparse.Namespace) -> int:
     if options.watch:
         raise InputError("--watch is for your own component: name its script")
     folder = options.out or DEFAULT_FOLDERS[options.kind]
-    written = bundle.build_bundle(
-        folder,
-        options.loader,
-        kind=options.kind,
-        fmi=options.fmi,
-        platforms=options.platforms,
-        arrays=options.arrays,
-        force=options.force,
-        hear=say,
-    )
+    written = bundle.build_bundle(folder, force=options.force, hear=say, **_form(options))
     show(*written)
     state = "built" if written else "up to date"
     show(f"{folder} is {state}, {_described(bundle.settings_of(folder))}")
     return OK
 
 
+def _form(options: argparse.Namespace) -> bundle.Form:
+    return bundle.Form(
+        kind=options.kind,
+        fmi=options.fmi,
+        loader=options.loader,
+        platforms=options.platforms,
+        arrays=options.arrays,
+    )
+
+
 def _build_own(options: argparse.Namespace) -> int:
     built = build_own(
         options.script,
         options.out,
-        options.loader,
-        kind=options.kind,
-        fmi=options.fmi,
-        platforms=options.platforms,
-        arrays=options.arrays,
         force=options.force,
         hear=lambda line: None if options.watch else say(line),
+        **_form(options),
     )
     show(f"{built}, {datetime.now():%H:%M:%S}" if options.watch else built)
     return OK

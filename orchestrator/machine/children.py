@@ -1,4 +1,4 @@
-"""Child processes that do not outlive this one: modules of Python, and C compilers.
+"""Child processes that do not outlive this one, and run modules of Python.
 
 Run as a module, `python -m orchestrator.machine.children MODULE ...`, it is the child: it runs
 another module, and ends with its parent. Nothing here takes code or settings from the current
@@ -14,19 +14,13 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from subprocess import PIPE, CompletedProcess, Popen, run
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
-from fmus.compilers import LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.disk import process_folder
-from orchestrator.machine.errors import last_line
 from orchestrator.machine.operating_system import wait_for_end
-
-#: A compiler: a call with its arguments.
-Compiler = Callable[..., CompletedProcess[str]]
 
 
 def imported_apart(module: str, file: str) -> None:
@@ -119,50 +113,6 @@ def _tie() -> Iterator[dict[str, Any]]:
     finally:
         os.close(end_of_child)
         os.close(end_of_ours)
-
-
-def find_compiler() -> Compiler | None:
-    """Find a C compiler: this machine's, or else the package ziglang's; None: there is none."""
-    if found := find_fast_compiler():
-        return found
-    if find_spec("ziglang") is None:
-        return None
-    return lambda *arguments: run_module("ziglang", "cc", *arguments, timeout=LIMIT_OF_ZIG)
-
-
-def find_fast_compiler() -> Compiler | None:
-    """Find this machine's C compiler, if it has one: it takes a tenth of a second, zig some."""
-    command = machines_compiler()
-    return None if command is None else lambda *arguments: run_compiler([command, *arguments])
-
-
-def compile_library(compiler: Compiler, *arguments: str) -> bytes:
-    """Compile a library of sources and options, and give its bytes.
-
-    Raises:
-        OSError: it does not; the text is its first error.
-
-    """
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        path = Path(temporary, "library")
-        process = compiler(*arguments, "-o", str(path))
-        if process.returncode != 0:
-            errors = (line for line in process.stderr.splitlines() if "error" in line)
-            raise OSError(next(errors, last_line(process.stderr)))
-        return path.read_bytes()
-
-
-def compile_text(compiler: Compiler, text: str, *options: str) -> bytes:
-    """Compile a library of the text of one source, and give its bytes.
-
-    Raises:
-        OSError: it does not; the text is its first error.
-
-    """
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        source = Path(temporary, "source.c")
-        source.write_text(text, encoding="utf-8")
-        return compile_library(compiler, str(source), *options)
 
 
 def _follow() -> None:

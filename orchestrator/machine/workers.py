@@ -9,7 +9,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -39,26 +39,26 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Workers:
-    """Some processes, as :func:`workers` gives them.
+    """Some processes, as :func:`workers` gives them, or threads.
 
     Attributes:
         n: how many.
 
     """
 
-    def __init__(self, n: int, begin: Callable[[], object], interrupts: Interrupts) -> None:
-        """Start no process yet.
+    def __init__(self, n: int, fresh: Callable[[], Executor], interrupts: Interrupts) -> None:
+        """Start none yet.
 
         Args:
             n: how many there may be.
-            begin: called in each of them first.
+            fresh: gives a pool of them.
             interrupts: signals to stop.
 
         """
         self.n = n
-        self._begin, self._interrupts = begin, interrupts
+        self._fresh, self._interrupts = fresh, interrupts
         self._others = set(active_children())
-        self._pool = self._fresh()
+        self._pool = fresh()
 
     def renew(self) -> None:
         """End all processes, of which one has died: what follows is done by others."""
@@ -126,9 +126,6 @@ class Workers:
             _end(set(active_children()) - self._others)
         self._pool.shutdown(cancel_futures=True)
 
-    def _fresh(self) -> ProcessPoolExecutor:
-        return ProcessPoolExecutor(self.n, get_context("spawn"), self._begin)
-
 
 def _result(future: Future[Any], unit: str) -> Any:
     try:
@@ -152,10 +149,10 @@ def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterato
     """
     # What a killed process leaves goes with the folder of this one.
     environment = {"TMPDIR": str(process_folder())} | cache.environment()
+    begin, n = partial(_begin, environment, setup), min(n or cores(), most_processes())
     with held_interrupts() as interrupts:
-        crew = Workers(
-            min(n or cores(), most_processes()), partial(_begin, environment, setup), interrupts
-        )
+        pool = partial(ProcessPoolExecutor, n, get_context("spawn"), begin)
+        crew = Workers(n, pool, interrupts)
         try:
             yield crew
         except BaseException:

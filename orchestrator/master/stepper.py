@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from contextlib import suppress
 from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_void_p
-from functools import cache
-from hashlib import sha256
+from functools import cache, partial
 from pathlib import Path
 
-from fmpy import platform_tuple, sharedLibraryExtension
+from fmpy import platform_tuple
 
 from fmus.compilers import FLAGS
-from orchestrator.machine import cache as user_cache
-from orchestrator.machine.children import compile_library, find_compiler, find_fast_compiler
-from orchestrator.machine.disk import hold_lock
+from orchestrator.machine.cache import users_folder
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.libraries import (
+    compile_library,
+    find_compiler,
+    find_fast_compiler,
+    find_library,
+    library_key,
+    load_library,
+)
 from orchestrator.master.fmi.instance import CALLS
 from orchestrator.master.fmi.transfer import CMember, CMove
 from orchestrator.master.hooks.hook import Run
@@ -27,6 +31,9 @@ SOURCE = Path(__file__).with_name("stepper.c")
 
 #: What it is among what is kept.
 CATEGORY = "loop"
+
+#: What it offers.
+_FUNCTION = "advance"
 
 #: Libraries that this process has loaded, by cache folders.
 _in_use: dict[Path, CDLL] = {}
@@ -161,18 +168,15 @@ def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:
 
 def load_stepper() -> CDLL | None:
     """Load the library that was compiled earlier; None: there is none."""
-    folder = user_cache.users_folder()
-    if folder not in _in_use:
-        # What is loaded needs no second look: short runs would take longer for it.
-        with suppress(OSError):
-            _in_use.update(
-                (folder, _loaded(path)) for path in user_cache.read_cached(CATEGORY, key_of())
-            )
+    folder = users_folder()
+    # What is loaded needs no second look: short runs would take longer for it.
+    if folder not in _in_use and (library := find_library(CATEGORY, key_of(), _FUNCTION)):
+        _in_use[folder] = library
     return _in_use.get(folder)
 
 
 def compile_stepper(in_no_time: bool = False) -> CDLL:
-    """Compile the library, and load it.
+    """Compile the library, unless it was compiled earlier, and load it.
 
     Args:
         in_no_time: only by a compiler that takes a tenth of a second.
@@ -181,35 +185,19 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
         InputError: it cannot be; the text says what to do.
 
     """
-    found = find_fast_compiler() if in_no_time else find_compiler()
-    if found is None:
+    compiler = find_fast_compiler() if in_no_time else find_compiler()
+    if compiler is None:
         raise InputError(
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"
         )
+    compiled = partial(compile_library, compiler, *FLAGS, str(SOURCE))
     try:
-        with hold_lock(user_cache.category_folder(CATEGORY), wait=True):
-            if library := load_stepper():
-                # Another process was first.
-                return library
-            content = compile_library(found, *FLAGS, str(SOURCE))
-            name = f"stepper{sharedLibraryExtension}"
-            [place] = user_cache.write_cached(CATEGORY, key_of(), {name: content})
-        return _loaded(place)
+        return load_library(CATEGORY, key_of(), _FUNCTION, compiled)
     except OSError as error:
         raise InputError(f"the loop cannot be compiled: {reason(error)}") from error
 
 
 @cache
-def _loaded(place: Path) -> CDLL:
-    library = CDLL(str(place))
-    if not hasattr(library, "advance"):
-        raise OSError(f"{place} has no function advance")
-    return library
-
-
-@cache
 def key_of(machine: str = platform_tuple) -> str:
-    """Of the text, the flags and the machine, as FMI 3.0 calls it."""
-    digest = sha256(SOURCE.read_bytes())
-    digest.update("\0".join((*FLAGS, machine)).encode())
-    return digest.hexdigest()[:16]
+    """Key of the library in the cache."""
+    return library_key(SOURCE.read_text(encoding="utf-8"), *FLAGS, machine=machine)

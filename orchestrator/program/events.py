@@ -1,34 +1,18 @@
-"""Events of a program: the part of its text that they need, and what they are in numbers.
+"""Events of a program: the part of its text that they need.
 
 Between two steps, `events.c` does what :mod:`orchestrator.master.hooks.events` does. It knows
-numbers only: what happened is put into words here, or by the page.
+numbers only: what happened is put into words by the page.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
-
-import numpy as np
+from typing import Protocol
 
 from fmus.language.types import FLOAT
 from fmus.native.emit import number_in_c
 from fmus.native.pieces import Place
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks.events import (
-    MOST_LISTED,
-    Action,
-    Alter,
-    Event,
-    Freeze,
-    Release,
-    Reset,
-    Set,
-    Stop,
-    occurrence,
-)
-from orchestrator.master.observers.observer import Occurrence
 from orchestrator.master.plan import Plan
 from orchestrator.master.row import FACTOR, OFFSET
 from orchestrator.program.kind import Kind
@@ -36,13 +20,6 @@ from orchestrator.system.names import PortName
 from orchestrator.system.units import Linear
 
 _SOURCE = Path(__file__).with_name("events.c")
-
-#: Numbers that stand for what an action is, and for a comparison, in events.c.
-_OVERRIDE, _BIAS, _FREEZE, _RELEASE, _SET, _RESET, _END = range(7)
-_COMPARISONS = ("<", "<=", ">", ">=")
-
-#: How many numbers an event, an action, and something that has happened are.
-EVENT, ACTION, LISTED = 13, 4, 3
 
 _TABLES = """\
 /* A number of the simulation. */
@@ -244,78 +221,3 @@ def _restarts(text: Text) -> str:
         "EXPORTED void restarts(const simulation *it, double times[]) {\n"
         f"    (void)it;\n{''.join(rows)}}}"
     )
-
-
-# In numbers
-
-
-class Agenda(NamedTuple):
-    """What is to happen, as events.c has it, with how far it has come.
-
-    Attributes:
-        events, actions: a row each.
-        happened: their number, then a row each.
-
-    """
-
-    events: np.ndarray
-    actions: np.ndarray
-    happened: np.ndarray
-
-
-def agenda_of(text: Text, events: Sequence[Event]) -> Agenda:
-    """What is to happen in a run of a program."""
-    columns = {name: i for i, name in enumerate(text.columns)}
-    found, actions = np.zeros((len(events), EVENT)), list[tuple[float, float, float, float]]()
-    for row, event in zip(found, events, strict=True):
-        first = len(actions)
-        actions += _actions(text, event.action)
-        when: tuple[float, ...] = (0.0, 0.0, 0.0)
-        if event.when is not None:
-            comparison = _COMPARISONS.index(event.when.comparison)
-            when = columns[event.when.signal], comparison, event.when.value
-        at = 0.0 if event.at is None else event.at
-        times = event.at is not None, at, *when, event.repeat, event.lasts or 0.0
-        row[: len(times) + 2] = *times, first, len(actions)
-    return Agenda(
-        found,
-        np.array(actions, dtype=float).reshape(-1, ACTION),
-        np.zeros(1 + len(events) * MOST_LISTED * LISTED),
-    )
-
-
-def _actions(text: Text, action: Action) -> Iterator[tuple[float, float, float, float]]:
-    parameters = {name: i for i, name in enumerate(text.parameters)}
-    match action:
-        case Alter(effect, values):
-            kind = _BIAS if effect == "bias" else _OVERRIDE
-            for target, value in values:
-                yield kind, text.inputs[target], float(value), 0.0
-        case Freeze(targets):
-            yield from ((_FREEZE, text.inputs[target], 0.0, 0.0) for target in targets)
-        case Release(targets):
-            yield from ((_RELEASE, text.inputs[target], 0.0, 0.0) for target in targets)
-        case Set(tuned, supplied):
-            for target, value in (*tuned, *supplied):
-                yield _SET, parameters[target], float(value), 0.0
-        case Reset(components):
-            for name in components:
-                yield _RESET, text.components.index(name), 0.0, 0.0
-        case Stop():
-            yield _END, 0.0, 0.0, 0.0
-        case _:
-            raise TypeError(f"a program does not know the event {action!r}")
-
-
-def occurrences(
-    events: Sequence[Event], happened: np.ndarray, experiment: Experiment
-) -> list[Occurrence]:
-    """What has happened in a run, in words."""
-    rows: Any = happened[1:].reshape(-1, LISTED)[: int(happened[0])].astype(int).tolist()
-    listed = [0] * len(events)
-    found = []
-    for number, step, ends in rows:
-        listed[number] += 1
-        time, n = experiment.time(step), listed[number]
-        found.append(occurrence(events[number], number, time, n, ends=bool(ends)))
-    return found

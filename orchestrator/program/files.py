@@ -16,8 +16,8 @@ from pathlib import Path
 
 from fmus.language.mathematics import FUNCTIONS
 from fmus.language.types import FLOAT, count
-from fmus.native.emit import closed, lines_of, number_in_c, quoted
-from fmus.native.pieces import function
+from fmus.native.emit import closed, number_in_c, quoted
+from fmus.native.pieces import array, function
 from fmus.native.translator import deepest
 from fmus.ports.definition import Definition
 from orchestrator.machine.errors import InputError
@@ -308,9 +308,9 @@ class ProgramFiles:
         """Their texts by their names."""
         main = self._filled(
             _MAIN,
-            components=_texts("components", self.text.components),
-            refused=_texts("refused", _REFUSED),
-            columns=_texts("columns", self._columns),
+            components=array("char *const components", map(quoted, self.text.components)),
+            refused=array("char *const refused", map(quoted, _REFUSED)),
+            columns=array("char *const columns", map(quoted, self._columns)),
             digits="9" if self.is_single else "17",
             cast="(double)" * self.is_single,
         )
@@ -511,9 +511,3 @@ def _without_unused(text: str) -> str:
 
 def _used(words: Mapping[str, int], found: re.Match[str]) -> str:
     return found[0] if words[found["function"] or found["constant"]] > 1 else ""
-
-
-def _texts(name: str, texts: Iterable[str]) -> str:
-    """An array of texts."""
-    listed = ", ".join(map(quoted, texts))
-    return "\n".join(lines_of(f"static const char *const {name}[] = {{{listed}}};", ""))

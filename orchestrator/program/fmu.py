@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import IntEnum
 from functools import cached_property
+from itertools import accumulate
 from math import lcm
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,10 +27,11 @@ from fmus.compilers import compiler_for
 from fmus.discovery import write_archive
 from fmus.documentation import html_of, page_of
 from fmus.kinds import platforms as platforms_of
-from fmus.language.types import FLOAT, Type, count
-from fmus.native.emit import closed, lines_of, number_in_c, quoted
+from fmus.language.types import FLOAT, INT, Scalar, Type, count
+from fmus.native.emit import closed, number_in_c, quoted
 from fmus.native.numbers import has_only_doubles, moves
 from fmus.native.packaging import Parts, entries_of
+from fmus.native.pieces import array, function, structure
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
 from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
@@ -82,6 +84,73 @@ static void model_tell(const simulation *it, Error *error) {
 }
 """
 
+_PUT, _TAKE, _SET, _FEED, _RENEW = (
+    f"static {head}"
+    for head in (
+        "void model_put(const simulation *it, double to[])",
+        "void model_take(simulation *it, const double from[])",
+        "void model_set(simulation *it, const model_parameters *parameters, int all, Error *error)",
+        "void model_feed(simulation *it, const model_inputs *inputs)",
+        "int model_renew(simulation *it, Error *error)",
+    )
+)
+
+_CONSTANTS = """\
+#define SYSTEM_STEP {step}
+
+/* Whether only steps of this length can be made, and after how many all components step. */
+enum {{ ONLY_SYSTEM_STEPS = {is_slow}, SYSTEM_CYCLE = {cycle} }};"""
+
+#: What some functions do that the runtime calls.
+_START = """\
+simulation *it = calloc(1, sizeof *it);
+int found;
+if (it == NULL) {
+    raise_error(error, "out of memory");
+    return;
+}
+it->start_time = t;
+it->step = SYSTEM_STEP;
+model_set(it, parameters, 1, error);
+model_feed(it, inputs);
+found = come_to_rest(it, error);
+if (found < 0) {
+    model_tell(it, error);
+} else if (found > 0) {
+    raise_error(error, "values do not come to rest at the start");
+} else {
+    model_put(it, state->v);
+}
+free(it);"""
+
+_DERIVE = """\
+simulation *it = &derived->it;
+model_set(it, parameters, !derived->begun, error);
+derived->begun = 1;
+model_take(it, state->v);
+if (model_renew(it, error)) {
+    model_tell(it, error);
+    return;
+}
+model_feed(it, inputs);"""
+
+_PASS = "if (pass(it, it->made, t, error)) model_tell(it, error);"
+
+_UPDATE = f"""\
+simulation *it = &derived->it;
+/* Hosts that subtract times have steps that nearly are the system's. */
+it->step = fabs(h - SYSTEM_STEP) <= SYSTEM_STEP * {euler.ROUNDING!r} ? SYSTEM_STEP : h;
+if (ONLY_SYSTEM_STEPS && it->step != SYSTEM_STEP) {{
+    raise_error(error, "step %g s: only steps of %g s can be made", h, SYSTEM_STEP);
+    return;
+}}
+if (make_step(it, it->made, t, error)) {{
+    model_tell(it, error);
+    return;
+}}
+it->made = (it->made + 1) % SYSTEM_CYCLE;
+model_put(it, state->v);"""
+
 _HEAD = """\
 /* {title}
  *
@@ -122,16 +191,39 @@ class Part(NamedTuple):
     """Some numbers of the state.
 
     Attributes:
-        owner: what holds them.
+        owner: what holds them, in C.
+        type: of it; None: it is a generator of noise.
         types: of the numbers, in Python.
-        put, take: statements that move them from what holds them, or to it, by their first place.
 
     """
 
     owner: str
+    type: Type | None
     types: Sequence[Any]
-    put: Callable[[int], list[str]]
-    take: Callable[[int], list[str]]
+
+    def put(self, at: int) -> list[str]:
+        """Statements that move them into the state, from a place on."""
+        if self.type is None:
+            return [f"model_put_noise(&{self.owner}, to + {at});"]
+        if self._is_block:
+            return [f"memcpy(to + {at}, &{self.owner}, sizeof {self.owner});"]
+        return self._moves(at, "to[{place}] = {member};")
+
+    def take(self, at: int) -> list[str]:
+        """Statements that move them from there."""
+        if self.type is None:
+            return [f"model_take_noise(&{self.owner}, from + {at});"]
+        if self._is_block:
+            return [f"memcpy(&{self.owner}, from + {at}, sizeof {self.owner});"]
+        return self._moves(at, "{member} = {cast}from[{place}];")
+
+    @property
+    def _is_block(self) -> bool:
+        return not isinstance(self.type, Scalar) and has_only_doubles(self.type)
+
+    def _moves(self, at: int, text: str) -> list[str]:
+        assert self.type is not None
+        return [*moves(self.type, self.owner, range(at, at + count(self.type)), text)]
 
 
 class SystemModel:
@@ -160,46 +252,33 @@ class SystemModel:
         """
         self.text, self.name = Text(plan, definitions, is_tuned=True, is_hosted=True), name
         self.plan, self._definitions, self._title = self.text.plan, definitions, title
+        system = self.plan.system
+        #: The ports of the components.
+        self._known = {
+            PortName(name, port.name): port
+            for name in system.components
+            for port in definitions[name].ports
+        }
+        fed = {connection.target for connection in system.connections}
+        #: The inputs that nothing feeds.
+        self._open = [
+            name
+            for name, port in self._known.items()
+            if port.causality == "input" and name not in fed
+        ]
 
     # What the description says
 
     @cached_property
-    def _open(self) -> list[PortName]:
-        """The inputs that nothing feeds."""
-        system = self.plan.system
-        fed = {connection.target for connection in system.connections}
-        return [name for name in self._ports_of("input") if name not in fed]
-
-    def _ports_of(self, causality: str) -> list[PortName]:
-        return [
-            PortName(name, port.name)
-            for name in self.plan.system.components
-            for port in self._definitions[name].ports
-            if port.causality == causality
-        ]
-
-    def _port(self, name: PortName) -> Port:
-        return self._known[name]
-
-    @cached_property
-    def _known(self) -> dict[PortName, Port]:
-        """The ports of the components."""
-        return {
-            PortName(name, port.name): port
-            for name in self.plan.system.components
-            for port in self._definitions[name].ports
-        }
-
-    @cached_property
     def ports(self) -> tuple[Port, ...]:
         """All but `fault`: open inputs, outputs, and parameters, which have the system's values."""
-        names = {
-            "input": self._open,
-            "output": self._ports_of("output"),
-            "parameter": self._ports_of("parameter"),
-        }
+        known = self._known.items()
+        outputs, parameters = (
+            [name for name, port in known if port.causality == causality]
+            for causality in ("output", "parameter")
+        )
         try:
-            found = [self._renamed(name) for named in names.values() for name in named]
+            found = [self._renamed(name) for name in (*self._open, *outputs, *parameters)]
             found.append(largest_step(self.plan.experiment.step))
             taken = {FAULT.name, TIME.name}
             for port in found:
@@ -213,16 +292,10 @@ class SystemModel:
         return tuple(found)
 
     def _renamed(self, name: PortName) -> Port:
-        port = self._port(name)
-        direct = tuple(self._direct(name)) if port.causality == "output" else ()
-        return replace(
-            port,
-            name=str(name),
-            start=None if port.causality == "output" else self.text.start(name),
-            feedthrough=direct,
-            initially=None if port.causality == "output" else (),
-            array=None,
-        )
+        port = replace(self._known[name], name=str(name), array=None)
+        if port.causality == "output":
+            return replace(port, start=None, feedthrough=tuple(self._direct(name)), initially=None)
+        return replace(port, start=self.text.start(name), feedthrough=(), initially=())
 
     def _direct(self, output: PortName) -> list[str]:
         """The open inputs that an output depends on without a state between."""
@@ -234,7 +307,7 @@ class SystemModel:
         seen, waiting = {output}, [output]
         while waiting:
             at = waiting.pop()
-            for port in self._port(at).feedthrough:
+            for port in self._known[at].feedthrough:
                 name = PortName(at.component, port)
                 if name not in sources:
                     found.add(port if port == TIME.name else str(name))
@@ -306,46 +379,32 @@ class SystemModel:
     @cached_property
     def _state(self) -> list[Part]:
         """The numbers of the state, which are all that the rest of a run depends on."""
-        found = [_number("it->start_time", float), _number("it->made", int)]
+        found = [Part("it->start_time", FLOAT, [float]), Part("it->made", INT, [int])]
         for name, member in self.text.members.items():
             kind, owner = self.text.kind(name), f"it->{member}"
-            said = kind.said
-            found.append(_numbers(f"{owner}.state", kind.types["state"], said.state))
+            said, types = kind.said, kind.types
+            found.append(Part(f"{owner}.state", types["state"], [*scalars_of(said.state)]))
             # Of these, any number is taken, as it has no consequence.
-            holders = {f"{owner}.inputs": "inputs", f"{owner}.outputs": "outputs"}
-            if name in self.text.slow:
-                holders[f"{owner}_shown"] = "outputs"
-            for holder, group in holders.items():
-                hint = getattr(said, group)
-                part = _numbers(holder, kind.types[group], hint)
-                found.append(part._replace(types=[*map(_plain, part.types)]))
+            found.append(Part(f"{owner}.inputs", types["inputs"], _plain(said.inputs)))
+            numbers, shown = _plain(said.outputs), [f"{owner}_shown"] * (name in self.text.slow)
+            found += [Part(one, types["outputs"], numbers) for one in (f"{owner}.outputs", *shown)]
             if kind.is_timed:
-                found.append(_number(f"{owner}.time", float))
+                found.append(Part(f"{owner}.time", FLOAT, [float]))
+            found += [Part(f"{owner}.draws[{i}]", FLOAT, [float]) for i in range(said.draws)]
             if said.draws:
-                found += [
-                    *(_number(f"{owner}.draws[{i}]", float) for i in range(said.draws)),
-                    _generator(f"{owner}.noise"),
-                ]
+                found.append(Part(f"{owner}.noise", None, _NOISE_TYPES))
         return [part for part in found if part.types]
 
-    def _moved(self, way: str) -> list[str]:
-        """Statements that move the whole state."""
-        return [line for part, place in self._placed.values() for line in getattr(part, way)(place)]
-
     @cached_property
-    def _placed(self) -> dict[str, tuple[Part, int]]:
-        """The parts of the state and their first places, by what holds them."""
-        found, place = {}, 0
-        for part in self._state:
-            found[part.owner] = part, place
-            place += len(part.types)
-        return found
+    def _placed(self) -> list[tuple[Part, int]]:
+        """The parts of the state, each with its first place."""
+        places = accumulate((len(part.types) for part in self._state), initial=0)
+        return [*zip(self._state, places, strict=False)]
 
     # What the runtime calls
 
     def _glue(self) -> list[str]:
-        text, step = self.text, number_in_c(self.plan.experiment.step)
-        members = text.members.items()
+        text, members = self.text, self.text.members.items()
         is_timed = any(kind.is_timed for kind in text.kinds.values())
         outputs = self._values("output")
         answers = {
@@ -362,102 +421,44 @@ class SystemModel:
         parameters = [row for name, member in members for row in self._parameters(name, member)]
         n_state = sum(len(part.types) for part in self._state)
         sizes = {"inputs": len(self._open), "outputs": len(outputs), "state": n_state}
-        types = [
-            _structure("model_parameters", parameters or ["char nothing;"]),
-            *(_structure(f"model_{what}", [f"double v[{n or 1}];"]) for what, n in sizes.items()),
-            "typedef struct {\n    simulation it;\n    int begun; /* whether it has parameters */\n"
-            "} model_derived;",
-        ]
+        derived = ["simulation it;", "int begun; /* whether it has parameters */"]
         counts = ", ".join(f"MODEL_{what.upper()} = {n}" for what, n in sizes.items())
-        cycle = lcm(*self.plan.decimations.values())
-        mine = "simulation *it = &derived->it;"
-        refuse = "model_tell(it, error);"
-        passing = text.stages.passing is not None
-        slow = [
-            f"if (it->step != {step}) {{",
-            f'    raise_error(error, "step %g s: only steps of {self.plan.experiment.step:g} s can '
-            'be made", h);',
-            "    return;",
-            "}",
-        ] if text.slow else []  # fmt: skip
+        columns = {str(name): place.text for name, place in text.columns.items()}
         bodies = {
             "check": [line for name, member in members for line in self._check(name, member)],
             "check_state": [
                 line for name, member in members for line in self._check_state(name, member)
             ],
-            "start": [
-                "simulation *it = calloc(1, sizeof *it);",
-                "int found;",
-                "if (it == NULL) {",
-                '    raise_error(error, "out of memory");',
-                "    return;",
-                "}",
-                "it->start_time = t;",
-                f"it->step = {step};",
-                "model_set(it, parameters, 1, error);",
-                *self._feed_call(),
-                "found = come_to_rest(it, error);",
-                "if (found < 0) {",
-                f"    {refuse}",
-                "} else if (found > 0) {",
-                '    raise_error(error, "values do not come to rest at the start");',
-                "} else {",
-                "    model_put(it, state->v);",
-                "}",
-                "free(it);",
-            ],
-            "derive": [
-                mine,
-                "model_set(it, parameters, !derived->begun, error);",
-                "derived->begun = 1;",
-                "model_take(it, state->v);",
-                *self._anew(refuse),
-                *self._feed_call(),
-                *([f"if (pass(it, it->made, t, error)) {refuse}"] if passing else []),
-            ],
+            "start": _START.splitlines(),
+            "derive": [*_DERIVE.splitlines(), *([_PASS] if text.passes else [])],
             "evaluate": [
                 "const simulation *it = &derived->it;",
-                *(
-                    f"outputs->v[{i}] = {text.columns[self._named[port.name]].text};"
-                    for i, port in enumerate(outputs)
-                ),
+                *(f"outputs->v[{i}] = {columns[port.name]};" for i, port in enumerate(outputs)),
             ],
-            "update": [
-                mine,
-                # Hosts that subtract times have steps that nearly are the system's.
-                f"it->step = fabs(h - {step}) <= {step} * {euler.ROUNDING!r} ? {step} : h;",
-                *slow,
-                "if (make_step(it, it->made, t, error)) {",
-                f"    {refuse}",
-                "    return;",
-                "}",
-                f"it->made = (it->made + 1) % {cycle};",
-                "model_put(it, state->v);",
-            ],
+            "update": _UPDATE.splitlines(),
         }
         return [
             "/* What the runtime calls. */",
-            *types,
+            structure("model_parameters", parameters),
+            *(structure(f"model_{what}", [f"double v[{n or 1}];"]) for what, n in sizes.items()),
+            structure("model_derived", derived),
             f"enum {{ {counts} }};",
+            _CONSTANTS.format(
+                step=number_in_c(self.plan.experiment.step),
+                is_slow=int(bool(text.slow)),
+                cycle=lcm(*self.plan.decimations.values()),
+            ),
             *self._names(),
             _TOLD.strip(),
             *([_NOISE.strip()] if text.equations.is_noisy else []),
-            _function("put", "const simulation *it, double to[]", self._moved("put")),
-            _function("take", "simulation *it, const double from[]", self._taken()),
-            _function(
-                "set",
-                "simulation *it, const model_parameters *parameters, int all, Error *error",
-                self._set(),
-            ),
-            *self._feed(),
+            function(_PUT, [line for part, at in self._placed for line in part.put(at)], ()),
+            function(_TAKE, self._taken(), ()),
+            function(_SET, self._set(), ()),
+            function(_FEED, [*self._feed()], ("it", "inputs")),
+            function(_RENEW, [*self._renewed(), "return 0;"], ("it", "error")),
             constants(answers),
             *defined(bodies),
         ]
-
-    @cached_property
-    def _named(self) -> dict[str, PortName]:
-        """The ports of components by their names in the FMU."""
-        return {str(name): name for name in self._known}
 
     def _values(self, causality: str) -> list[Port]:
         """Ports in the order of their values."""
@@ -498,31 +499,26 @@ class SystemModel:
 
     def _taken(self) -> list[str]:
         """Take a state, from which some is to be derived."""
-        lines = self._moved("take")
+        lines = [line for part, at in self._placed for line in part.take(at)]
         for name, member in self.text.members.items():
             kind = self.text.kind(name)
             if kind.said.derived and kind.derives_anew:
                 lines.append(f"it->{member}.underived = 1;")
         return lines
 
-    def _feed(self) -> list[str]:
-        """The function that hands open inputs over."""
-        lines = []
+    def _feed(self) -> Iterator[str]:
+        """Hand open inputs over."""
+        columns = {str(name): place for name, place in self.text.columns.items()}
         for i, port in enumerate(self._values("input")):
-            place = self.text.columns[self._named[port.name]]
+            place = columns[port.name]
             cast = "" if place.type == FLOAT else "(int)"
-            lines.append(f"{place.text} = {cast}inputs->v[{i}];")
+            yield f"{place.text} = {cast}inputs->v[{i}];"
         for name in dict.fromkeys(name.component for name in self._open):
             said = self.text.kind(name).said
             if said.derived and said.takes("derive", "inputs"):
-                lines.append(f"it->{self.text.members[name]}.underived = 1;")
-        given = "simulation *it, const model_inputs *inputs"
-        return [_function("feed", given, lines)] if lines else []
+                yield f"it->{self.text.members[name]}.underived = 1;"
 
-    def _feed_call(self) -> list[str]:
-        return ["model_feed(it, inputs);"] if self._open else []
-
-    def _anew(self, refuse: str) -> Iterator[str]:
+    def _renewed(self) -> Iterator[str]:
         """Outputs that nothing computes again as values pass, and that follow parameters."""
         sequence = self.text.sequence
         place = {name: i for i, names in enumerate(sequence) for name in names}
@@ -544,8 +540,7 @@ class SystemModel:
                 yield f"{kind.name}_evaluate(&it->{member}, error);"
                 yield "if (error->raised) {"
                 yield f"    it->component = {i};"
-                yield f"    {refuse}"
-                yield "    return;"
+                yield "    return 1;"
                 yield "}"
 
     def _check(self, name: str, member: str) -> Iterator[str]:
@@ -566,90 +561,28 @@ class SystemModel:
         given = {"parameters": f"parameters->{member}", "state": "of_one"}
         yield "if (!error->raised) {"
         yield f"    {self.text.emitter.type(kind.types['state'])} of_one;"
-        if found := self._placed.get(f"it->{member}.state"):
-            part = _numbers("of_one", kind.types["state"], kind.said.state)
-            yield from (f"    {line.replace('from', 'state->v')}" for line in part.take(found[1]))
+        for part, at in self._placed:
+            if part.owner == f"it->{member}.state":
+                lines = part._replace(owner="of_one").take(at)
+                yield from (f"    {line.replace('from', 'state->v')}" for line in lines)
         yield f"    {kind.call('check_state', **given)};"
         yield f"    model_ascribe(error, {quoted(name)});"
         yield "}"
 
-    def _names(self) -> list[str]:
+    def _names(self) -> Iterator[str]:
         """The names of components and of their inputs."""
-        inputs, names = [], []
-        for i, name in enumerate(self.text.components):
-            ports = [port.name for port in self.text.kind(name).ports["input"]] or [""]
-            texts = ", ".join(map(quoted, ports))
-            inputs += lines_of(f"static const string model_inputs_of_{i}[] = {{{texts}}};", "")
-            names.append(f"model_inputs_of_{i}")
-        found = ", ".join(map(quoted, self.text.components))
-        return [
-            "\n".join(
-                [
-                    *lines_of(f"static const string model_components[] = {{{found}}};", ""),
-                    *inputs,
-                    *lines_of(
-                        f"static const string *const model_inputs_of[] = {{{', '.join(names)}}};",
-                        "",
-                    ),
-                ]
-            )
-        ]
+        components = self.text.components
+        yield array("string model_components", map(quoted, components))
+        for i, name in enumerate(components):
+            names = [quoted(port.name) for port in self.text.kind(name).ports["input"]]
+            yield array(f"string model_inputs_of_{i}", names or ['""'])
+        inputs = (f"model_inputs_of_{i}" for i in range(len(components)))
+        yield array("string *const model_inputs_of", inputs)
 
 
-def _numbers(owner: str, type_: Type, hint: Any) -> Part:
-    """The numbers of a structure."""
-    n = count(type_)
-    if has_only_doubles(type_):
-        return Part(
-            owner,
-            [*scalars_of(hint)],
-            lambda at: [f"memcpy(to + {at}, &{owner}, sizeof {owner});"],
-            lambda at: [f"memcpy(&{owner}, from + {at}, sizeof {owner});"],
-        )
-
-    def moved(text: str) -> Callable[[int], list[str]]:
-        return lambda at: [
-            line.removeprefix("    ") for line in moves(type_, owner, range(at, at + n), text)
-        ]
-
-    put, take = "to[{place}] = {member};", "{member} = {cast}from[{place}];"
-    return Part(owner, [*scalars_of(hint)], moved(put), moved(take))
-
-
-def _number(owner: str, type_: type) -> Part:
-    """A number."""
-    cast = "" if type_ is float else "(int)"
-    return Part(
-        owner,
-        [type_],
-        lambda at: [f"to[{at}] = {owner};"],
-        lambda at: [f"{owner} = {cast}from[{at}];"],
-    )
-
-
-def _generator(owner: str) -> Part:
-    """The numbers of a generator of noise."""
-    return Part(
-        owner,
-        _NOISE_TYPES,
-        lambda at: [f"model_put_noise(&{owner}, to + {at});"],
-        lambda at: [f"model_take_noise(&{owner}, from + {at});"],
-    )
-
-
-def _plain(scalar: Any) -> Any:
-    """A type of numbers without what its values are called."""
-    return int if is_class(scalar, IntEnum) else scalar
-
-
-def _structure(name: str, rows: Sequence[str]) -> str:
-    body = "\n".join(f"    {row}" for row in rows)
-    return f"typedef struct {{\n{body}\n}} {name};"
-
-
-def _function(name: str, arguments: str, body: Sequence[str]) -> str:
-    head = lines_of(f"static void model_{name}({arguments}) {{", "")
-    return "\n".join([*head, *(line for part in body for line in lines_of(part, "    ")), "}"])
+def _plain(hint: Any) -> list[Any]:
+    """The types of numbers without what their values are called."""
+    return [int if is_class(scalar, IntEnum) else scalar for scalar in scalars_of(hint)]
 
 
 def _apart(ports: Sequence[Port]) -> Iterator[Port]:

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, create_string_buffer
 from dataclasses import dataclass, field, replace
-from hashlib import sha256
-from importlib.util import find_spec
+from functools import partial
 from threading import local
 
 import numpy as np
-from fmpy import platform_tuple, sharedLibraryExtension
+from fmpy import platform_tuple
 
-from fmus.compilers import EXPORTED, LIMIT_OF_ZIG, MATHEMATICS, SAME_NUMBERS
-from orchestrator.machine.cache import made_once, read_cached
-from orchestrator.machine.children import Compiler, compile_text, find_compiler, run_module
+from fmus.compilers import EXPORTED, MATHEMATICS, SAME_NUMBERS
+from orchestrator.machine.cache import read_cached
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.libraries import (
+    compile_text,
+    find_best_compiler,
+    library_key,
+    load_library,
+)
 from orchestrator.master.experiment import Experiment
 from orchestrator.program.writer import Text
 
@@ -32,16 +36,6 @@ FLAGS = (
     "-fPIC", "-fvisibility=hidden", "-shared", "-s", "-w",
     *EXPORTED,
 )  # fmt: skip
-
-#: Beside them, for ziglang: any processor of this kind, where it would take this very one.
-_ANY_PROCESSOR = "-mcpu=baseline"
-
-
-def best_compiler() -> Compiler | None:
-    """Find ziglang, whose programs are faster, or else this machine's compiler."""
-    if find_spec("ziglang") is None:
-        return find_compiler()
-    return lambda *given: run_module("ziglang", "cc", _ANY_PROCESSOR, *given, timeout=LIMIT_OF_ZIG)
 
 
 @dataclass(frozen=True)
@@ -75,15 +69,13 @@ class Source:
         """The same, with what this machine has compiled."""
         if self.library and self.machine == platform_tuple:
             return self
-        place = next(iter(read_cached(CATEGORY, self.key)))
-        return replace(self, library=place.read_bytes(), machine=platform_tuple)
+        [library] = read_cached(CATEGORY, self.key).values()
+        return replace(self, library=library, machine=platform_tuple)
 
     @property
     def key(self) -> str:
         """Of the text, the flags and the machine."""
-        digest = sha256(self.text.encode())
-        digest.update("\0".join((*FLAGS, self.machine)).encode())
-        return digest.hexdigest()[:24]
+        return library_key(self.text, *FLAGS, machine=self.machine)
 
 
 class Program:
@@ -157,10 +149,8 @@ def _loaded(source: Source) -> CDLL:
         InputError: it cannot be compiled.
 
     """
-    name = f"program{sharedLibraryExtension}"
     try:
-        place = made_once(CATEGORY, source.key, lambda: {name: compiled(source)})[name]
-        library = CDLL(str(place))
+        library = load_library(CATEGORY, source.key, "run", partial(_compiled, source))
     except OSError as error:
         raise InputError(f"the program cannot be compiled: {reason(error)}") from error
     library.size_of_simulation.restype = c_size_t
@@ -173,7 +163,7 @@ def _loaded(source: Source) -> CDLL:
     return library
 
 
-def compiled(source: Source) -> bytes:
+def _compiled(source: Source) -> bytes:
     """The library of a program: the one that came with it, or else compiled now.
 
     Raises:
@@ -183,7 +173,7 @@ def compiled(source: Source) -> bytes:
     """
     if source.library and source.machine == platform_tuple:
         return source.library
-    compiler = best_compiler()
+    compiler = find_best_compiler()
     if compiler is None:
         raise InputError(
             "a program needs a C compiler: install gcc or clang, or `pip install ziglang`"

@@ -16,7 +16,7 @@ from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypedDict, Unpack
 
 from fmus.compilers import compiler_for
 from fmus.discovery import fingerprint
@@ -50,30 +50,47 @@ class BuildFailed(InputError):
     """The FMU of a user's script cannot be built."""
 
 
+class Form(TypedDict, total=False):
+    """What FMUs are built as.
+
+    Attributes:
+        kind: one of :data:`fmus.kinds.KINDS`; by default the Python kind.
+        fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
+        loader: of the Python kind, `native` or `plain`; None: what is there, and for new files
+            native where it can be compiled.
+        platforms: of the native kind, with commas between them; None: this machine.
+        arrays: whether vectors and matrices of one unit are arrays of FMI 3.0.
+
+    """
+
+    kind: str
+    fmi: str
+    loader: str | None
+    platforms: str | None
+    arrays: bool
+
+
+def words_of(form: Form) -> list[str]:
+    """What the build is told of a form."""
+    texts = {name: value for name, value in form.items() if isinstance(value, str)}
+    words = [word for name, value in texts.items() for word in (f"--{name}", value)]
+    return words + ["--arrays"] * form.get("arrays", False)
+
+
 def build_bundle(
     folder: Path,
-    loader: str | None = None,
     *,
-    kind: str = PYTHON,
-    fmi: str = FMI_VERSIONS[0],
-    platforms: str | None = None,
-    arrays: bool = False,
     force: bool = False,
     hear: Callable[[str], None] = lambda line: None,
+    **form: Unpack[Form],
 ) -> list[Path]:
     """Bring a folder with FMUs and SSP up to date.
 
     Args:
         folder: made if it does not exist.
-        loader: of the Python kind, `native` or `plain`; None: what is there, and for new files
-            native where it can be compiled.
-        kind: one of :data:`fmus.kinds.KINDS`.
-        fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
-        platforms: of the native kind, with commas between them; None: this machine.
-        arrays: whether vectors of one unit are arrays of FMI 3.0; the SSP is left out then, whose
-            connections are of scalars.
         force: move aside files of the user's that have names of these.
         hear: called with a line when a library is made.
+        form: of the FMUs; with arrays, the SSP is left out, whose connections are of scalars.
 
     Returns:
         The files that had to be written.
@@ -87,13 +104,9 @@ def build_bundle(
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
                 shutil.copy2(path, unfinished)
-        options = ["--kind", kind, "--fmi", fmi]
-        options += ["--loader", loader] if loader is not None else []
-        options += ["--platforms", platforms] if platforms is not None else []
-        options += ["--arrays"] * arrays
-        run_fmus("build", unfinished, *options, hear=hear)
+        run_fmus("build", unfinished, *words_of(form), hear=hear)
         files = sorted(unfinished.glob("*.fmu"))
-        if not arrays:
+        if not form.get("arrays"):
             archive = unfinished / ARCHIVE
             archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
             files.append(archive)

@@ -16,13 +16,13 @@ from contextlib import suppress
 from importlib.machinery import PathFinder
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Unpack
 from zipfile import BadZipFile, ZipFile
 
 from fmus.discovery import ORIGIN, name_of, origin_of
-from fmus.kinds import FMI_VERSIONS, PYTHON
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.bundle import BuildFailed, run_fmus
+from orchestrator.runs.bundle import BuildFailed, Form, run_fmus, words_of
 from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
@@ -165,14 +165,10 @@ def _names(name: str, what: str) -> tuple[str, str]:
 def build_own(
     script: Path,
     folder: Path | None = None,
-    loader: str | None = None,
     *,
-    kind: str = PYTHON,
-    fmi: str = FMI_VERSIONS[0],
-    platforms: str | None = None,
-    arrays: bool = False,
     force: bool = False,
     hear: Callable[[str], None] = lambda line: None,
+    **form: Unpack[Form],
 ) -> Path:
     """Build the FMU of a user's component.
 
@@ -180,22 +176,15 @@ def build_own(
         script: a component in one Python file, a script with a slave of PythonFMU, or a folder
             with one of them.
         folder: of the FMU, which gets the name of the component; None: the script's own.
-        loader: of the Python kind, `native` or `plain`; None: native where it can be compiled.
-        kind: one of :data:`fmus.kinds.KINDS`.
-        fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
-        platforms: of the native kind, with commas between them; None: this machine.
-        arrays: whether vectors and matrices of one unit are arrays of FMI 3.0.
         force: move aside a file of the user's that has the name of the FMU.
         hear: called with a line when a library is made.
+        form: of the FMU.
 
     Raises:
         InputError: the script is missing or fails, or the folder cannot be written.
 
     """
-    options = [str(script), "--kind", kind, "--fmi", fmi]
-    options += ["--loader", loader] if loader is not None else []
-    options += ["--platforms", platforms] if platforms is not None else []
-    options += ["--arrays"] * arrays
+    options = [str(script), *words_of(form)]
     with TemporaryDirectory(dir=process_folder()) as temporary:
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder

@@ -46,16 +46,10 @@ from orchestrator.runs.record import (
 from orchestrator.runs.request import Files
 from orchestrator.system.names import file_name
 from orchestrator.system.structure import System
-from orchestrator.vehicle.cautions import (
-    cautions,
-    cautions_after,
-    cautions_beside,
-    values_of,
-    watched_columns,
-)
+from orchestrator.vehicle.cautions import Watch, cautions, cautions_beside, values_of
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
-from orchestrator.vehicle.signals import Loop, suffixes
+from orchestrator.vehicle.signals import suffixes
 
 #: A file that keeps room for the files written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
@@ -169,9 +163,11 @@ class _Running:
         self.ending, self.metrics = Ending(), dict[str, Any]()
         loops = prepared.loops
         self._metrics = Metrics(loops)
-        # Without figures only the cautions look at what was seen.
-        seen = watched_columns if files.no_figures else Loop.drawn
-        self.seen = VisibleRows({name for loop in loops for name in seen(loop)})
+        self.watch = Watch(loops)
+        # Without figures only references are compared.
+        self.seen = VisibleRows(
+            {name for one in loops for name in (one.y_d if files.no_figures else one.drawn())}
+        )
         self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
         self.observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
@@ -180,6 +176,7 @@ class _Running:
                 for loop, vehicle in suffixes(loops).items()
             ),
             self._metrics,
+            self.watch,
             self.seen,
             Progress(prepared.scenario.name),
         ]
@@ -266,7 +263,7 @@ class _Unfinished:
         said = [f"did not happen: {event}" for event in missed]
         compared = first.prepared
         said += cautions_beside(run.seen, compared.scenario.name, first.seen, compared.loops)
-        said += [caution.text for caution in cautions_after(run.seen, prepared.loops)]
+        said += [caution.text for caution in run.watch.found()]
         self.caution(prepared, said)
 
     def draw(self, draw: Callable[..., list[str]], interrupts: Interrupts) -> None:

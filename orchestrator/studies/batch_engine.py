@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from itertools import chain
-from math import inf, isnan
+from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +30,6 @@ from orchestrator.system.structure import System
 from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.cautions import (
     WATCHED,
-    Seen,
     cautions,
     cautions_seen,
     values_of,
@@ -223,8 +222,7 @@ class _Known:
         found = cautions(value, point.step, self.loops)
         for loop, places in zip(self.loops, ready.watched, strict=True):
             seen = {name: numbers[i] for name, i in places.items() if not isnan(numbers[i])}
-            bound, vertical = seen.get("largest_bound", -inf), seen.get("vertical_passed", inf)
-            found += cautions_seen(Seen(bound, vertical), loop, value, point.step)
+            found += cautions_seen(seen, loop, value, point.step)
         return kinds_of(found)
 
     def value(self, point: Point, name: str) -> Value | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
@@ -18,7 +18,7 @@ from time import monotonic
 from typing import NamedTuple, Protocol
 
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.interrupts import Interrupts, held_interrupts
+from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.machine.workers import Workers, cores
 from orchestrator.machine.workers import workers as workers_of
 from orchestrator.studies.engine import Engine, Outcome, Point
@@ -37,9 +37,6 @@ _MOST_RUNS = 10_000
 
 #: How often a block may lose its process on this machine before it is put aside.
 _LOSSES = 1
-
-#: How long threads are waited for before it is asked whether to stop [s].
-_GLANCE = 0.1
 
 #: What is said of a run that no worker has survived.
 FATAL = "every process that ran it died"
@@ -103,7 +100,7 @@ def local_workers(n: int | None, engine: Engine) -> Iterator[Crew]:
                 "no process can be started (a script needs `if __name__ == '__main__':` around "
                 "what it does)"
             ) from None
-        yield _Local(workers)
+        yield _Local(workers, _task)
 
 
 class _Sent(NamedTuple):
@@ -115,17 +112,17 @@ class _Sent(NamedTuple):
 
 
 class _Local:
-    """Processes of this machine."""
+    """Processes of this machine, or threads of this one, and the task that makes a block there."""
 
     ahead = 1
 
-    def __init__(self, workers: Workers) -> None:
-        self._workers, self.threads = workers, workers.n
+    def __init__(self, workers: Workers, task: Callable[[list[Point], float], Answer]) -> None:
+        self._workers, self._task, self.threads = workers, task, workers.n
         self._under_way: dict[Future[Answer], _Sent] = {}
         self._put_aside: list[list[Point]] = []
 
     def send(self, block: list[Point], limit: float, left: int = _LOSSES) -> None:
-        future = self._workers.submit(_task, block, limit)
+        future = self._workers.submit(self._task, block, limit)
         self._under_way[future] = _Sent(block, limit, left)
 
     def receive(self) -> tuple[list[Point], Answer | None]:
@@ -160,47 +157,15 @@ def local_threads(n: int | None, engine: Engine) -> Iterator[Crew]:
         engine: makes the runs; several threads use it at the same time.
 
     """
-    with held_interrupts() as interrupts, ThreadPoolExecutor(n or cores()) as pool:
-        threads = _Threads(n or cores(), pool, engine, interrupts)
+    n, ends = n or cores(), Event()
+    with held_interrupts() as interrupts:
+        threads = Workers(n, partial(ThreadPoolExecutor, n), interrupts)
         try:
-            yield threads
+            yield _Local(threads, partial(answer, engine, ends=ends))
         finally:
-            threads.stop()
-
-
-class _Threads:
-    """Threads of this process."""
-
-    ahead = 1
-
-    def __init__(
-        self, n: int, pool: ThreadPoolExecutor, engine: Engine, interrupts: Interrupts
-    ) -> None:
-        self.threads, self._pool, self._engine, self._interrupts = n, pool, engine, interrupts
-        self._under_way: dict[Future[Answer], list[Point]] = {}
-        self._ends = Event()
-
-    def send(self, block: list[Point], limit: float) -> None:
-        future = self._pool.submit(answer, self._engine, block, limit, self._ends)
-        self._under_way[future] = block
-
-    def receive(self) -> tuple[list[Point], Answer | None]:
-        done: set[Future[Answer]] = set()
-        while not done:
-            done, _ = wait(self._under_way, _GLANCE, FIRST_COMPLETED)
-            if self._interrupts:
-                raise KeyboardInterrupt
-        future = next(iter(done))
-        block = self._under_way.pop(future)
-        try:
-            return block, future.result()
-        except Exception as error:
-            raise cannot_make(block, error) from error
-
-    def stop(self) -> None:
-        """End with the runs that are under way."""
-        self._ends.set()
-        self._pool.shutdown(cancel_futures=True)
+            # With the runs that are under way.
+            ends.set()
+            threads.close()
 
 
 def _set_up(engine: Engine) -> None:

@@ -5,7 +5,7 @@ Among the former: which velocities reach a controller that is to do without.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from math import inf
 from typing import NamedTuple
@@ -66,25 +66,6 @@ class Caution(NamedTuple):
 
     kind: str
     text: str
-
-
-class Seen(NamedTuple):
-    """What the rows of a run have shown of a loop.
-
-    Attributes:
-        rho_hat: largest theta_hat[1] of a step, the part of the bound that is there at any speed
-            [N].
-        vertical: when the pitch had first passed 90 degrees [s].
-
-    """
-
-    rho_hat: float = -inf
-    vertical: float = inf
-
-
-def watched_columns(loop: Loop) -> tuple[str, str]:
-    """The columns that :class:`Watch` looks at: theta_hat[1], and the pitch."""
-    return loop.theta_hat[0], loop.attitude[1]
 
 
 def values_of(system: System) -> ValueOf:
@@ -200,40 +181,41 @@ class Watch:
         ]
 
 
-def _seen(reductions: Iterable[Reduction]) -> Seen:
-    found = {name: value for one in reductions for name, [value] in one.found().items()}
-    return Seen(found.get("largest_bound", -inf), found.get("vertical_passed", inf))
+def _seen(reductions: Iterable[Reduction]) -> dict[str, float]:
+    return {name: value for one in reductions for name, [value] in one.found().items()}
 
 
-def cautions_after(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> list[Caution]:
-    """What a run has shown whose rows are all there."""
-    watch = Watch(loops)
-    watch.begin(table.header)
-    if len(table):
-        watch.take(table.rows)
-    return watch.found()
+def cautions_seen(
+    seen: Mapping[str, float], loop: Loop, value: ValueOf, step: float
+) -> Iterator[Caution]:
+    """What a run has shown of a loop.
 
+    Args:
+        seen: the numbers of :data:`WATCHED` by their names, as far as there are some.
+        loop: that they are of.
+        value: gives the values of parameters.
+        step: of the run [s].
 
-def cautions_seen(seen: Seen, loop: Loop, value: ValueOf, step: float) -> Iterator[Caution]:
-    """What a run in steps of a length [s] has shown of a loop."""
+    """
+    rho_hat, vertical = seen.get("largest_bound", -inf), seen.get("vertical_passed", inf)
     roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
     needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
-    known = map(value, needed) if seen.rho_hat > 0.0 else ()
+    known = map(value, needed) if rho_hat > 0.0 else ()
     numbers = [float(one) for one in known if isinstance(one, int | float)]
     if len(numbers) == len(needed) and min(numbers[:2]) > 0.0:
         eps_t, ell, h_max, *plant = numbers
         lambda_m2 = bounds(Vehicle._make(plant), ell).lambda_m2
-        h_p = min(step, h_max) * robust_rate(seen.rho_hat, eps_t, lambda_m2)
+        h_p = min(step, h_max) * robust_rate(rho_hat, eps_t, lambda_m2)
         if h_p > _REVERSES:
             text = (
-                f"the robust term chatters: with theta_hat[1] up to {seen.rho_hat:.3g} N and {eps} "
+                f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {eps} "
                 f"= {eps_t:g} W its step gain h p is {h_p:.3g}, and above {_REVERSES:g} its sign "
                 "changes in every step; raise eps_t or reduce --step"
             )
             yield Caution(CHATTERING, text)
-    if seen.vertical < inf and value(roll) is False:
+    if vertical < inf and value(roll) is False:
         text = (
-            f"the pitch passes 90 degrees by t = {seen.vertical:g} s, where (1) has a pole: with "
+            f"the pitch passes 90 degrees by t = {vertical:g} s, where (1) has a pole: with "
             f"{roll} = false what follows depends on rounding, so quote no single run; compare "
             f"runs whose {loop.vehicle}.eta0 differs by 1e-6 m, or set {roll} = true"
         )

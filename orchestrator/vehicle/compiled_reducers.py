@@ -3,31 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_void_p, create_string_buffer
-from functools import cache
-from hashlib import sha256
+from functools import cache, partial
 from itertools import chain
-from pathlib import Path
 
 import numpy as np
-from fmpy import platform_tuple, sharedLibraryExtension
 
 from fmus.compilers import EXPORTED, FLAGS, MATHEMATICS
-from fmus.language.build import Untranslatable
 from fmus.native.names import RUNTIME
-from fmus.native.reducer import text_over_rows
 from fmus.ports.reducer import Reducer
-from orchestrator.machine.cache import made_once, read_cached
-from orchestrator.machine.children import compile_text, find_fast_compiler
+from orchestrator.machine.libraries import (
+    compile_text,
+    find_fast_compiler,
+    library_key,
+    load_library,
+)
 from orchestrator.master.experiment import Experiment
+from orchestrator.master.plan import code_of
 from orchestrator.system.values import Value
 
 #: Category in the cache.
 CATEGORY = "indices"
 
-#: Sources of the runtime that the indices include.
-_INCLUDED = ("arithmetic.h", "error.h", "text.c", "host.h")
+#: Where the indices of this product are, and all that makes libraries of them.
+_OURS = "orchestrator.vehicle.index."
+_MADE_OF = ("auv_fmu", "fmus.language", "fmus.native", "fmus.ports", "orchestrator.vehicle")
+
+_OPTIONS = (*FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", *MATHEMATICS)
 
 
 class Raised(ArithmeticError):
@@ -42,30 +44,16 @@ class Raised(ArithmeticError):
 @cache
 def library_of(reducer: Reducer) -> CDLL | None:
     """The library of an index; None: there is none, and no compiler that takes no time."""
-    try:
-        text = text_over_rows(reducer)
-    except Untranslatable:
+    module = reducer.hooks["update"].__module__
+    # To translate takes far longer than to read the code of all that does.
+    made_of = module if module.startswith(_OURS) else _text(reducer)
+    if made_of is None:
         return None
-    digest = sha256("\0".join((text, *FLAGS, platform_tuple)).encode())
-    for name in _INCLUDED:
-        digest.update((RUNTIME / name).read_bytes())
-    key, name = digest.hexdigest()[:24], f"indices{sharedLibraryExtension}"
-    with suppress(OSError):
-        if read_cached(CATEGORY, key) or find_fast_compiler():
-            place = made_once(CATEGORY, key, lambda: {name: _compiled(text)})[name]
-            return _loaded(place)
-    return None
-
-
-def _compiled(text: str) -> bytes:
-    compiler = find_fast_compiler()
-    assert compiler is not None
-    options = (*FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", *MATHEMATICS)
-    return compile_text(compiler, text, *options)
-
-
-def _loaded(place: Path) -> CDLL:
-    library = CDLL(str(place))
+    key = library_key(made_of, code_of(*_MADE_OF), *_OPTIONS)
+    try:
+        library = load_library(CATEGORY, key, "take_rows", partial(_compiled, reducer))
+    except OSError:
+        return None
     library.size_of_rows.restype = c_size_t
     library.why.argtypes, library.why.restype = (c_void_p,), c_char_p
     library.take_rows.argtypes = (
@@ -73,6 +61,28 @@ def _loaded(place: Path) -> CDLL:
     )  # fmt: skip
     library.give_numbers.argtypes = (c_void_p, c_double, c_double, c_void_p)
     return library
+
+
+@cache
+def _text(reducer: Reducer) -> str | None:
+    """An index in C; None: it is outside the language of equations."""
+    # Slow to import, and most runs find what was translated.
+    from fmus.native.reducer import text_over_rows  # noqa: PLC0415
+
+    return text_over_rows(reducer)
+
+
+def _compiled(reducer: Reducer) -> bytes:
+    """The library of an index, compiled now.
+
+    Raises:
+        OSError: it cannot be.
+
+    """
+    compiler, text = find_fast_compiler(), _text(reducer)
+    if compiler is None or text is None:
+        raise OSError(f"{reducer.name} cannot be compiled")
+    return compile_text(compiler, text, *_OPTIONS)
 
 
 class CompiledReduction:

@@ -6,8 +6,7 @@ Rows come in blocks; what is made of them does not depend on the blocks.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from math import isnan
 from typing import Any, NamedTuple
@@ -88,82 +87,6 @@ def _number(port: Port, name: str, value: Any) -> Value:
     return float(value) if port.type == "Real" else value
 
 
-class Kept(NamedTuple):
-    """What a reducer keeps of the rows so far.
-
-    Attributes:
-        state: that its hooks made.
-        before: the last row, as they take it.
-        time: of that row [s].
-
-    """
-
-    state: Any
-    before: Any
-    time: float
-
-
-class _Functions(NamedTuple):
-    """A reducer over rows, from the row of the start and from what is kept."""
-
-    start: Callable[..., Any]
-    go_on: Callable[..., Any]
-
-
-@cache
-def _functions(reducer: Reducer, places: tuple[str, ...], acting_row: int) -> _Functions:
-    """The hooks of a reducer over rows, compiled: a loop over groups takes several times as long.
-
-    Args:
-        reducer: whose hooks they are.
-        places: the names of ports whose values stand in rows, in their order there.
-        acting_row: as :attr:`.Experiment.acting_row` says.
-
-    """
-    names = {port.name: f"x{i}" for i, port in enumerate(reducer.ports)}
-    types = {port.name: port.type for port in reducer.ports}
-    texts = dict(names) | {one: _MADE.get(types[one], _WHOLE).format(names[one]) for one in places}
-    scope: dict[str, Any] = {**SCOPE, **reducer.hooks}
-    inputs = gathered(reducer.inputs, iter(texts.values()), scope)
-    row = "".join(f"{names[one]}, " for one in places)
-    constants = "".join(f"{name}, " for one, name in names.items() if one not in places)
-    given = {"acting": "inputs" if acting_row else "before", "h": "t - time"}
-    start, update = (
-        f"{hook}({', '.join(given.get(one, one) for one in reducer.arguments(hook))})"
-        for hook in ("start", "update")
-    )
-    head = "rows, constants, begin, end, state=None, before=None, time=None"
-    loop = f"({constants}) = constants\n " if constants else ""
-    loop += f"for (t, {row}) in rows:\n  inputs = {inputs}\n  "
-    go_on = f"state = {update}\n  before = inputs\n  time = t\n return state, before, time"
-    return _Functions(
-        compiled(head, f"{loop}return {start}, inputs, t", {**scope}),
-        compiled(head, f"{loop}{go_on}", {**scope}),
-    )
-
-
-def reduce_block(
-    reducer: Reducer, sources: Sources, run: Experiment, rows: np.ndarray, kept: Kept | None = None
-) -> Kept:
-    """What a reducer keeps after some more rows.
-
-    Args:
-        reducer: that takes them.
-        sources: of its inputs.
-        run: that the rows are of.
-        rows: in the order of the places, time first; at least one.
-        kept: before; None: the first of the rows is the one of the start.
-
-    """
-    functions = _functions(reducer, tuple(sources.places), run.acting_row)
-    rest, constants = rows.tolist(), tuple(sources.constants.values())
-    given = constants, run.start_time, run.stop_time
-    if kept is None:
-        kept = Kept(*functions.start(rest[:1], *given))
-        rest = rest[1:]
-    return Kept(*functions.go_on(rest, *given, *kept))
-
-
 def reductions_of(
     reducers: Iterable[Reducer], loops: Sequence[Loop], header: Header
 ) -> dict[Loop, dict[Reducer, Reduction]]:
@@ -186,8 +109,32 @@ class _Interpreted:
     """A reducer of rows in Python."""
 
     def __init__(self, reducer: Reducer, sources: Sources, run: Experiment) -> None:
-        self._reducer, self._sources, self._run = reducer, sources, run
-        self._kept: Kept | None = None
+        self._reducer, self._run = reducer, run
+        self._arguments = {name: reducer.arguments(name) for name in reducer.hooks}
+        names = {port.name: f"x{i}" for i, port in enumerate(reducer.ports)}
+        types = {port.name: port.type for port in reducer.ports}
+        made = {one: _MADE.get(types[one], _WHOLE).format(names[one]) for one in sources.places}
+        scope = {**SCOPE, **{names[one]: value for one, value in sources.constants.items()}}
+        inputs = gathered(reducer.inputs, iter({**names, **made}.values()), scope)
+        row = ", ".join(["time", *(names[one] for one in sources.places)])
+        self._inputs = compiled("row", f"({row},) = row\n return {inputs}", scope)
+        self._state: Any = None
+        self._before: Any = None
+        self._time = run.start_time
+
+    def _call(self, hook: str, t: float, **given: Any) -> Any:
+        """Call a hook.
+
+        Raises:
+            Raised: by the hook.
+
+        """
+        given |= {"state": self._state, "t": t}
+        given |= {"begin": self._run.start_time, "end": self._run.stop_time}
+        try:
+            return self._reducer.hooks[hook](*(given[one] for one in self._arguments[hook]))
+        except Exception as error:
+            raise Raised(f"{type(error).__name__}: {error}", t) from error
 
     def take(self, rows: np.ndarray) -> None:
         """Take some rows into account.
@@ -196,13 +143,16 @@ class _Interpreted:
             Raised: by one of them.
 
         """
-        try:
-            self._kept = reduce_block(self._reducer, self._sources, self._run, rows, self._kept)
-        except Exception as error:
-            # One by one, to say when.
-            for row in rows if len(rows) > 1 else ():
-                self.take(row[np.newaxis])
-            raise Raised(f"{type(error).__name__}: {error}", float(rows[0, 0])) from error
+        for row in rows.tolist():
+            inputs, before, t = self._inputs(row), self._before, row[0]
+            if before is None:
+                self._state = self._call("start", t, inputs=inputs)
+            else:
+                acting = inputs if self._run.acting_row else before
+                self._state = self._call(
+                    "update", t, inputs=inputs, before=before, acting=acting, h=t - self._time
+                )
+            self._before, self._time = inputs, t
 
     def found(self) -> list[float]:
         """The numbers of the results.
@@ -211,14 +161,7 @@ class _Interpreted:
             Raised: by what gives them.
 
         """
-        assert self._kept is not None
-        of = {"state": self._kept.state, "t": self._kept.time}
-        of |= {"begin": self._run.start_time, "end": self._run.stop_time}
-        given = [of[one] for one in self._reducer.arguments("outputs")]
-        try:
-            return [*_flat(self._reducer.hooks["outputs"](*given))]
-        except Exception as error:
-            raise Raised(f"{type(error).__name__}: {error}", self._kept.time) from error
+        return [*_flat(self._call("outputs", self._time))]
 
 
 class Reduction:

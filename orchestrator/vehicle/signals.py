@@ -56,8 +56,8 @@ class Loop:
     #: eta: centre of mass [m] and Euler angles [rad], earth frame.
     position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
     posture = _Group("vehicle", "eta", (*AXES, *EULER))
-    #: nu [m/s, rad/s], body frame; sway and heave, of which nothing is commanded.
-    nu, drift = _Group("vehicle", "nu", DIRECTIONS), _Group("vehicle", "nu", ("v", "w"))
+    #: nu [m/s, rad/s], body frame.
+    nu = _Group("vehicle", "nu", DIRECTIONS)
     #: Velocity of the control point [m/s].
     dy = _Group("vehicle", "dy", AXES)
     #: tau as commanded, and as (3) lets it through [N, N.m].

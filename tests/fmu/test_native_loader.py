@@ -162,7 +162,7 @@ def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path,
 @pytest.mark.xfail(reason="PythonFMU's own start of Python takes no lock that others could take")
 def test_threads_with_fmus_that_have_no_loader(tmp_path: Path):
     """What docs/how-to/hosts/c-program.md warns of."""
-    bundle.build_bundle(tmp_path, "plain")
+    bundle.build_bundle(tmp_path, loader="plain")
     program = host(tmp_path, "threads")
     arguments = unpacked(tmp_path, tmp_path / "plain")[:4]
     for _ in range(REPETITIONS):
@@ -289,12 +289,12 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
 
 
 def test_plain_variant_is_there_on_request(tmp_path: Path):
-    bundle.build_bundle(tmp_path, "plain")
+    bundle.build_bundle(tmp_path, loader="plain")
     assert bundle.settings_of(tmp_path)["loader"] == "plain"
     fmpy.extract(tmp_path / "AuvPlant.fmu", unzipdir=tmp_path / "unpacked")
     libraries = tmp_path / "unpacked/binaries/linux64"
     assert [path.name for path in libraries.iterdir()] == ["AuvPlant.so"]
     fmpy.simulate_fmu(str(tmp_path / "AuvPlant.fmu"), stop_time=0.2)
     assert bundle.build_bundle(tmp_path) == [], "what is there stays as it is"
-    written = bundle.build_bundle(tmp_path, "native")
+    written = bundle.build_bundle(tmp_path, loader="native")
     assert tmp_path / "AuvPlant.fmu" in written

@@ -129,7 +129,7 @@ def workers(
 def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Place, str]]:
     """The same for an FMU without the native loader."""
     folder = tmp_path_factory.mktemp("plain")
-    bundle.build_bundle(folder, "plain")
+    bundle.build_bundle(folder, loader="plain")
     with Worker(trials, *unpacked(folder, folder, PLAIN, "AuvPlant")) as process:
         yield process
 

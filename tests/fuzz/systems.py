@@ -12,7 +12,6 @@ in. Some components refuse: then so does the program, after as many steps.
 from __future__ import annotations
 
 import argparse
-import ctypes
 import json
 import re
 import subprocess
@@ -28,7 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.compilers import FLAGS, compiler_for, machines_compiler
+from fmus.compilers import compiler_for
 from fmus.kinds import NATIVE, PYTHON, platforms
 from fmus.native.packaging import NativeKind
 from fmus.ports.definition import Definition
@@ -71,6 +70,7 @@ from orchestrator.system.names import PortName
 from orchestrator.system.structure import System
 from orchestrator.system.units import Linear, Mapped, Transformation
 from orchestrator.system.values import items_of, type_of
+from support.programs import compiled, play, values_of
 
 #: Components of a pool, and systems that are made of them.
 COMPONENTS, SYSTEMS = 6, 20
@@ -464,46 +464,11 @@ def run_of_fmus(plan: Plan) -> Run:
     return Run(rows, _PLACE.sub("", ending.failure or ""))
 
 
-DOUBLES = ctypes.POINTER(ctypes.c_double)
-
-
-def values_of(text: Text) -> list[float]:
-    """What a program begins with."""
-    system = text.plan.system
-    return [0.0 if (found := system.value(name)) is None else found for name in text.parameters]
-
-
-def run_of_program(text: Text, library: ctypes.CDLL) -> Run:
+def run_of_program(text: Text, path: Path) -> Run:
     """A run of a program."""
-    library.size_of_simulation.restype = ctypes.c_size_t
-    library.begin.argtypes = (
-        ctypes.c_void_p, DOUBLES, *[ctypes.c_double] * 3, ctypes.c_int, ctypes.c_int,
-    )  # fmt: skip
-    experiment, said = text.plan.experiment, (ctypes.c_int * 4)()
-    parameters = (ctypes.c_double * len(text.parameters))(*values_of(text))
-    size = library.size_of_simulation()
-    simulation, ahead = (ctypes.create_string_buffer(size) for _ in range(2))
-    rows = np.zeros((experiment.rows, 1 + len(text.columns)))
-    has_begun = not library.begin(
-        simulation, parameters, experiment.start_time, experiment.step, experiment.stop_time,
-        experiment.full_steps, experiment.rows - 1,
-    )  # fmt: skip
-    outcome = 1
-    if has_begun:
-        place = rows.ctypes.data_as(DOUBLES)
-        for until in (experiment.rows // 3, experiment.rows - 1):
-            outcome = (
-                library.run_with_events(
-                    simulation, ahead, until, place, parameters, 0, None, None, None
-                )
-                if text.alters
-                else library.run(simulation, until, place)
-            )
-            if outcome:
-                break
-    library.failure(simulation, said)
-    refused = (said[0], said[3]) if outcome else None
-    return _told(text, rows[: library.rows_shown(simulation)], has_begun, refused)
+    found = play(text, path)
+    refused = found.refused if found.outcome else None
+    return _told(text, found.rows, found.has_begun, refused)
 
 
 def _told(text: Text, rows: np.ndarray, has_begun: bool, refused: tuple[int, int] | None) -> Run:
@@ -517,20 +482,6 @@ def _told(text: Text, rows: np.ndarray, has_begun: bool, refused: tuple[int, int
     return Run(dict(zip(names, rows.T, strict=True)), failure, has_begun)
 
 
-def compiled(text: str, place: Path, *options: object) -> Path:
-    """A program as a library, or an object if that is what the options say."""
-    place.with_suffix(".c").write_text(text, encoding="utf-8")
-    command = [
-        str(machines_compiler()), *FLAGS[:-2], "-O1", "-fno-math-errno", "-Wall", "-Wextra",
-        "-Wno-unused", "-Wno-unused-parameter",
-        '-DEXPORTED=__attribute__((visibility("default")))', place.with_suffix(".c"), *options,
-        "-o", place, "-lm",
-    ]  # fmt: skip
-    process = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert not process.returncode and not process.stderr, process.stderr[:2000]
-    return place
-
-
 class Ways:
     """The ways in which programs are made of the components of a pool."""
 
@@ -539,20 +490,16 @@ class Ways:
         self._shared = Equations((one.definition for one in made), (), is_tuned=True)
         self._object = compiled(self._shared.apart(), folder / "equations.o", *self._options, "-c")
 
-    def programs(self, of: Drawn, number: int) -> Iterator[tuple[str, Text, ctypes.CDLL]]:
+    def programs(self, of: Drawn, number: int) -> Iterator[tuple[str, Text, Path]]:
         """Programs of a system, each with the name of the way in which it was made."""
         plan, place = of.plan(NATIVE), self._folder / f"{number}"
         text = Text(plan, of.definitions, alters=True, shared=self._shared)
         options = *self._options, self._object, "-shared"
-        yield "alters", text, _loaded(compiled(text.apart(), place.with_suffix(".a.so"), *options))
+        yield "alters", text, compiled(text.apart(), place.with_suffix(".a.so"), *options)
         is_quick = number % 2 == 1
         text = Text(plan, of.definitions, is_tuned=of.is_tuned, is_quick=is_quick)
         library = compiled(text.text(), place.with_suffix(".b.so"), "-shared")
-        yield QUICK if text.is_quick else "careful", text, _loaded(library)
-
-
-def _loaded(path: Path) -> ctypes.CDLL:
-    return ctypes.CDLL(str(path))
+        yield QUICK if text.is_quick else "careful", text, library
 
 
 # The page

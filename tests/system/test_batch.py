@@ -1,11 +1,11 @@
-"""The batch engine: the numbers of the straight line and of the FMUs, bit for bit."""
+"""The batch engine: the numbers of the FMUs, bit for bit."""
 
 from __future__ import annotations
 
 import pickle
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
@@ -16,9 +16,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from auv_fmu.loop.closed_loop import Instant, Setting
-from auv_fmu.loop.closed_loop import closed_loop as straight_line
-from auv_fmu.paper.output_feedback import ControllerState
 from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO
 from orchestrator import sweep
@@ -36,8 +33,7 @@ from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.system.names import port_name
 from orchestrator.system.structure import System
-from parts.straight import setting_of
-from support import others
+from support import largest_depth, others
 from support.runs import prepared, whole
 from support.texts import mentions
 
@@ -46,9 +42,6 @@ pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no
 KIND = "native"
 
 ORDERS = (FEEDTHROUGH, JACOBI)
-
-#: The ready studies of one vehicle.
-STUDIES = [name for name in ready_studies() if name != "formation"]
 
 #: How many runs of each study are tried, and how many steps of each.
 SAMPLES, STEPS = 100, 40
@@ -90,89 +83,6 @@ def bits(rows: np.ndarray) -> np.ndarray:
 
 def changes(values: Mapping[str, Any]) -> dict[Any, Any]:
     return {port_name(name): value for name, value in values.items()}
-
-
-# The straight line
-
-
-#: What is compared with it, in the order of :func:`straight_row`.
-COMPARED = [
-    *(f"plant.eta.{k}" for k in ("x", "y", "z", "phi", "theta", "psi")),
-    *(f"plant.nu.{k}" for k in "uvwpqr"),
-    *(f"plant.{group}.{k}" for group in ("y", "dy") for k in "xyz"),
-    *(f"planner.{group}.{k}" for group in ("y_d", "dy_d", "ddy_d") for k in "xyz"),
-    *(f"plant.tau_applied.{k}" for k in "uqr"),
-    *(f"controller.theta_hat[{i}]" for i in range(1, 5)),
-    *(f"{part}.tau.{k}" for part in ("controller", "plant") for k in "uqr"),
-    *(f"plant.tau_w.{k}" for k in "uvwpqr"),
-]
-
-
-def straight_rows(setting: Setting, steps: int, order: Order | None) -> np.ndarray:
-    """The values of COMPARED in every row."""
-    instants = list(straight_line(steps, setting, order == JACOBI))
-    acting = [instants[0], *instants[:-1]] if order == JACOBI else instants
-    rows = zip(acting, instants, strict=True)
-    return np.array([straight_row(*pair, setting.plant.T) for pair in rows])
-
-
-def straight_row(acting: Instant, now: Instant, T: Sequence[float]) -> list[float]:
-    seen, state = now.scene.plant, acting.controller_state
-    reference = [x for one in now.scene.reference for x in one]
-    # Actuators with a lag give what they have come to.
-    given = zip(T, now.vehicles.plant.tau, acting.tau, strict=True)
-    applied = [reached if lag else tau for lag, reached, tau in given]
-    theta_hat = state.theta_hat if isinstance(state, ControllerState) else state
-    return [
-        *now.vehicles.plant.position, *seen.euler, *seen.nu, *now.scene.y, *seen.dy, *reference,
-        *applied, *theta_hat, *acting.signals.tau, *acting.command, *acting.tau_w,
-    ]  # fmt: skip
-
-
-def compare_with_straight_line(engine: BatchEngine, system: System, point: Point) -> None:
-    table = engine.table(point)
-    setting = setting_of(system.with_parameters(changes(point.parameters)), point.step)
-    straight = straight_rows(setting, len(table) - 1, point.order)
-    found = table.group(*COMPARED)
-    # Where nothing is drawn, what is zero is not of a sign.
-    different = np.argwhere(found != straight)
-    assert not different.size, COMPARED[different[0][1]]
-
-
-@pytest.mark.parametrize("name", STUDIES)
-def test_runs_of_studies_are_those_of_the_straight_line(name):
-    """Every signal after every step."""
-    scenarios = read_study(name).scenario
-    engine, _ = engines(*scenarios)
-    for run in sampled(name):
-        compare_with_straight_line(engine, systems(*scenarios)[run.scenario], run)
-
-
-#: Values that make a difference to how the loop is computed.
-ADDITIONS: list[dict[str, Any]] = [
-    {"controller.saturation": "algebraic"},
-    {"controller.saturation": "arctan", "controller.observer": "exact"},
-    {"controller.observer": "integral", "controller.printed_jacobian": True},
-    {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
-    {"plant.roll": False, "plant.noise.std": 0.001},
-    {"plant.current.x": 0.4, "plant.current.z": -0.2},
-    {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0},
-    {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1},
-    {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01},
-    {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007},
-    {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0},
-]
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("values", ADDITIONS, ids=", ".join)
-def test_additions_are_those_of_the_straight_line(values, order):
-    engine, _ = engines("fig4")
-    point = Point(0, "fig4", values, 2.0, 0.02, order)
-    compare_with_straight_line(engine, systems("fig4")["fig4"], point)
-
-
-# The FMUs
 
 
 @pytest.mark.parametrize("name", ready_studies())
@@ -312,8 +222,22 @@ def test_a_controller_of_ones_own_is_that_of_its_fmu(workplace):
     assert mentions(str(refused.value), "mine: my_law.py changed --engine fmu")
 
 
-#: Values that make a difference to how these are computed.
-OTHER_ADDITIONS: list[tuple[str, dict[str, Any]]] = [
+#: Values that make a difference to how a loop is computed.
+ADDITIONS: list[tuple[str, dict[str, Any]]] = [
+    ("fig4", {"controller.saturation": "algebraic"}),
+    ("fig4", {"controller.saturation": "arctan", "controller.observer": "exact"}),
+    ("fig4", {"controller.observer": "integral", "controller.printed_jacobian": True}),
+    (
+        "fig4",
+        {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
+    ),
+    ("fig4", {"plant.roll": False, "plant.noise.std": 0.001}),
+    ("fig4", {"plant.current.x": 0.4, "plant.current.z": -0.2}),
+    ("fig4", {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0}),
+    ("fig4", {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1}),
+    ("fig4", {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01}),
+    ("fig4", {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007}),
+    ("fig4", {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0}),
     ("path", {"planner.cruise": 0.4, "planner.rounding": 40.0, "plant.water.y": 0.1}),
     ("path", {"planner.timed": True, "planner.count": 4, "planner.waypoint[1].t": 0.01}),
     ("path", {"plant.dwater.x": 0.1}),
@@ -328,8 +252,8 @@ OTHER_ADDITIONS: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(("name", "values"), OTHER_ADDITIONS)
-def test_additions_in_other_systems_are_those_of_the_fmus(name, values, order):
+@pytest.mark.parametrize(("name", "values"), ADDITIONS)
+def test_additions_are_those_of_the_fmus(name, values, order):
     compare_with_fmus(name, Point(0, name, values, 2.01, 0.02, order))
 
 
@@ -474,51 +398,13 @@ def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
 # Engines
 
 
-INDEX = """
-from __future__ import annotations
-
-from math import nan
-from typing import Annotated, NamedTuple
-
-from auv_fmu import Variable
-
-
-class Inputs(NamedTuple):
-    z: Annotated[float, Variable("m", "Depth", name="plant.eta.z")]
-    z_d: Annotated[float, Variable("m", "Reference", name="planner.y_d.z")]
-
-
-class State(NamedTuple):
-    away: float
-    rows: int
-
-
-class Outputs(NamedTuple):
-    settling: Annotated[float, Variable("s", "last time that z is away")]
-    rows: Annotated[float, Variable("1", "rows")]
-
-
-def start(inputs: Inputs, t: float) -> State:
-    return update(State(nan, 0), inputs, t)
-
-
-def update(state: State, inputs: Inputs, t: float) -> State:
-    away = t if abs(inputs.z - inputs.z_d) > 1.0 else state.away
-    return State(away, state.rows + 1)
-
-
-def outputs(state: State) -> Outputs:
-    return Outputs(state.away, float(state.rows))
-"""
-
-
 @pytest.mark.parametrize("name", ["fig4", "formation-v"])
 def test_an_index_of_ones_own_is_that_of_the_fmus(name):
-    own = (OwnIndex("settling", INDEX.encode()),)
-    compare_with_fmus(name, Point(0, name, {}, 10.01, 0.02), own)
-    [outcome] = engines(name, own=own)[0].outcomes([Point(0, name, {}, 10.01, 0.02)])
-    found = {value for key, value in outcome.indices.items() if key.endswith("rows")}
-    assert found == {502.0}
+    own = (OwnIndex("largest_depth", Path(largest_depth.__file__).read_bytes()),)
+    run = Point(0, name, {}, 10.01, 0.02)
+    compare_with_fmus(name, run, own)
+    [outcome] = engines(name, own=own)[0].outcomes([run])
+    assert any(key.endswith("largest_depth") for key in outcome.indices)
 
 
 @pytest.mark.parametrize("name", ["fig4", "formation-v"])
@@ -563,7 +449,7 @@ def test_another_process_finds_the_program_compiled(tmp_path):
         "from orchestrator.program import library\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
-        "library.best_compiler = lambda: sys.exit('it compiles')\n"
+        "library.find_best_compiler = lambda: sys.exit('it compiles')\n"
         "engine = pickle.load(sys.stdin.buffer)\n"
         "print(*engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
     )

@@ -31,6 +31,7 @@ from orchestrator.runs.scenario import names
 from orchestrator.vehicle import compiled_reducers
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
+from support.events import ALL, ENDS
 from support.live import TOLERANCE, needs_npm, needs_zig
 
 #: An installed package has no tests.
@@ -215,75 +216,12 @@ def with_same_functions(folder: Path, place: Path) -> Path:
     return made
 
 
-#: Events of all kinds, at times and conditions, one upon another.
-EVENTS = """
-stop_time = 20.0
-step = 0.01
-[parameters]
-planner.eta0.z = -2.0
-[[events]]
-at = 2.0
-for = 3.0
-override = { controller.tau.u = 15.0 }
-[[events]]
-at = 3.0
-for = 1.0
-bias = { plant.y = 0.2 }
-[[events]]
-at = 3.5
-for = 4.0
-freeze = "planner.y_d"
-[[events]]
-when = "plant.nu.u > 0.2"
-repeat = true
-for = 0.5
-set = { controller.eps_t = 2.0, plant.current.x = 0.1 }
-[[events]]
-at = 5.0
-set = { plant.water = [0.1, 0.2, 0.0] }
-[[events]]
-at = 7.0
-release = "planner.y_d"
-[[events]]
-at = 9.0
-bias = { plant.water.x = 0.3 }
-[[events]]
-at = 10.0
-reset = ["controller"]
-[[events]]
-at = 12.0
-release = "plant.water"
-[[events]]
-at = 15.0
-drop = "plant.y"
-LAST
-"""
-
-#: An event that undoes its own condition, and so happens more often than is listed.
-CHATTERING = """
-[[events]]
-at = 6.0
-set = { plant.water.z = 0.01 }
-[[events]]
-when = "plant.water.z > 0.001"
-repeat = true
-for = 0.01
-override = { plant.water.z = 0.0 }
-"""
-
-
 @pytest.mark.parametrize(
     ("last", "end"),
-    [
-        ('[[events]]\nwhen = "plant.eta.x < 1e9"\nstop = true', 20.0),
-        (CHATTERING, 20.0),
-        ("[[events]]\nat = 18.0\nstop = true", 18.0),
-        ("[[events]]\nat = 18.0\noverride = { disturbance.tau_w.u = 1e300 }", 18.0),
-    ],
-    ids=["whole", "chattering", "stopped", "refused"],
+    [("whole", 20.0), ("chattering", 20.0), ("stopped", 18.0), ("refused", 18.0)],
 )
 def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
-    said, run = both(EVENTS.replace("LAST", last), parts, tmp_path)
+    said, run = both(ALL.replace("LAST", ENDS[last]), parts, tmp_path)
     ending, table = compare(run, said, tmp_path)
     assert table.time[-1] == pytest.approx(end)
     assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]

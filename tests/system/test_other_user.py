@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 import shutil
 import socket
 import subprocess
@@ -75,16 +74,6 @@ def done_by(user: int, what: Callable[[], object]) -> bool:
     return os.waitpid(child, 0)[1] == 0
 
 
-class Mark:
-    """What leaves a mark when it is unpickled."""
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-
-    def __reduce__(self) -> tuple[Callable[[str], int], tuple[str]]:
-        return os.system, (f"touch {self.path}",)
-
-
 @pytest.fixture
 def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A cache of another user's, with what it takes to be taken for ours; where marks are left."""
@@ -95,7 +84,6 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
     forged = Path(mkdtemp())
     monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
     write_cached("loop", stepper.key_of(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
-    write_cached("batch", "0", {"kernel": pickle.dumps(Mark(mark))})
     monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
     for path in (forged, *forged.rglob("*")):
         path.chmod(0o777)
@@ -124,7 +112,7 @@ def test_what_another_user_has_put_into_the_cache_is_not_run(
     assert mentions(line, f"auv-fmu: warning: {open_folder / 'auv-fmu'}")
     assert not planted.exists()
     with pytest.warns(UserWarning, match="only you can write"):
-        assert not read_cached("batch", "0")
+        assert not read_cached("loop", stepper.key_of())
 
 
 def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, open_folder):
@@ -132,7 +120,6 @@ def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, op
     for folder in (open_folder / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)
     assert stepper.load_stepper() is None
-    assert not read_cached("batch", "0")
     assert stepper.compile_stepper().advance
     assert not planted.exists()
 

@@ -21,9 +21,9 @@ import fmpy
 from fmpy.model_description import read_build_description
 
 from orchestrator.machine import cache
-from orchestrator.machine.children import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.libraries import compile_library, find_compiler
 from orchestrator.master.fmi.slaves import slave_class
 from orchestrator.master.fmi.surroundings import restore_mode, within_folder
 from orchestrator.system.component import Component

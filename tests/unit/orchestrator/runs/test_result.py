@@ -17,7 +17,7 @@ import orchestrator
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.figures.drawing import save
-from orchestrator.machine.children import find_compiler
+from orchestrator.machine.libraries import find_compiler
 from orchestrator.system.names import PortName
 from support.tiers import slow
 

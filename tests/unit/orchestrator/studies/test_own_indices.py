@@ -185,17 +185,6 @@ def test_without_a_file_the_name_is_no_number(tmp_path):
         prepare_study(read_study(str(file)), Means(kind="native"))
 
 
-def test_programs_give_what_fmus_give(tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    file, _ = study(tmp_path)
-    results = [
-        sweep(str(file), engine=engine, kind="native", out=tmp_path / engine)
-        for engine in ("fmu", "batch")
-    ]
-    by_fmus, by_programs = (result["settling"] for result in results)
-    assert by_fmus.tobytes() == by_programs.tobytes()
-
-
 def test_figures_without_indices_of_ones_own_stay_as_they_are():
     own = OwnIndex("other", SETTLING.encode())
     figures = {"f": {"kind": "front", "x": "a", "y": "b"}, "labels": {"a": "A"}}

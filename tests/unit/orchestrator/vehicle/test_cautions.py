@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator import simulate
-from orchestrator.vehicle.cautions import VERTICAL, cautions_after
+from orchestrator.vehicle.cautions import VERTICAL, Watch
 
 FIVE = {"plant.roll": False, "plant.noise.std": 0.0}
 
@@ -30,7 +30,10 @@ def pitch(result):
 def test_five_degrees_of_freedom_that_pass_the_vertical_are_told(scenario, parameters, stop_time):
     result = simulate(scenario, parameters, stop_time=stop_time, kind="native")
     beyond = pitch(result) > np.pi / 2
-    said = [one.text for one in cautions_after(result) if one.kind == VERTICAL]
+    watch = Watch()
+    watch.begin(result.header)
+    watch.take(result.rows)
+    said = [one.text for one in watch.found() if one.kind == VERTICAL]
     if "plant.roll" in parameters and beyond.any():
         time = result.time[beyond.argmax()]
         [line] = said

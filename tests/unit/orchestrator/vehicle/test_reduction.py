@@ -16,8 +16,9 @@ from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment, Order
 from orchestrator.master.observers.observer import Header
 from orchestrator.system.names import port_name
-from orchestrator.vehicle import reduction
+from orchestrator.vehicle import compiled_reducers, reduction
 from orchestrator.vehicle.cautions import WATCHED
+from orchestrator.vehicle.compiled_reducers import library_of
 from orchestrator.vehicle.indices import INDICES
 from orchestrator.vehicle.reduction import Reduction, reductions_of, sources_of
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
@@ -118,7 +119,7 @@ def reduced(of: Header, blocks: int = 1, last: float | None = None) -> Reduction
 
 def state(one: Reduction) -> State:
     # These hooks are no equations, so they run in Python.
-    return one._reducing._kept.state
+    return one._reducing._state
 
 
 @pytest.mark.parametrize("blocks", [1, 4, N])
@@ -200,3 +201,11 @@ def test_compiled_indices_are_those_of_their_hooks_in_python(order, blocks, monk
     compiled = found()
     monkeypatch.setattr(reduction, "library_of", lambda reducer: None)
     assert repr(compiled) == repr(found())
+
+
+def test_what_is_compiled_is_found_without_translating_it_again(monkeypatch):
+    [reducer] = {index.reducer for index in INDICES if index.name == "final_error"}
+    if library_of(reducer) is None:
+        pytest.skip("there is no C compiler")
+    monkeypatch.setattr(compiled_reducers, "_text", None)
+    assert library_of.__wrapped__(reducer)
