@@ -199,9 +199,10 @@ class Kind:
             lines.append(f"const {self.emitter.type(type_)} exact = {group};")
             measured = f"{group} = {self._measured('it->draws', 'exact')};"
             lines.append(measured)
-            if self._may_skip:
+            floats = [one.text for one in scalars(type_, group) if one.type == FLOAT]
+            if self._may_skip and floats:
                 # Noise of zero may still change the sign of a zero.
-                zeros = " || ".join(f"{place.text} == 0.0" for place in scalars(type_, group))
+                zeros = " || ".join(f"{one} == 0.0" for one in floats)
                 lines += [
                     f"if (it->undrawn > 0 && ({zeros})) {{",
                     f"    {self.name}_draw(it);",
