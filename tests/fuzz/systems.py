@@ -192,7 +192,7 @@ class Calm(Component):
                 direct = [*fields]
             else:
                 direct = self._some(*fields) if self._random.random() < 0.6 else []
-            if self._is_sampled and not direct:
+            if self._is_sampled and all(fields[one] == EMPTY for one in direct):
                 direct = ["u"]
             names = self._known["parameters"] | self._inputs(direct) | time
             names |= self._known["state"] if guard <= {*direct} else {}
