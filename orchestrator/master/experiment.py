@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import lru_cache
 from math import ceil, floor, gcd, isfinite, lcm, ulp
 from numbers import Real
 from typing import Literal, NamedTuple, TypeAlias, cast, get_args
@@ -166,8 +167,7 @@ class Experiment:
     @property
     def _in_steps(self) -> float:
         """The run in steps; a whole number where it is one apart from rounding."""
-        # However small its share of a step, a run is not empty.
-        return _rounded(max(self._length / self.step, ulp(0.0)))
+        return _in_steps(self._length, self.step)
 
     def reaching(self, time: float) -> int:
         """After how many steps a time [s] has come: the first t_k that is not before it."""
@@ -206,6 +206,13 @@ class Experiment:
             t = end
         if self.has_short_step and made < self.rows - 1:
             yield self.rows - 1, t, self.stop_time - t, self.stop_time
+
+
+# Studies ask again and again.
+@lru_cache
+def _in_steps(length: float, step: float) -> float:
+    # However small its share of a step, a run is not empty.
+    return _rounded(max(length / step, ulp(0.0)))
 
 
 def _rounded(n: float) -> float:

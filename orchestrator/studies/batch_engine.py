@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from itertools import chain
 from math import isnan
 from typing import Any, NamedTuple
@@ -360,5 +360,8 @@ class BatchEngine:
         )
 
 
+_experiments: Callable[..., Experiment] = lru_cache(Experiment)
+
+
 def _experiment(point: Point) -> Experiment:
-    return Experiment(point.stop_time, point.step, point.order, point.start_time)
+    return _experiments(point.stop_time, point.step, point.order, point.start_time)
