@@ -506,7 +506,8 @@ class Text:
 
     def text(self) -> str:
         """All of it."""
-        title = closed(f"{self.plan.system.name}: {listed(self.components)} as one program.")
+        # Without the name of the system: others that are alike have the same program.
+        title = closed(f"{listed(self.components)} as one program.")
         parts = [f"/* {title} */", head_of(self.equations), *self.core(), *self.calls()]
         return "\n\n".join(parts) + "\n"
 
