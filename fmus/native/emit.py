@@ -172,7 +172,6 @@ class Emitter:
     Attributes:
         structures, constants: their texts, by their names.
         names: of the functions.
-        most_copied: how many numbers are copied; a larger structure has its address passed.
 
     """
 
@@ -185,8 +184,11 @@ class Emitter:
 
         """
         functions = [*functions]
-        self.most_copied = most_copied
         self._addressed = {one: _addressed(one, most_copied) for one in functions}
+        self._shared = {
+            one: given | _large_parts(one, given, most_copied)
+            for one, given in self._addressed.items()
+        }
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
         self._types: dict[Type | tuple[str, int], str] = {}
@@ -219,6 +221,10 @@ class Emitter:
     def addressed(self, function: Function) -> frozenset[str]:
         """The arguments of a function that are passed by their addresses."""
         return self._addressed[function]
+
+    def shared(self, function: Function) -> frozenset[str]:
+        """These arguments, and the variables that are parts of them, which are not copied."""
+        return self._shared[function]
 
     # Names
 
@@ -317,9 +323,8 @@ class _Definition:
 
     def __init__(self, emitter: Emitter, function: Function) -> None:
         self._emitter, self._function = emitter, function
-        addressed = emitter.addressed(function)
-        self._parts = _large_parts(function, addressed, emitter.most_copied)
-        self._addressed = addressed | self._parts
+        self._addressed = emitter.shared(function)
+        self._parts = self._addressed - emitter.addressed(function)
 
     def text(self) -> str:
         """All of it."""

@@ -8,9 +8,10 @@ functions that are written here go over it number by number: ints of 32 bits are
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
 from operator import itemgetter
 from string import Formatter
 from textwrap import wrap
@@ -304,7 +305,10 @@ def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
     return _Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
 
 
-def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
+def deepest(
+    functions: Iterable[Function],
+    shared: Callable[[Function], Collection[str]] = lambda function: {function.by_address},
+) -> tuple[int, Function | None]:
     """The most bytes that lie on a thread's stack in a call from outside, and the call of what.
 
     Structures are passed and returned by value, so a function that adds large vectors keeps each
@@ -313,6 +317,7 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
 
     Args:
         functions: each after those that it calls.
+        shared: the arguments and variables of one that are not copied.
 
     """
     depths: dict[Function, int] = {}
@@ -320,9 +325,10 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
         found = [x for one in tree.statements_in(called.body) for x in tree.expressions_of(one)]
         calls = [x for one in found for x in tree.expressions_in(one) if isinstance(x, Call)]
         own = sum(map(_held, found))
-        own += sum(map(_result, tree.variables_in(called.body).values()))
+        named = chain(called.arguments.items(), tree.variables_in(called.body).items())
+        own += sum(_result(type_) for name, type_ in named if name not in shared(called))
         deeper = max((depths[one.function] for one in calls), default=0)
-        depths[called] = _passed(called) + own + deeper
+        depths[called] = own + deeper
     ends = ((depth + _result(one.returns), one) for one, depth in depths.items())
     return max(ends, key=itemgetter(0), default=(0, None))
 
@@ -330,12 +336,6 @@ def deepest(functions: Iterable[Function]) -> tuple[int, Function | None]:
 def _result(type_: Type) -> int:
     """The bytes of a structure; a number lies in a register."""
     return 0 if isinstance(type_, Scalar) else _NUMBER * count(type_)
-
-
-def _passed(function: Function) -> int:
-    """The bytes of the arguments that a function takes by value."""
-    given = function.arguments.items()
-    return sum(_result(type_) for name, type_ in given if name != function.by_address)
 
 
 def _held(one: Expression, within: bool = False) -> int:

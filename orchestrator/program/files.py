@@ -447,7 +447,8 @@ class ProgramFiles:
     def stack(self) -> int:
         """How many bytes of the stack a call takes at most."""
         number = 4 if self.is_single else 8
-        equations = deepest(self.text.emitter.names)[0] * number // 8
+        emitter = self.text.emitter
+        equations = deepest(emitter.names, emitter.shared)[0] * number // 8
         held = (
             2 * number * (count(kind.types["state"]) + count(kind.types["outputs"]))
             for kind in self.text.kinds.values()
