@@ -48,38 +48,39 @@ REFUSED = "refused"
 _Key = tuple[Order | None, tuple[int, ...]]
 
 
-class _Group(NamedTuple):
-    """An index of a loop among the numbers of a program.
-
-    Attributes:
-        columns: its names in the table of a study.
-        first: the place of the first of them.
-
-    """
-
-    columns: Sequence[str]
-    first: int
-
-
 @dataclass(frozen=True)
 class _Ready:
     """The program of a system, as it travels, and what its numbers are.
 
     Attributes:
         source: of the program.
-        groups: of its indices, in the order of the columns.
+        groups: for each index, its columns and their places among the numbers.
         watched: for each loop, the places of what cautions follow from.
 
     """
 
     source: Source
-    groups: Sequence[_Group]
+    groups: Sequence[Mapping[str, int]]
     watched: Sequence[Mapping[str, int]]
 
     @cached_property
     def program(self) -> Program:
         """The program, compiled."""
         return Program(self.source)
+
+    @cached_property
+    def _places(self) -> Mapping[str, int]:
+        return {column: place for group in self.groups for column, place in group.items()}
+
+    def indices(self, numbers: Sequence[float]) -> dict[str, float]:
+        """The indices among the numbers of a run, without those that are not there."""
+        found = {column: numbers[place] for column, place in self._places.items()}
+        if any(map(isnan, found.values())):
+            for group in self.groups:
+                if all(isnan(numbers[place]) for place in group.values()):
+                    for column in group:
+                        del found[column]
+        return found
 
     def __getstate__(self) -> Mapping[str, Any]:
         """Without the library, which each process loads."""
@@ -149,7 +150,7 @@ class _Known:
                     first += len(ports)
             found = (index for index in indices if index.name in places)
             groups += [
-                _Group([f"{prefix}{one}" for one in index.columns], places[index.name])
+                {f"{prefix}{one}": places[index.name] + i for i, one in enumerate(index.columns)}
                 for index in found
             ]
             names = (name for one in WATCHED for name in one.results)
@@ -325,11 +326,7 @@ class BatchEngine:
         indices: dict[str, float] = {}
         if rows is not None:
             indices[SMALLEST_DISTANCE] = float(smallest_of(known.positions(ready, rows)).min())
-        for columns, first in ready.groups:
-            of_one = numbers[first : first + len(columns)]
-            # What is not a number is not there.
-            if not all(map(isnan, of_one)):
-                indices.update(zip(columns, of_one, strict=True))
+        indices |= ready.indices(numbers)
         return Outcome(point.number, indices, None, known.cautions(ready, point, numbers))
 
     def table(self, point: Point) -> Table:
