@@ -39,15 +39,9 @@ class _Group:
         self._role = role
         self._names = tuple(member_name(group, m) if group else m for m in members)
 
-    def __set_name__(self, owner: type[Loop], name: str) -> None:
-        self._name = name
-
     def __get__(self, loop: Loop, owner: type[Loop] | None = None) -> tuple[str, ...]:
         component = getattr(loop, self._role)
-        found = tuple(f"{component}.{name}" for name in self._names)
-        # From now on it is found there.
-        vars(loop)[self._name] = found
-        return found
+        return tuple(f"{component}.{name}" for name in self._names)
 
 
 @dataclass(frozen=True)
