@@ -181,7 +181,8 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
     (tmp_path / "same.wasm").write_bytes(content)
     said = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
-    monkeypatch.setattr(compiled_reducers, "FLAGS", (*FLAGS, "-include", str(SAME_FUNCTIONS)))
+    options = (*compiled_reducers._OPTIONS, "-include", str(SAME_FUNCTIONS))
+    monkeypatch.setattr(compiled_reducers, "_OPTIONS", options)
     compiled_reducers.library_of.cache_clear()
     for room in ("runs.loading", "runs.preparation"):
         monkeypatch.setattr(f"orchestrator.{room}.current_fmus", lambda *_: fmus)
