@@ -11,10 +11,9 @@ class here, and for each of the operators.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import chain
 from typing import Any
 
 from fmus.language.mathematics import FUNCTIONS
@@ -377,18 +376,11 @@ def expressions_in(expression: Expression) -> Iterator[Expression]:
         yield from expressions_in(part)
 
 
-def functions_from(*functions: Function) -> Collection[Function]:
-    """Functions, and all that they call."""
-    found: dict[Function, None] = {}
-    left = [*functions]
-    while left:
-        function = left.pop()
-        if function not in found:
-            found[function] = None
-            expressions = chain.from_iterable(map(expressions_of, statements_in(function.body)))
-            parts = chain.from_iterable(map(expressions_in, expressions))
-            left += [part.function for part in parts if isinstance(part, Call)]
-    return found
+def calls_in(body: Sequence[Statement]) -> Iterator[Call]:
+    """All calls in a block, also those within others."""
+    for statement in statements_in(body):
+        for expression in expressions_of(statement):
+            yield from (one for one in expressions_in(expression) if isinstance(one, Call))
 
 
 def stored_in(statement: Statement) -> list[str]:

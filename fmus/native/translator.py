@@ -323,11 +323,10 @@ def deepest(
     depths: dict[Function, int] = {}
     for called in functions:
         found = [x for one in tree.statements_in(called.body) for x in tree.expressions_of(one)]
-        calls = [x for one in found for x in tree.expressions_in(one) if isinstance(x, Call)]
         own = sum(map(_held, found))
         named = chain(called.arguments.items(), tree.variables_in(called.body).items())
         own += sum(_result(type_) for name, type_ in named if name not in shared(called))
-        deeper = max((depths[one.function] for one in calls), default=0)
+        deeper = max((depths[one.function] for one in tree.calls_in(called.body)), default=0)
         depths[called] = own + deeper
     ends = ((depth + _result(one.returns), one) for one, depth in depths.items())
     return max(ends, key=itemgetter(0), default=(0, None))

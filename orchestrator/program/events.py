@@ -199,7 +199,7 @@ def _restart(text: Text) -> str:
     cases = {
         i: [
             f"feed_{i}(it, now, error);",
-            *([f"it->{member}.is_seeded = 0;"] * bool(text.kind(name).said.draws)),
+            *([f"it->{member}.has_noise = 0;"] * bool(text.kind(name).said.draws)),
             f"return start_{i}(it, t, error);",
         ]
         for i, (name, member) in enumerate(text.members.items())

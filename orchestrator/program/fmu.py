@@ -203,27 +203,25 @@ class Part(NamedTuple):
 
     def put(self, at: int) -> list[str]:
         """Statements that move them into the state, from a place on."""
-        if self.type is None:
-            return [f"model_put_noise(&{self.owner}, to + {at});"]
-        if self._is_block:
-            return [f"memcpy(to + {at}, &{self.owner}, sizeof {self.owner});"]
-        return self._moves(at, "to[{place}] = {member};")
+        block = "memcpy(to + {at}, &{owner}, sizeof {owner});"
+        return self._moved(
+            at, "model_put_noise(&{owner}, to + {at});", block, "to[{place}] = {member};"
+        )
 
     def take(self, at: int) -> list[str]:
         """Statements that move them from there."""
+        block = "memcpy(&{owner}, from + {at}, sizeof {owner});"
+        return self._moved(
+            at, "model_take_noise(&{owner}, from + {at});", block, "{member} = {cast}from[{place}];"
+        )
+
+    def _moved(self, at: int, generator: str, block: str, each: str) -> list[str]:
+        """Statements of one of three forms: of a generator, of a block, and of each number."""
         if self.type is None:
-            return [f"model_take_noise(&{self.owner}, from + {at});"]
-        if self._is_block:
-            return [f"memcpy(&{self.owner}, from + {at}, sizeof {self.owner});"]
-        return self._moves(at, "{member} = {cast}from[{place}];")
-
-    @property
-    def _is_block(self) -> bool:
-        return not isinstance(self.type, Scalar) and has_only_doubles(self.type)
-
-    def _moves(self, at: int, text: str) -> list[str]:
-        assert self.type is not None
-        return [*moves(self.type, self.owner, range(at, at + count(self.type)), text)]
+            return [generator.format(owner=self.owner, at=at)]
+        if not isinstance(self.type, Scalar) and has_only_doubles(self.type):
+            return [block.format(owner=self.owner, at=at)]
+        return [*moves(self.type, self.owner, range(at, at + count(self.type)), each)]
 
 
 class SystemModel:

@@ -156,7 +156,8 @@ class Kind:
         if self.said.draws:
             rows.append(f"double draws[{self.said.draws}];")
             rows.append("int is_noisy; /* whether each draw makes a difference */")
-            rows.append("int is_seeded, undrawn; /* how often numbers are still to be drawn */")
+            rows.append("int has_noise; /* whether it has begun */")
+            rows.append("int undrawn; /* how often numbers are still to be drawn */")
             rows.append("generator noise;")
         body = "\n".join(f"    {row}" for row in rows)
         return (
@@ -241,7 +242,7 @@ class Kind:
         if said.derived:
             lines.append("it->underived = 1;")
         if said.draws:
-            lines += ["if (!it->is_seeded) {", *(f"    {line}" for line in self._seed()), "}"]
+            lines += ["if (!it->has_noise) {", *(f"    {line}" for line in self._seed()), "}"]
         if said.hooks["start"]:
             lines.append(f"it->state = {self.call('start', t='t')};")
             if sound := self.is_sound("it->state"):
@@ -272,7 +273,7 @@ class Kind:
             "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
         ]
         return [
-            "it->is_seeded = 1;",
+            "it->has_noise = 1;",
             "it->noise.place = 0; /* not seeded yet */",
             "it->undrawn = 1;",
             *(

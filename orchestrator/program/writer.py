@@ -14,7 +14,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import chain
 from typing import Any
 
 from auv_fmu.paper import euler
@@ -245,11 +244,12 @@ class Equations:
             one: {name: program.function(hook) for name, hook in hooks[one].items() if hook}
             for one in distinct
         }
-        looks = (one.hooks.values() for one in by_identity.values())
+        looks = (hook for one in by_identity.values() for hook in one.hooks.values())
         self._is_inlined = is_quick
-        self.is_quick = is_quick and not _wait(map(program.function, chain.from_iterable(looks)))
         # What waits for a number would wait for ever for one that is none.
-        waiting = {one for one in distinct if _wait(trees[one].values())}
+        waits = _waiting(program.functions.values())
+        self.is_quick = is_quick and waits.isdisjoint(map(program.function, looks))
+        waiting = {one for one in distinct if not waits.isdisjoint(trees[one].values())}
         checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*distinct}
         self.emitter = Emitter(program.functions.values(), _MOST_COPIED)
         self._euler = {one.__name__: program.function(one) for one in euler}
@@ -1023,11 +1023,19 @@ class Text:
         return bool(types)
 
 
-def _wait(functions: Iterable[tree.Function]) -> bool:
-    """Whether functions, or what they call, may go round in a loop for ever."""
-    bodies = (one.body for one in tree.functions_from(*functions))
-    statements = chain.from_iterable(map(tree.statements_in, bodies))
-    return any(isinstance(one, tree.While) for one in statements)
+def _waiting(functions: Iterable[tree.Function]) -> set[tree.Function]:
+    """Those that may go round in a loop for ever, or call one that may.
+
+    Args:
+        functions: each after those that it calls.
+
+    """
+    found = set[tree.Function]()
+    for one in functions:
+        loops = any(isinstance(part, tree.While) for part in tree.statements_in(one.body))
+        if loops or any(call.function in found for call in tree.calls_in(one.body)):
+            found.add(one)
+    return found
 
 
 def _as(place: Place, value: float) -> float:
