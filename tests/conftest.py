@@ -6,6 +6,7 @@ import os
 import re
 import shutil
 import signal
+import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -106,6 +107,14 @@ def _own_cache(shared: Path) -> None:
     # What that compiler has made of the C libraries takes minutes to make again.
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(user_cache_path("zig", appauthor=False)))
     os.environ["XDG_CACHE_HOME"] = os.environ.get("TESTS_CACHE") or str(shared / "cache")
+
+
+@pytest.fixture(autouse=True)
+def _same_imports() -> Iterator[None]:
+    """Forget the folders that a test imported from: a later one may want a name that is free."""
+    before = [*sys.path], [*sys.path_hooks]
+    yield
+    sys.path[:], sys.path_hooks[:] = before
 
 
 def _copy(fmus: Path, module: str, folder: Path, *options: str, **_: object) -> None:
