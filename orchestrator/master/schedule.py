@@ -20,8 +20,6 @@ from orchestrator.master.row import Gathering, Row
 from orchestrator.master.stages import (
     ALL,
     CHECK,
-    DIRECT,
-    ONLY_STATES,
     RENEW,
     RENEW_ALWAYS,
     Close,
@@ -30,6 +28,7 @@ from orchestrator.master.stages import (
     Reads,
     Visit,
     stages_of,
+    types_read,
 )
 from orchestrator.master.stages import Stage as StageByNames
 from orchestrator.system.component import Component
@@ -200,12 +199,8 @@ def _reading(reads: Reads, instance: Instance, component: Component) -> list[Cal
         return instance.get_outputs
     outputs = component.having("output")
     types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
-    kinds = {(one.type, component.has_feedthrough(one.name)) for one in outputs}
-    return [
-        call
-        for call, of in zip(instance.get_outputs, types, strict=True)
-        if (of, reads == DIRECT) in kinds and not (reads == ONLY_STATES and (of, True) in kinds)
-    ]
+    wanted = types_read(reads, component, (one.name for one in outputs))
+    return [call for call, of in zip(instance.get_outputs, types, strict=True) if of in wanted]
 
 
 def make_stages(

@@ -15,7 +15,7 @@ shown when they pass, or as soon as the component was stepped, unless the order 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Order
@@ -26,8 +26,7 @@ from orchestrator.system.graph import delayed_connections
 from orchestrator.system.names import PortName
 
 #: Which outputs are read: all; those with direct feedthrough; the others, which are states; of
-#: these, the ones that are not read together with the former. A call reads all outputs of a type,
-#: so a type is read if it has any of them, and in the last case if it has no others.
+#: these, the ones that are not read together with the former.
 Reads: TypeAlias = Literal["all", "direct", "states", "only states"]
 READS: tuple[Reads, ...] = get_args(Reads)
 ALL, DIRECT, STATES, ONLY_STATES = READS
@@ -37,6 +36,27 @@ ALL, DIRECT, STATES, ONLY_STATES = READS
 Closing: TypeAlias = Literal["check", "renew", "renew always"]
 CLOSINGS: tuple[Closing, ...] = get_args(Closing)
 CHECK, RENEW, RENEW_ALWAYS = CLOSINGS
+
+
+def types_read(reads: Reads, component: Component, outputs: Iterable[str]) -> set[str]:
+    """The types of FMI whose outputs are read, as a call reads all outputs of a type.
+
+    Args:
+        reads: which outputs are wanted. One is enough to read a type; if those with feedthrough are
+            read elsewhere, it must have none.
+        component: whose outputs they are.
+        outputs: names of them.
+
+    """
+    found: dict[str, set[bool]] = {}
+    for name in outputs:
+        direct = component.has_feedthrough(name)
+        found.setdefault(component.variables[name].type, set()).add(direct)
+    if reads == ALL:
+        return {*found}
+    if reads == ONLY_STATES:
+        return {one for one, direct in found.items() if direct == {False}}
+    return {one for one, direct in found.items() if (reads == DIRECT) in direct}
 
 
 class Visit(NamedTuple):

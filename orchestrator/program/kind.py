@@ -15,7 +15,7 @@ from fmus.language.tree import Function
 from fmus.language.types import FLOAT, Scalar, Type, type_of
 from fmus.native.emit import Emitter, closed, members, number_in_c, unbroken
 from fmus.native.names import in_c
-from fmus.native.pieces import function, initializer, scalars
+from fmus.native.pieces import function, initializer, scalars, structure
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
 from fmus.ports.port import H_MAX, Port
@@ -159,10 +159,7 @@ class Kind:
             rows.append("int has_noise; /* whether it has begun */")
             rows.append("int undrawn; /* how often numbers are still to be drawn */")
             rows.append("generator noise;")
-        body = "\n".join(f"    {row}" for row in rows)
-        return (
-            f"/* {closed(self.definition.summary)} */\ntypedef struct {{\n{body}\n}} {self.name};"
-        )
+        return f"/* {closed(self.definition.summary)} */\n{structure(self.name, rows)}"
 
     def _derive(self, state: str, time: str) -> list[str]:
         if not self.said.derived:

@@ -22,7 +22,7 @@ from fmus.language.build import Program, Untranslatable
 from fmus.language.types import FLOAT, Array, Type, is_whole
 from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
-from fmus.native.pieces import Place, function, scalars
+from fmus.native.pieces import Place, function, scalars, structure
 from fmus.native.reducer import ReducerText
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
@@ -30,7 +30,7 @@ from fmus.ports.reducer import Reducer
 from orchestrator.machine.errors import InputError
 from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
 from orchestrator.master.plan import Plan, stages
-from orchestrator.master.stages import DIRECT, ONLY_STATES, STATES, Stage, Stages, Visit, stages_of
+from orchestrator.master.stages import Stage, Stages, Visit, stages_of, types_read
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind
 from orchestrator.program.reducing import Looking
@@ -540,7 +540,13 @@ class Text:
         ]
 
     def _simulation(self) -> str:
-        rows = [f"{self.kind(name).name} {member};" for name, member in self.members.items()]
+        rows = [
+            "double start_time, step, stop_time;",
+            "int full_steps, steps; /* if there is one more of all steps, it is shorter */",
+            "int made, shown; /* steps, and rows */",
+            "int component, call, port; /* that was refused */",
+            *(f"{self.kind(name).name} {member};" for name, member in self.members.items()),
+        ]
         for name in self.slow:
             kind = self.kind(name)
             rows.append(f"{self.emitter.type(kind.types['outputs'])} {self.members[name]}_shown;")
@@ -556,17 +562,9 @@ class Text:
                 f"double started[{len(self.components)}]; /* when components were [s] */",
                 "int due; /* after how many steps an event needs action */",
             ]
-        body = "\n".join(f"    {row}" for row in rows)
-        return (
-            "/* Everything that a run depends on. */\n"
-            "typedef struct {\n"
-            "    double start_time, step, stop_time;\n"
-            "    int full_steps, steps; /* if there is one more of all steps, it is shorter */\n"
-            "    int made, shown; /* steps, and rows */\n"
-            "    int component, call, port; /* that was refused */\n"
-            f"{body}\n}} simulation;\n\n"
-            f"enum {{ {', '.join(CALLS)} }};"
-        )
+        whole = structure("simulation", rows)
+        calls = f"enum {{ {', '.join(CALLS)} }};"
+        return f"/* Everything that a run depends on. */\n{whole}\n\n{calls}"
 
     # The start
 
@@ -1010,17 +1008,8 @@ class Text:
     def reads(self, visit: Visit) -> bool:
         """Whether one of the outputs is read that the component computes."""
         component = self.plan.system.components[visit.component]
-        # Whether those of each type have feedthrough.
-        types: dict[str, set[bool]] = {}
-        for port in self.kind(visit.component).ports["output"]:
-            types.setdefault(port.type, set()).add(bool(component.has_feedthrough(port.name)))
-        if visit.reads == DIRECT:
-            return any(True in found for found in types.values())
-        if visit.reads == STATES:
-            return any(False in found for found in types.values())
-        if visit.reads == ONLY_STATES:
-            return any(found == {False} for found in types.values())
-        return bool(types)
+        outputs = (port.name for port in self.kind(visit.component).ports["output"])
+        return bool(types_read(visit.reads, component, outputs))
 
 
 def _waiting(functions: Iterable[tree.Function]) -> set[tree.Function]:
