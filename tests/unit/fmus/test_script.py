@@ -80,7 +80,6 @@ def test_names_that_no_module_can_have_are_refused(tmp_path, name, why):
 
 @pytest.mark.parametrize(("stem", "name"), [("own_lag", "OwnLag"), ("ownLag", "OwnLag")])
 def test_source_has_name_page_and_root(tmp_path, monkeypatch, stem, name):
-    monkeypatch.setattr(sys, "path", [*sys.path])
     monkeypatch.delitem(sys.modules, stem, raising=False)
     source = source_of_script(write(tmp_path, name=stem))
     assert (source.name, source.module, source.root) == (name, stem, tmp_path.resolve())

@@ -1101,7 +1101,7 @@ def test_numbers_of_numpy_are_refused(tmp_path: Path):
         c_text({"f": module_of(text, tmp_path, "with_numpy").f})
 
 
-def test_functions_are_files_of_one_folder(tmp_path: Path):
+def test_functions_are_files_of_one_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """What a component's modules import from beside them is translated with it."""
     (tmp_path / "helpers_beside.py").write_text(
         "from __future__ import annotations\n\n\ndef half(x: float) -> float:\n    return x / 2.0\n"
@@ -1110,9 +1110,6 @@ def test_functions_are_files_of_one_folder(tmp_path: Path):
         HEAD
         + "from helpers_beside import half\n\n\ndef f(x: float) -> float:\n    return half(x)\n"
     )
-    sys.path.insert(0, str(tmp_path))
-    try:
-        both = Twins(module_of(text, tmp_path, "with_helpers"), tmp_path)
-    finally:
-        sys.path.remove(str(tmp_path))
+    monkeypatch.syspath_prepend(str(tmp_path))
+    both = Twins(module_of(text, tmp_path, "with_helpers"), tmp_path)
     assert both.c("f", [3.0]).numbers == both.python("f", [3.0]).numbers == (1.5,)
