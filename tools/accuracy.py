@@ -22,15 +22,15 @@ from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import ControllerState
 from fmus.ports.port import H_MAX
 from orchestrator import load, simulate
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import typed
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
 from orchestrator.program.components import definitions_of
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
 
 Values = Mapping[str, Any]

@@ -16,12 +16,12 @@ import numpy as np
 from fmpy.model_description import ModelVariable
 
 from orchestrator import Result, load, simulate
+from orchestrator.cosim.experiment import DELAY, JACOBI
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value, type_of
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import DELAY, JACOBI
 from orchestrator.runs.preparation import DEFAULT_STEP
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, type_of
 
 #: Name of the component that an FMU is alone.
 ALONE = "fmu"

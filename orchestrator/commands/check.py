@@ -12,19 +12,19 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
-from orchestrator.formats.osp import OSP_STRUCTURE
+from orchestrator.cosim.fmi.binary import binary_of, check_binary
+from orchestrator.cosim.formats.osp import OSP_STRUCTURE
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.graph import rings
+from orchestrator.cosim.system.variables import array_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
-from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import load_scenario, outdated
 from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.graph import rings
-from orchestrator.system.variables import array_of
 
 #: What surprises the user of an FMU, by a flag of its description and the value that means it.
 _SURPRISES = {

@@ -9,13 +9,13 @@ from typing import NamedTuple
 import numpy as np
 from fmpy.model_description import ModelVariable
 
-from orchestrator.formats.tables import places_of_time, port_of, records, time_of
+from orchestrator.cosim.experiment import ROUNDING
+from orchestrator.cosim.formats.tables import places_of_time, port_of, records, time_of
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.system.values import Value, cell, type_of
+from orchestrator.cosim.system.variables import array_of
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ROUNDING
-from orchestrator.master.observers.table import Table
-from orchestrator.system.component import Component
-from orchestrator.system.values import Value, cell, type_of
-from orchestrator.system.variables import array_of
 
 
 class Series(NamedTuple):

@@ -12,16 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.formats.tables import (
-    SEPARATORS,
-    Record,
-    places_of_time,
-    port_of,
-    records,
-    time_of,
-)
-from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import (
+from orchestrator.cosim.experiment import (
     DELAY,
     FEEDTHROUGH,
     FULL,
@@ -34,16 +25,25 @@ from orchestrator.master.experiment import (
     Order,
     format_order,
 )
-from orchestrator.master.hooks.events import Event, Events
-from orchestrator.master.hooks.hook import Hook, Run
-from orchestrator.master.observers.observer import Ending, Header, Observer
-from orchestrator.master.plan import check_order, make_plan
-from orchestrator.master.simulation import simulate_to_end
+from orchestrator.cosim.formats.tables import (
+    SEPARATORS,
+    Record,
+    places_of_time,
+    port_of,
+    records,
+    time_of,
+)
+from orchestrator.cosim.hooks.events import Event, Events
+from orchestrator.cosim.hooks.hook import Hook, Run
+from orchestrator.cosim.observers.observer import Ending, Header, Observer
+from orchestrator.cosim.plan import check_order, make_plan
+from orchestrator.cosim.simulation import simulate_to_end
+from orchestrator.cosim.system.graph import rings
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import BOOLEANS, finite, type_of
+from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import DEFAULT_STEP
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.values import BOOLEANS, finite, type_of
 
 #: How far values may differ where nothing else is said.
 TOLERANCE = 1e-6

@@ -16,11 +16,8 @@ from typing import Any, NamedTuple
 
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
-from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
-from orchestrator.live.programs import REDUCERS, Programs
-from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import LINEAR
-from orchestrator.master.hooks.events import (
+from orchestrator.cosim.experiment import LINEAR
+from orchestrator.cosim.hooks.events import (
     Action,
     Alter,
     Event,
@@ -30,6 +27,14 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
+from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.system.graph import rings
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value, items_of, named
+from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
+from orchestrator.live.programs import REDUCERS, Programs
+from orchestrator.machine.errors import InputError
 from orchestrator.program.reducing import looking_at
 from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
@@ -38,11 +43,6 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
-from orchestrator.system.component import Component
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
+from orchestrator.cosim.system.names import file_name, port_name
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
@@ -33,7 +34,6 @@ from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, complete_study
-from orchestrator.system.names import file_name, port_name
 from orchestrator.vehicle.indices import metrics, of_vehicles
 
 #: The parameter that decides whether a run has a twin without noise.

@@ -27,18 +27,18 @@ from fmus.native.reducer import ReducerText
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
+from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
+from orchestrator.cosim.plan import Plan, stages
+from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.graph import rings
+from orchestrator.cosim.system.names import PortName, listed
+from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system.values import items_of
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
-from orchestrator.master.plan import Plan, stages
-from orchestrator.master.stages import Stage, Stages, Visit, stages_of, types_read
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind
 from orchestrator.program.reducing import Looking
-from orchestrator.system.connection import Connection
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName, listed
-from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import items_of
 
 #: What a component has refused, where `failure` names one.
 CALLS = START, INPUT, OUTPUTS, STEP, SET = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP", "AT_SET"

@@ -12,20 +12,20 @@ from typing import Any, TypeVar
 
 from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
+from orchestrator.cosim.experiment import step_of
+from orchestrator.cosim.formats.osp import OSP_STRUCTURE, read_osp
+from orchestrator.cosim.formats.ssp import STRUCTURE
+from orchestrator.cosim.formats.ssp.reader import read_ssp
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.graph import unfed_inputs
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.figures.run_figures import check_figure
-from orchestrator.formats.osp import OSP_STRUCTURE, read_osp
-from orchestrator.formats.ssp import STRUCTURE
-from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import is_folder
-from orchestrator.master.experiment import step_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import Scenario, names, read_scenario, scenario_of
 from orchestrator.runs.wiring import check_built, closed_loop
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.graph import unfed_inputs
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import differing_vehicle
 
 T = TypeVar("T")

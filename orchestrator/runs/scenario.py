@@ -18,15 +18,12 @@ from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.formats.tables import read_columns, read_rows, records
-from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
-from orchestrator.master.experiment import Order
-from orchestrator.master.hooks.timing import InputTable
-from orchestrator.runs import SCENARIOS_FOLDER
-from orchestrator.system.names import PortName, file_name, flatten, for_each, port_name
-from orchestrator.system.structure import System, is_spread
-from orchestrator.system.values import (
+from orchestrator.cosim.experiment import Order
+from orchestrator.cosim.formats.tables import read_columns, read_rows, records
+from orchestrator.cosim.hooks.timing import InputTable
+from orchestrator.cosim.system.names import PortName, file_name, flatten, for_each, port_name
+from orchestrator.cosim.system.structure import System, is_spread
+from orchestrator.cosim.system.values import (
     TYPES,
     Standing,
     StringTable,
@@ -37,6 +34,9 @@ from orchestrator.system.values import (
     type_of,
     typed,
 )
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
+from orchestrator.runs import SCENARIOS_FOLDER
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.

@@ -7,8 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.hooks.events import (
+from orchestrator.cosim.hooks.events import (
     COMPARISONS,
     Action,
     Alter,
@@ -20,11 +19,20 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, flatten, paired, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import TYPES, Value, finite, is_finite, literal, type_of, typed
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName, flatten, paired, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system.values import (
+    TYPES,
+    Value,
+    finite,
+    is_finite,
+    literal,
+    type_of,
+    typed,
+)
+from orchestrator.machine.errors import Findings, InputError
 
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 

@@ -14,20 +14,20 @@ import numpy as np
 from auv_fmu.language.variable import Refusal
 from fmus.ports.definition import Definition
 from fmus.ports.port import Port
+from orchestrator.cosim.experiment import Experiment, Order, decimations
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import code_of, make_plan
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value, items_of, named
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment, Order, decimations
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import code_of, make_plan
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
 from orchestrator.program.reducing import looking_at
 from orchestrator.program.writer import Text
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.studies.own_indices import OwnIndex
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.cautions import (
     WATCHED,
     cautions,

@@ -17,14 +17,14 @@ from typing import Any
 from fmpy.model_description import ModelVariable
 
 from fmus.ports.reducer import Reducer, read_reducer
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import type_of
 from orchestrator.figures.study_values import is_known, names_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, last_line, reason
 from orchestrator.studies.study import Study
 from orchestrator.studies.study_file import LABELS, listed
-from orchestrator.system.structure import System
-from orchestrator.system.values import type_of
 from orchestrator.vehicle.indices import INDICES, Index, index_columns
 from orchestrator.vehicle.reduction import sources_of
 from orchestrator.vehicle.signals import Loop, loops_of

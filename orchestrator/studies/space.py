@@ -12,6 +12,17 @@ from typing import Any
 import numpy as np
 from fmpy.model_description import ModelVariable
 
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import (
+    Value,
+    is_finite,
+    literal,
+    named,
+    type_of,
+    typed,
+    unit_of,
+)
 from orchestrator.machine.errors import Findings, InputError, reason, shortened
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
@@ -27,17 +38,6 @@ from orchestrator.studies.study import (
     Sample,
     Study,
     norm_members,
-)
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import (
-    Value,
-    is_finite,
-    literal,
-    named,
-    type_of,
-    typed,
-    unit_of,
 )
 from orchestrator.vehicle.indices import Index, index_columns, index_units
 from orchestrator.vehicle.signals import loops_of

@@ -16,11 +16,11 @@ import numpy as np
 from auv_fmu.language.quantities import member_of
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer, read_reducer
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.values import named
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import named
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.distances import (
     SMALLEST_DISTANCE,

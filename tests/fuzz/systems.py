@@ -27,8 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.compilers import compiler_for
-from fmus.kinds import NATIVE, PYTHON, platforms
+from fmus.kinds import NATIVE, PYTHON
 from fmus.native.packaging import NativeKind
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX
@@ -53,23 +52,25 @@ from fuzz.components import (
     function,
     names_of,
 )
+from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import Plan, make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.component import Component as Fmu
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection, can_feed
+from orchestrator.cosim.system.graph import rings
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped, Transformation
+from orchestrator.cosim.system.values import items_of, type_of
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source
+from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import Plan, make_plan
-from orchestrator.master.simulation import simulate_plan
+from orchestrator.machine.platforms import platforms
 from orchestrator.program.writer import Equations, Text
-from orchestrator.system.component import Component as Fmu
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection, can_feed
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped, Transformation
-from orchestrator.system.values import items_of, type_of
 from support.programs import compiled, play, values_of
 
 #: Components of a pool, and systems that are made of them.

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.compilers import EXPORTED, FLAGS, machines_compiler
+from orchestrator.cosim.system.values import items_of
+from orchestrator.machine.compilers import EXPORTED, FLAGS, machines_compiler
 from orchestrator.program.writer import Text
-from orchestrator.system.values import items_of
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 

@@ -13,7 +13,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.tables import read_columns, read_rows
+from orchestrator.cosim.formats.tables import read_columns, read_rows
 from orchestrator.runs.result import Result
 from support.texts import mentions
 

@@ -13,19 +13,19 @@ import pytest
 
 from orchestrator.commands import check
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp import STRUCTURE
-from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.cosim.formats.ssp import STRUCTURE
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.graph import unfed_inputs
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names
 from orchestrator.runs.simulate import simulate
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.graph import unfed_inputs
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from support.others import build
 from support.own import write
 from support.texts import mentions

@@ -23,7 +23,7 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
-from orchestrator.formats.tables import read_rows
+from orchestrator.cosim.formats.tables import read_rows
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import record
 from orchestrator.runs.bundle import current_fmus

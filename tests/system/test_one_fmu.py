@@ -21,10 +21,10 @@ from fmpy.validation import validate_fmu
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI
+from orchestrator.cosim.experiment import GAUSS_SEIDEL, JACOBI
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.values import typed
 from orchestrator.runs.result import Result
-from orchestrator.system.names import PortName
-from orchestrator.system.values import typed
 from support.texts import mentions
 
 #: Communication step of the scenarios [s], and how many steps are compared.

@@ -12,19 +12,19 @@ import pytest
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import ORDERS, Experiment, decimations
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import delays, make_plan, stages
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.graph import delayed_connections
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment, decimations
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import delays, make_plan, stages
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.simulate import simulate as simulated
-from orchestrator.system.graph import delayed_connections
-from orchestrator.system.structure import System
 from support.relay import relay, system_of
 from support.runs import whole as run
 from support.texts import mentions

@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.formats.osp import write_osp
+from orchestrator.cosim.formats.ssp.writer import PARAMETER_SET, write_ssp
+from orchestrator.cosim.system.structure import System, flattened
 from orchestrator.exchange.hosts.drivers import write_rows
-from orchestrator.formats.osp import write_osp
-from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
-from orchestrator.system.structure import System, flattened
 
 #: In the folder: what is run, and where files for the tool go.
 GIVEN, _EXPORT = "given", "export"

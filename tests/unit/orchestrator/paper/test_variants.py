@@ -7,6 +7,8 @@ import csv
 import numpy as np
 import pytest
 
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.values import named
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     END_TIMES,
@@ -29,8 +31,6 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.system.names import port_name
-from orchestrator.system.values import named
 from orchestrator.vehicle.signals import STANDARD, tracking_error
 from support.tables import table_of
 from support.variants import (
