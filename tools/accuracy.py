@@ -25,7 +25,6 @@ from orchestrator import load, simulate
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import typed
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
 from orchestrator.program.components import definitions_of
@@ -257,7 +256,7 @@ def _values(system: System, component: str) -> Mapping[str, Any]:
     found: dict[str, Any] = {}
     for variable in system.components[component].having("parameter"):
         name = PortName(component, variable.name)
-        found[variable.name] = typed(str(name), variable, system.value(name))
+        found[variable.name] = variable.typed(system.value(name), str(name))
     return found
 
 

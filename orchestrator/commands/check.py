@@ -16,7 +16,6 @@ from orchestrator.cosim.fmi.binary import binary_of, check_binary
 from orchestrator.cosim.formats.osp import OSP_STRUCTURE
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.graph import rings
-from orchestrator.cosim.system.variables import array_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
@@ -184,8 +183,8 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
                 findings.note(f"start value of {error}")
         seen: dict[tuple[str, int], str] = {}
         for variable in (*component.having("input"), *component.having("parameter")):
-            name = array_of(variable)
-            other = seen.setdefault((variable.type, variable.valueReference), name)
+            name = variable.array
+            other = seen.setdefault((variable.type, variable.reference), name)
             if other != name:
                 findings.note(f"{other} and {name} share a value reference: setting one sets both")
         return component
@@ -194,7 +193,7 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 
 def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
-    if component.left_alone:
+    if component.unsupported:
         yield component.remainder
     if any(variable.type == "Clock" for variable in component.description.modelVariables):
         yield "has Clocks: if it cannot do without them, it ends a run before the first step"

@@ -134,7 +134,7 @@ class _LinearSteps:
                 for connection in system.feeding[instance.name]
                 if component.is_continuous(connection.target.port)
             ]
-            references = [component.variables[target.port].valueReference for target in targets]
+            references = [component.variables[target.port].reference for target in targets]
             self._changing.append((references, [row.columns[target] for target in targets]))
 
     def step(self, t: float, h: float) -> None:

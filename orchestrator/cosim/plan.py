@@ -93,7 +93,7 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     remarks = tuple(
         f"{name}: {component.remainder}"
         for name, component in system.components.items()
-        if component.left_alone
+        if component.unsupported
     )
     rigid = [name for name, component in system.components.items() if not component.takes_any_step]
     period = lcm(*(found[name] for name in rigid))

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from math import inf
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator.cosim.fmi.instance import ComponentFailed, Instance
 from orchestrator.cosim.row import Gathering, Row
@@ -21,7 +20,8 @@ from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import real, type_of
+from orchestrator.cosim.system.values import real
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import shortened
 
 #: A ring is at rest where what arrives at each input differs by no more than this, relatively or
@@ -61,9 +61,9 @@ class _Part:
     gather: Gathering
     block: tuple[np.ndarray, ...]
     unknowns: np.ndarray
-    inputs: list[ModelVariable]
+    inputs: list[Variable]
     sources: np.ndarray
-    outputs: list[ModelVariable]
+    outputs: list[Variable]
 
     def exchange(self) -> None:
         """Set its inputs and read its outputs, also those that are shown later in a step."""
@@ -312,7 +312,7 @@ def why_not_following(component: Component, instance: Instance, row: Row) -> str
         {
             row.columns[PortName(component.name, variable.name)]: variable
             for variable in component.having(causality)
-            if type_of(variable) == "Real"
+            if variable.family == "Real"
         }
         for causality in ("input", "output")
     )
@@ -351,7 +351,7 @@ def _differ(
 def _is_real(system: System, connection: Connection) -> bool:
     """Whether a connection goes from a Real to a Real."""
     return all(
-        type_of(system.components[end.component].variables[end.port]) == "Real"
+        system.components[end.component].variables[end.port].family == "Real"
         for end in (connection.source, connection.target)
     )
 
@@ -363,7 +363,7 @@ def _grain(system: System, connection: Connection) -> float:
     return _GRAIN_OF_FLOAT32 if "Float32" in types else 0.0
 
 
-def _near(held: float, variable: ModelVariable) -> float:
+def _near(held: float, variable: Variable) -> float:
     """A value of an input beside the one that it has."""
     share = _CHANGE_OF_FLOAT32 if variable.type == "Float32" else _CHANGE
     change = share * max(abs(held), abs(_number(variable.nominal, 1.0)) or 1.0)

@@ -7,7 +7,6 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator.cosim.fmi.instance import Instance, Part
 from orchestrator.cosim.system.component import Component
@@ -16,7 +15,7 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of
-from orchestrator.cosim.system.variables import references_of
+from orchestrator.cosim.system.variables import Variable, references_of
 
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12
@@ -207,7 +206,7 @@ def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
     return causality == "output" and component in hidden
 
 
-def _ports(component: Component, causality: str, fmi_type: str) -> list[ModelVariable]:
+def _ports(component: Component, causality: str, fmi_type: str) -> list[Variable]:
     return [variable for variable in component.having(causality) if variable.type == fmi_type]
 
 

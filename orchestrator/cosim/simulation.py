@@ -23,7 +23,7 @@ from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.row import Overrides, Row
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import literal, named, same, unit_of
+from orchestrator.cosim.system.values import literal, same
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
 
@@ -172,7 +172,7 @@ def _parameters(
                     f"{literal(held[port])}"
                 )
         parameters |= {
-            PortName(name, port): named(component.variables[port], held[port]) for port in own
+            PortName(name, port): component.variables[port].shown(held[port]) for port in own
         }
     return parameters
 
@@ -180,8 +180,7 @@ def _parameters(
 def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
     """The units of columns that have one."""
     units = {
-        str(name): unit_of(system.components[name.component].variables[name.port])
-        for name in columns
+        str(name): system.components[name.component].variables[name.port].unit for name in columns
     }
     return {name: unit for name, unit in units.items() if unit is not None}
 

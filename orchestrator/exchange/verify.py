@@ -41,7 +41,7 @@ from orchestrator.cosim.simulation import simulate_to_end
 from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import BOOLEANS, finite, type_of
+from orchestrator.cosim.system.values import BOOLEANS, finite
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import DEFAULT_STEP
 
@@ -167,10 +167,10 @@ def verify(
     check_tolerance(tolerance)
     algorithms = list(ways(system, order, initial))
     outputs = {
-        str(PortName(component.name, variable.name)): type_of(variable)
+        str(PortName(component.name, variable.name)): variable.family
         for component in system.components.values()
         for variable in component.having("output")
-        if type_of(variable) != "String"
+        if variable.family != "String"
     }
     if not outputs:
         raise InputError(f"{system.name}: has no numeric output to compare")

@@ -31,7 +31,7 @@ from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value, items_of, named
+from orchestrator.cosim.system.values import Value
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
@@ -337,15 +337,15 @@ def _parameters(text: Text) -> Iterator[Plain]:
             "name": str(name),
             "type": variable.type,
             "description": variable.description or "",
-            "default": named(variable, start),
-            "value": named(variable, value),
+            "default": variable.shown(start),
+            "value": variable.shown(value),
         }
         if variable.unit and variable.unit != "1":
             found["unit"] = printed_unit(variable.unit)
         for end in ("min", "max"):
             if (limit := getattr(variable, end)) is not None:
                 found[end] = float(limit)
-        if choices := items_of(variable):
+        if choices := variable.items:
             found["choices"] = {choice: int(number) for choice, number in choices.items()}
         yield found
 

@@ -34,7 +34,6 @@ from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName, listed
 from orchestrator.cosim.system.units import Linear, Mapped
-from orchestrator.cosim.system.values import items_of
 from orchestrator.machine.errors import InputError
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind
@@ -448,7 +447,7 @@ class Text:
         value, port = self.plan.system.value(name), self.port(name)
         if isinstance(value, str):
             variable = self.plan.system.components[name.component].variable(name.port)
-            value = int(items_of(variable)[value])
+            value = int(variable.items[value])
         if value is None:
             value = port.start or 0
         types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}

@@ -397,7 +397,7 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
     for name, component in system.components.items():
-        for variable, why in component.left_alone.items():
+        for variable, why in component.unsupported.items():
             if f"{name}.{variable}" in patterns:
                 raise InputError(f"--columns: {name}.{variable} {why}")
     if is_companion:

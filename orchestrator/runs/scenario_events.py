@@ -29,8 +29,6 @@ from orchestrator.cosim.system.values import (
     finite,
     is_finite,
     literal,
-    type_of,
-    typed,
 )
 from orchestrator.machine.errors import Findings, InputError
 
@@ -159,7 +157,7 @@ def _ports(
         raise InputError(
             f"{port} has causality {variable.causality}, not {' or '.join(causalities)}"
         )
-    if type_of(variable) == "String" and "parameter" not in causalities:
+    if variable.family == "String" and "parameter" not in causalities:
         raise InputError(f"{port} is a String: events act only on numbers and Booleans")
     return [port]
 
@@ -209,7 +207,7 @@ def _altered(
 def _value(system: System, port: PortName, route: Connection | None, value: Any) -> Value:
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
-    found = typed(str(port), variable, _text(value))
+    found = variable.typed(_text(value), str(port))
     match route:
         case Connection(transformation=Linear() as change):
             return _arrived(port, route, value, change(float(found)))
@@ -257,13 +255,13 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":
-                inputs.append((port, typed(str(port), variable, _text(one))))
+                inputs.append((port, variable.typed(_text(one), str(port))))
             elif variable.variability != "tunable":
                 raise InputError(
                     f"{port} is a {variable.variability} parameter: it cannot change during a run"
                 )
             else:
-                parameters.append((port, typed(str(port), variable, _text(one))))
+                parameters.append((port, variable.typed(_text(one), str(port))))
     return Set(tuple(parameters), tuple(inputs))
 
 

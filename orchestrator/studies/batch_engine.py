@@ -20,7 +20,7 @@ from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import code_of, make_plan
 from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value, items_of, named
+from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import InputError
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
@@ -193,7 +193,7 @@ class _Known:
         name = self.system.named(port_name(text))
         variable = self.system.components[name.component].variables[name.port]
         port = self._ports[name]
-        return _Parameter(place, port, {key: int(v) for key, v in items_of(variable).items()})
+        return _Parameter(place, port, {key: int(v) for key, v in variable.items.items()})
 
     @cached_property
     def _ports(self) -> Mapping[PortName, Port]:
@@ -347,7 +347,7 @@ class BatchEngine:
             raise InputError(f"{point.scenario}: a component has refused")
         system = known.system.with_parameters(point.parameters)
         parameters = {
-            name: named(variable, system.value(name))
+            name: variable.shown(system.value(name))
             for component in system.components.values()
             for variable in component.having("parameter")
             for name in (PortName(component.name, variable.name),)

@@ -14,11 +14,9 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from fmpy.model_description import ModelVariable
-
 from fmus.ports.reducer import Reducer, read_reducer
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import type_of
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.figures.study_values import is_known, names_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
@@ -188,8 +186,8 @@ def _check_inputs(
             sources = sources_of(own.reducer, loop, places, {})
             for port in own.reducer.ports:
                 variable = variables.get(loop.port(port.name))
-                if variable is not None and type_of(variable) != port.type:
-                    why = f"{port.name} is of the type {type_of(variable)}, not {port.type}"
+                if variable is not None and variable.family != port.type:
+                    why = f"{port.name} is of the type {variable.family}, not {port.type}"
                     raise InputError(f"{path}: {why}")
             if not sources.missing:
                 return
@@ -198,7 +196,7 @@ def _check_inputs(
     raise InputError(f"{path}: {without}")
 
 
-def _variables(system: System) -> Iterator[tuple[str, ModelVariable]]:
+def _variables(system: System) -> Iterator[tuple[str, Variable]]:
     """What rows and parameters of a run are of, by their names."""
     for component in system.components.values():
         for causality in ("output", "input", "parameter"):

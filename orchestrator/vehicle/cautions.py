@@ -21,7 +21,7 @@ from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.graph import reaching
 from orchestrator.cosim.system.names import PortName, listed, port_name
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value, literal, type_of, unit_of
+from orchestrator.cosim.system.values import Value, literal
 from orchestrator.vehicle.index import largest_bound, vertical_passed
 from orchestrator.vehicle.reduction import Reduction, reductions_of
 from orchestrator.vehicle.signals import (
@@ -139,7 +139,7 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     if not system.has(name):
         return None
     variable = system.component(name.component).variables[name.port]
-    is_one = (variable.causality, type_of(variable)) == ("parameter", "Real")
+    is_one = (variable.causality, variable.family) == ("parameter", "Real")
     value = system.value(name) if is_one else None
     return None if value is None else float(value)
 
@@ -292,6 +292,6 @@ def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
             str(source)
             for source in sources
             if source.component in vehicles
-            and unit_of(system.component(source.component).variable(source.port)) in _VELOCITY_UNITS
+            and system.component(source.component).variable(source.port).unit in _VELOCITY_UNITS
         }
     )

@@ -63,7 +63,6 @@ from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped, Transformation
-from orchestrator.cosim.system.values import items_of, type_of
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source
@@ -378,7 +377,7 @@ def _wired(system: System, draw: Random) -> System:
             continue
         for source, output in draw.sample(fitting, min(3, len(fitting))):
             change = _change(output, variable, draw)
-            if change is None and type_of(variable) == "Enumeration" != type_of(output):
+            if change is None and variable.family == "Enumeration" != output.family:
                 continue
             wire = Connection(source, target, change)
             more = replace(system, connections=(*system.connections, wire))
@@ -389,7 +388,7 @@ def _wired(system: System, draw: Random) -> System:
 
 
 def _change(source: Any, target: Any, draw: Random) -> Transformation | None:
-    kinds = type_of(source), type_of(target)
+    kinds = source.family, target.family
     if draw.random() < 0.5:
         return None
     if kinds == ("Real", "Real"):
@@ -397,7 +396,7 @@ def _change(source: Any, target: Any, draw: Random) -> Transformation | None:
     if kinds == ("Boolean", "Boolean"):
         return Mapped(((0, 1), (1, draw.choice((0, 1)))))
     if kinds[1] == "Enumeration":
-        values = [*map(int, items_of(target).values())]
+        values = [*map(int, target.items.values())]
         keys = values if kinds[0] == "Enumeration" else range(-3, 1000)
         return Mapped(tuple((key, draw.choice(values)) for key in keys))
     if kinds[0] != "Real":
@@ -425,14 +424,14 @@ def _parameters(system: System, draw: Random) -> Iterator[tuple[PortName, Any]]:
 
 
 def _value(variable: Any, draw: Random) -> Any:
-    match type_of(variable):
+    match variable.family:
         case "Real":
             return draw.choice((0.0, -0.0, draw.uniform(-3.0, 3.0)))
         case "Boolean":
             return draw.random() < 0.5
         case "Integer":
             return draw.randint(-10, 10)
-    return int(draw.choice([*items_of(variable).values()]))
+    return int(draw.choice([*variable.items.values()]))
 
 
 # Runs

@@ -19,7 +19,7 @@ from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Log, Part
 from orchestrator.cosim.fmi.transfer import CMember
 from orchestrator.cosim.fmi.worker import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
 from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of, is_of
+from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts
 
@@ -178,7 +178,7 @@ class IsolatedInstance:
         if not (isinstance(values, dict) and values.keys() == set(ports)):
             raise self._nonsense()
         variables = self._component.variables
-        if not all(is_of(variables[port], value) for port, value in values.items()):
+        if not all(variables[port].holds(value) for port, value in values.items()):
             raise self._nonsense()
         return values
 

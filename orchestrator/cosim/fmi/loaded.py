@@ -27,7 +27,6 @@ from orchestrator.cosim.fmi.surroundings import restore_mode
 from orchestrator.cosim.fmi.transfer import CMember, CMove, PortBlock, decode_text
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.values import StringTable, Value
-from orchestrator.cosim.system.variables import array_of
 from orchestrator.machine.errors import InputError, reason
 
 #: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
@@ -242,11 +241,11 @@ class LoadedInstance:
     def _arrays(self, ports: Iterable[str]) -> list[list[str]]:
         """The names of some variables, each with those of all others of its array."""
         arrays = self._component.arrays
-        names = dict.fromkeys(array_of(self._variables[port]) for port in ports)
+        names = dict.fromkeys(self._variables[port].array for port in ports)
         return [[v.name for v in arrays[name]] if name in arrays else [name] for name in names]
 
     def _references(self, arrays: Sequence[Sequence[str]]) -> list[int]:
-        return [self._variables[ports[0]].valueReference for ports in arrays]
+        return [self._variables[ports[0]].reference for ports in arrays]
 
     def _whole(
         self, values: Mapping[str, Value], others: Callable[[list[str]], Mapping[str, Value]]
@@ -270,12 +269,12 @@ class LoadedInstance:
         for ports in self._arrays(values):
             variable = self._variables[ports[0]]
             taken = [values[port] for port in ports]
-            self._call("set", variable.type, [variable.valueReference], taken)
+            self._call("set", variable.type, [variable.reference], taken)
 
     def _get(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of a variable, or of all elements of an array."""
         variable = self._variables[ports[0]]
-        values = self._call("get", variable.type, [variable.valueReference], len(ports))
+        values = self._call("get", variable.type, [variable.reference], len(ports))
         if variable.type == "String":
             values = map(decode_text, values)
         elif variable.type == "Boolean":

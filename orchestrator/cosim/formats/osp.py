@@ -15,7 +15,7 @@ from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName, listed
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, conversion, unit_of_port
-from orchestrator.cosim.system.values import Value, literal, type_of, typed
+from orchestrator.cosim.system.values import Value, literal
 from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.user_files import check_file, is_folder, read_archive
 
@@ -260,7 +260,7 @@ def _parameters(
                 variable = components[name].variable(port.port)
                 if stated is None or stated.get("value") is None:
                     raise InputError(f"{port}: an initial value without a value")
-                value = typed(str(port), variable, stated.get("value"))
+                value = variable.typed(stated.get("value"), str(port))
             except InputError as error:
                 archive.problem(error)
                 continue
@@ -269,7 +269,7 @@ def _parameters(
                 why = f"is fed by {fed[port]}" if port in fed else why
                 archive.note(f"{port}: {why}; the value that is given to it has no effect")
                 continue
-            if stated.tag != type_of(variable):
+            if stated.tag != variable.family:
                 archive.note(
                     f"{port}: is given a {stated.tag}, but is a {variable.type} in its FMU"
                 )

@@ -12,12 +12,12 @@ from typing import NamedTuple
 from xml.etree import ElementTree
 
 import fmpy
-from fmpy.model_description import ModelDescription, ModelVariable, ValidationError
+from fmpy.model_description import ModelDescription, ValidationError
 
-from orchestrator.cosim.system.values import Value, finite, integer, real, type_of, typed
+from orchestrator.cosim.system.values import Value, finite, integer, real
 from orchestrator.cosim.system.variables import (
     Terminal,
-    array_of,
+    Variable,
     complete,
     terminals_of,
     variables_of,
@@ -189,27 +189,27 @@ class Component:
         return unpacked_folder(self.fmu, self.digest)
 
     @cached_property
-    def variables(self) -> Mapping[str, ModelVariable]:
+    def variables(self) -> Mapping[str, Variable]:
         """The FMU's variables by name, except the ones that are left alone."""
         return variables_of(self.description).known
 
     @property
-    def left_alone(self) -> Mapping[str, str]:
+    def unsupported(self) -> Mapping[str, str]:
         """Why others cannot be connected, set or recorded, by name."""
-        return variables_of(self.description).left_alone
+        return variables_of(self.description).unsupported
 
     @property
     def remainder(self) -> str:
         """Which variables are left alone, in words."""
-        return f"{shortened(', '.join(self.left_alone))}: not supported, and ignored"
+        return f"{shortened(', '.join(self.unsupported))}: not supported, and ignored"
 
     @cached_property
-    def arrays(self) -> dict[str, list[ModelVariable]]:
+    def arrays(self) -> dict[str, list[Variable]]:
         """The elements of each array, in their order."""
-        found: dict[str, list[ModelVariable]] = {}
+        found: dict[str, list[Variable]] = {}
         for variable in self.variables.values():
             if variable.shape:
-                found.setdefault(array_of(variable), []).append(variable)
+                found.setdefault(variable.array, []).append(variable)
         return found
 
     @cached_property
@@ -257,7 +257,7 @@ class Component:
         of = self.description.coSimulation
         return bool(of.canGetAndSetFMUstate and of.canSerializeFMUstate)
 
-    def variable(self, name: str) -> ModelVariable:
+    def variable(self, name: str) -> Variable:
         """One variable of the FMU.
 
         Raises:
@@ -265,14 +265,14 @@ class Component:
 
         """
         if name not in self.variables:
-            _, left_alone, other_names = variables_of(self.description)
-            if why := left_alone.get(name) or other_names.get(name):
+            _, unsupported, other_names = variables_of(self.description)
+            if why := unsupported.get(name) or other_names.get(name):
                 raise InputError(f"{self.name}.{name} {why}")
             hint = did_you_mean(name, self.variables)
             raise InputError(f"{self.name} has no port or parameter {name!r}{hint}")
         return self.variables[name]
 
-    def elements(self, name: str) -> list[ModelVariable]:
+    def elements(self, name: str) -> list[Variable]:
         """The elements of an array, or a scalar variable.
 
         Raises:
@@ -281,7 +281,7 @@ class Component:
         """
         return self.arrays.get(name) or [self.variable(name)]
 
-    def having(self, causality: str) -> list[ModelVariable]:
+    def having(self, causality: str) -> list[Variable]:
         """The variables of one causality, in the order of the description."""
         return [v for v in self.variables.values() if v.causality == causality]
 
@@ -295,7 +295,7 @@ class Component:
         variable = self.variable(name)
         if variable.start is None:
             return None
-        return typed(f"{self.name}.{name}", variable, variable.start)
+        return variable.typed(variable.start, f"{self.name}.{name}")
 
     @property
     def starts(self) -> Mapping[str, Value]:
@@ -327,7 +327,7 @@ class Component:
     def is_continuous(self, name: str) -> bool:
         """Whether a variable may change at any time (FMI 2.0.4, section 2.2.7)."""
         variable = self.variable(name)
-        return type_of(variable) == "Real" and variable.variability in (None, "continuous")
+        return variable.family == "Real" and variable.variability in (None, "continuous")
 
     def has_feedthrough(self, output: str) -> bool:
         """Whether an output depends on an input of the same instant."""
@@ -347,7 +347,7 @@ def _starts_of(description: ModelDescription) -> Mapping[str, Value]:
     for name, variable in variables_of(description).known.items():
         if variable.start is not None:
             with suppress(InputError):
-                values[name] = typed(name, variable, variable.start)
+                values[name] = variable.typed(variable.start, name)
     return values
 
 
@@ -361,9 +361,7 @@ def _feedthrough_of(description: ModelDescription) -> frozenset[str]:
         and not any(variable.causality == "input" for variable in unknown.dependencies)
     }
     variables = variables_of(description).known.values()
-    return frozenset(
-        v.name for v in variables if v.causality == "output" and array_of(v) not in free
-    )
+    return frozenset(v.name for v in variables if v.causality == "output" and v.array not in free)
 
 
 def read_component(

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
-from orchestrator.cosim.system.values import TYPES, unit_of
+from orchestrator.cosim.system.values import TYPES
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
 
 #: What can be fed from another family of types, besides from its own.
@@ -58,7 +58,7 @@ def check_connection(connection: Connection, component: Callable[[str], Componen
         raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")
     if connection.transformation not in (None, Linear()):
         _check_transformed(connection, b.type)
-    if connection.transformation is not None or unit_of(a) == unit_of(b):
+    if connection.transformation is not None or a.unit == b.unit:
         return
     units = unit_of_port(starts, source.port), unit_of_port(ends, target.port)
     try:
@@ -70,7 +70,7 @@ def check_connection(connection: Connection, component: Callable[[str], Componen
         raise InputError(f"{source} -> {target}: units differ, {names}")
 
 
-def can_feed(source: ModelVariable, target: ModelVariable) -> bool:
+def can_feed(source: Variable, target: Variable) -> bool:
     """Whether a variable takes all values of another, and none is lost on the way."""
     start, end = TYPES[source.type], TYPES[target.type]
     if start.family not in (end.family, *_FED_FROM.get(end.family, ())):

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 
-from fmpy.model_description import ModelVariable
-
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection, can_feed
 from orchestrator.cosim.system.names import PortName, listed
 from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.variables import Variable
 
 #: What each component waits for: the components whose direct feedthrough feeds it.
 _Sources = Mapping[str, Collection[str]]
@@ -328,7 +327,7 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
         for output in component.having("output"):
             giving.setdefault(output.name, []).append(name)
     for name, component in system.components.items():
-        groups: dict[str, list[ModelVariable]] = {}
+        groups: dict[str, list[Variable]] = {}
         for variable in component.having("input"):
             groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
         for group, members in groups.items():
@@ -354,7 +353,7 @@ def unfed_inputs(system: System, settled: Collection[PortName] = ()) -> str | No
     return f"nothing feeds or sets {listed(labels)}{wanted}"
 
 
-def _could_feed(source: Component, variable: ModelVariable) -> bool:
+def _could_feed(source: Component, variable: Variable) -> bool:
     """Whether a component has an output of the name and type of an input."""
     output = source.variables.get(variable.name)
     return output is not None and output.causality == "output" and can_feed(output, variable)

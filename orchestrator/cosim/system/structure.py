@@ -23,7 +23,7 @@ from orchestrator.cosim.system.names import (
     port_name,
     splits,
 )  # fmt: skip
-from orchestrator.cosim.system.values import Value, is_finite, type_of, typed
+from orchestrator.cosim.system.values import Value, is_finite
 from orchestrator.machine.errors import InputError, did_you_mean
 
 #: Values by the names of ports or of groups, taken apart or as text.
@@ -85,7 +85,7 @@ class System:
                 members = listed([str(port) for port in ports])
                 raise InputError(f"{name}: takes a list of {len(ports)} values, for {members}")
             variable = self.component(target.component).variable(target.port)
-            new[target] = typed(str(target), variable, value)
+            new[target] = variable.typed(value, str(target))
         return replace(self, parameters={**self.parameters, **new})
 
     def expanded(self, values: Values) -> dict[PortName, object]:
@@ -184,7 +184,7 @@ class System:
             name: value
             for name, value in self.parameters.items()
             if value != (own := self.component(name.component)).start(name.port)
-            and (not types or type_of(own.variable(name.port)) in types)
+            and (not types or own.variable(name.port).family in types)
         }
 
     @cached_property

@@ -9,7 +9,6 @@ from sys import float_info
 from typing import Any, TypeAlias
 
 from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.values import unit_of
 from orchestrator.machine.errors import InputError
 
 #: Values of a mapping that is made of several.
@@ -127,16 +126,14 @@ def unit_of_port(component: Component, port: str, otherwise: Units | None = None
 
     """
     variable = component.variable(port)
-    name = unit_of(variable)
+    name = variable.unit
     if not name:
         return None
     unit = defined(component, name)
     if unit.exponents is None:
         unit = (otherwise or {}).get(name, unit)
-    declared = variable.declaredType
-    relative = variable.relativeQuantity or (declared is not None and declared.relativeQuantity)
     # A difference of two temperatures has no zero that could be shifted.
-    return replace(unit, offset=0.0) if relative else unit
+    return replace(unit, offset=0.0) if variable.is_relative else unit
 
 
 def conversion(source: Unit | None, target: Unit | None) -> Linear | None:

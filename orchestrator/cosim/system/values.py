@@ -10,9 +10,6 @@ from math import copysign, isclose, isfinite
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
-from fmpy.model_description import ModelVariable
-
-from orchestrator.machine.errors import InputError, shortened
 
 #: A value in the type of its variable.
 Value: TypeAlias = float | int | bool | str
@@ -86,75 +83,6 @@ _ROUNDING = 1e-9
 #: Truth values, as XML writes them.
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
-#: Types in words.
-_IN_WORDS = {
-    "Real": "a real number",
-    "Boolean": "a Boolean (true or false)",
-    "String": "a text in UTF-8",
-}
-
-
-def typed(name: str, variable: ModelVariable, value: object) -> Value:
-    """A value, or its text from a command line or file, in the variable's type.
-
-    Args:
-        name: of the variable in the system, for the message.
-        variable: whose type and range count.
-        value: a number, a truth value or a text.
-
-    Raises:
-        InputError: it is not of that type, not finite, or outside the range of the variable.
-
-    """
-    shown = ""
-    try:
-        text = str(value).strip()
-        shown = f" = {shortened(text)}"
-        if type_of(variable) == "Boolean":
-            return BOOLEANS[text.lower()]
-        if type_of(variable) == "String":
-            return _transferable(str(value))
-        items = items_of(variable)
-        number = real(text) if type_of(variable) == "Real" else integer(items.get(text, text))
-        if items and not any(number == int(value) for value in items.values()):
-            raise ValueError(f"{number} is not an item")
-    except (KeyError, ValueError):
-        # Python itself refuses to write and to read integers of very many digits.
-        names = ", ".join(items_of(variable))
-        words = f"one of {names}" if names else _IN_WORDS.get(type_of(variable), "an integer")
-        raise InputError(f"{name}{shown}: not {words}") from None
-    if isinstance(number, float) and not isfinite(number):
-        raise InputError(f"{name}{shown}: must be finite")
-    lower, upper = _range(variable)
-    if number < lower:
-        raise InputError(f"{name}{shown}: must be at least {_written(lower)}")
-    if number > upper:
-        raise InputError(f"{name}{shown}: must be at most {_written(upper)}")
-    # What the FMU will hold.
-    return ctypes.c_float(number).value if variable.type == "Float32" else number
-
-
-def cell(variable: ModelVariable, value: object, where: str = "") -> Value:
-    """A value of a table: numbers, truth values and names of items as a run or a user writes them.
-
-    Args:
-        variable: whose column it is in; only its type and the names of its items count.
-        value: a number, a truth value or a text.
-        where: it stands, for the message.
-
-    Raises:
-        ValueError: it is neither a finite number nor another value of the type.
-
-    """
-    text, family = str(value), type_of(variable)
-    if family == "String":
-        return _transferable(text)
-    word = text.strip()
-    if family == "Boolean" and word.lower() in BOOLEANS:
-        return BOOLEANS[word.lower()]
-    word = items_of(variable).get(word, word)
-    return finite(word, where) if family == "Real" else whole(word, where)
-
 
 def real(text: str) -> float:
     """A number as every program reads it: only Python takes 1_000, and digits of any script."""
@@ -218,7 +146,7 @@ def _plain(text: str) -> str:
     return text
 
 
-def _transferable(text: str) -> str:
+def transferable(text: str) -> str:
     """A text that FMI can carry: in UTF-8, and ended by the first zero."""
     text.encode()
     if "\0" in text:
@@ -226,47 +154,9 @@ def _transferable(text: str) -> str:
     return text
 
 
-def _range(variable: ModelVariable) -> tuple[float, float]:
-    # What a description says beyond its type no FMU can be given.
-    _, _, least, most = TYPES[variable.type]
-    lower, upper = (None if end is None else _end(end) for end in (variable.min, variable.max))
-    return (
-        least if lower is None else max(least, lower),
-        most if upper is None else min(most, upper),
-    )
-
-
-def _end(text: str) -> float:
-    """An end of a range, exact where it is an integer."""
-    with suppress(ValueError):
-        return integer(text)
-    return real(text)
-
-
-def _written(end: float) -> str:
-    return str(end) if isinstance(end, int) else f"{end:.16g}"
-
-
 def family_of(fmi_type: str) -> str:
     """What FMI 2.0 calls a type, or the one that is its like."""
     return TYPES[fmi_type].family if fmi_type in TYPES else fmi_type
-
-
-def type_of(variable: ModelVariable) -> str:
-    """The family of a variable's type."""
-    return family_of(variable.type)
-
-
-def items_of(variable: ModelVariable) -> dict[str, str]:
-    """The values of an Enumeration by their names, as its description writes them."""
-    declared = variable.declaredType
-    return {} if declared is None else {item.name: item.value for item in declared.items}
-
-
-def named(variable: ModelVariable, value: Any) -> Any:
-    """A value as a user writes it: that of an Enumeration by its name."""
-    names = (name for name, number in items_of(variable).items() if int(number) == value)
-    return next(names, value)
 
 
 def literal(value: Value) -> str:
@@ -279,18 +169,6 @@ def same(wanted: Value, held: Value) -> bool:
     if isinstance(wanted, float) and isinstance(held, float):
         return isclose(wanted, held, rel_tol=_ROUNDING)
     return wanted == held
-
-
-def is_of(variable: ModelVariable, value: object) -> bool:
-    """Whether a value is one that the variable can have."""
-    family = type_of(variable)
-    if isinstance(value, str):
-        # Half of a UTF-16 pair is not text.
-        return family == "String" and value.encode(errors="ignore").decode() == value
-    if type(value) is int:
-        of = TYPES[variable.type]
-        return family in ("Integer", "Enumeration") and of.least <= value <= of.most
-    return type(value) is {"Real": float, "Boolean": bool}.get(family)
 
 
 def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
@@ -315,13 +193,6 @@ def as_float32(numbers: np.ndarray) -> np.ndarray:
     """Numbers as a Float32 holds them; those that are too large for one stay as they are."""
     fit = np.abs(numbers) <= TYPES["Float32"].most
     return np.where(fit, np.where(fit, numbers, 0.0).astype(np.float32), numbers)
-
-
-def unit_of(variable: ModelVariable) -> str | None:
-    """The unit of a variable, its own or its type's."""
-    declared = variable.declaredType
-    unit: str | None = variable.unit or (declared.unit if declared is not None else None)
-    return unit
 
 
 class StringTable:

@@ -54,7 +54,7 @@ class Ran(NamedTuple):
 def real_outputs(system: System) -> list[tuple[str, str, int]]:
     """Component, port and value reference of every Real output."""
     return [
-        (component.name, variable.name, variable.valueReference)
+        (component.name, variable.name, variable.reference)
         for component in system.components.values()
         for variable in component.having("output")
         if variable.type in _NUMBERS

@@ -13,7 +13,7 @@ from orchestrator.cosim.formats.ssp.archive import Archive
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.names import listed
 from orchestrator.cosim.system.units import BASE_UNITS, Unit, Units, unit_of_port
-from orchestrator.cosim.system.values import family_of, integer, items_of, type_of
+from orchestrator.cosim.system.values import family_of, integer
 from orchestrator.cosim.system.variables import MOST_ELEMENTS, element_names
 from orchestrator.machine.errors import InputError
 
@@ -158,8 +158,8 @@ class Leaf:
             return None
         stated = self.connectors.get(name, Connector())
         unit = unit_of_port(self.component, name, self.units) or stated.unit
-        items = {item: int(value) for item, value in items_of(variable).items()} or stated.items
-        return Connector(variable.causality, type_of(variable), unit, items)
+        items = {item: int(value) for item, value in variable.items.items()} or stated.items
+        return Connector(variable.causality, variable.family, unit, items)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
         """The variable of a name.
@@ -170,7 +170,7 @@ class Leaf:
         """
         if self.component is None:
             return
-        if name in self.component.left_alone:
+        if name in self.component.unsupported:
             self.component.variable(name)
         if (connector := self.connector(name)) is not None:
             yield Node(self.way, name), connector
@@ -315,7 +315,7 @@ class Builder:
         """Say where connectors are not what their FMU has."""
         absent = []
         elements = {name for stated in leaf.connectors.values() for name in stated.elements}
-        known = leaf.component.left_alone if leaf.component else {}
+        known = leaf.component.unsupported if leaf.component else {}
         for name, stated in leaf.connectors.items():
             own = leaf.connector(name)
             if name in known or (own is not None and name in elements):

@@ -13,14 +13,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple, TypeAlias
 
-from fmpy.model_description import ModelVariable
-
 from orchestrator.cosim.formats.ssp.hierarchy import Way
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.variables import array_of
+from orchestrator.cosim.system.variables import Variable
 
 #: The systems that a component is in, and its name there.
 Place: TypeAlias = tuple[Way, str]
@@ -67,7 +65,7 @@ class Crossing(NamedTuple):
 
     kind: str
     component: Component
-    variable: ModelVariable
+    variable: Variable
 
 
 @dataclass
@@ -98,7 +96,7 @@ class Nest:
         It is named after the port in all of the system: an identifier, as OMSimulator takes no
         other, and one that no other system has, as it puts those of several systems into one.
         """
-        port = PortName(crossing.component.name, array_of(crossing.variable))
+        port = PortName(crossing.component.name, crossing.variable.array)
         if port in self._crossing:
             return self._crossing[port], False
         name = re.sub(r"\W", "_", str(port), flags=re.ASCII)
@@ -140,7 +138,7 @@ def offers(system: System) -> Iterator[Crossing]:
     for name, component in system.components.items():
         open_inputs = set(system.open_inputs(name))
         for causality in ("input", "output"):
-            ports = {array_of(variable): variable for variable in component.having(causality)}
+            ports = {variable.array: variable for variable in component.having(causality)}
             for array, variable in ports.items():
                 members = {element.name for element in component.elements(array)}
                 if causality == "output" or members <= open_inputs:
@@ -184,7 +182,7 @@ def _route(
     shared = _shared(places[source.component][0], inwards)
     start = _out(top, places[source.component], Crossing("output", component, variable), shared)
     start = _in(top, inwards, start, Crossing("input", component, variable), shared)
-    end = End(last, array_of(system.component(target.component).variable(target.port)))
+    end = End(last, system.component(target.component).variable(target.port).array)
     if not is_whole:
         start = start._replace(indices=_indices(system, source))
         end = end._replace(indices=_indices(system, target))
@@ -199,14 +197,14 @@ def _offer(top: Nest, place: Place, offer: Crossing) -> None:
     if offer.kind == "output":
         top.lines.append(Line(_out(top, place, offer, 0), border))
     else:
-        end = End(local, array_of(offer.variable))
+        end = End(local, offer.variable.array)
         _nests(top, way)[-1].lines.append(Line(_in(top, way, border, offer, 0), end))
 
 
 def _out(top: Nest, place: Place, crossing: Crossing, shared: int) -> End:
     """Lead an output out of all systems that it is in but some; returns where it is then."""
     way, local = place
-    nests, end = _nests(top, way), End(local, array_of(crossing.variable))
+    nests, end = _nests(top, way), End(local, crossing.variable.array)
     for depth in range(len(way), shared, -1):
         name, is_new = nests[depth].cross(crossing)
         if is_new:
@@ -245,7 +243,7 @@ def _indices(system: System, port: PortName) -> str | None:
     variable = system.component(port.component).variable(port.port)
     if not variable.shape:
         return None
-    return port.port.removeprefix(array_of(variable))[1:-1].replace(",", " ")
+    return port.port.removeprefix(variable.array)[1:-1].replace(",", " ")
 
 
 def _whole(
@@ -257,7 +255,7 @@ def _whole(
     source, target = starts.variable(start.port), ends.variable(end.port)
     if not source.shape or source.shape != target.shape:
         return set()
-    members = zip(starts.elements(array_of(source)), ends.elements(array_of(target)), strict=True)
+    members = zip(starts.elements(source.array), ends.elements(target.array), strict=True)
     found = {
         replace(
             connection,

@@ -26,7 +26,7 @@ from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName, listed
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Mapped, Transformation, Unit, combine
-from orchestrator.cosim.system.values import BOOLEANS, Value, integer, real, typed
+from orchestrator.cosim.system.values import BOOLEANS, Value, integer, real
 from orchestrator.machine.errors import Findings, InputError, shortened
 
 #: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
@@ -310,11 +310,11 @@ class _Ports:
             value = whole(_number(port, str(value), isinstance(whole, Mapped)))
         if isinstance(value, float) and value.is_integer() and connector.type != "Real":
             value = int(value)
-        self.parameters[port] = typed(str(port), component.variable(port.port), value)
+        self.parameters[port] = component.variable(port.port).typed(value, str(port))
 
     def _keep_size(self, port: PortName, component: Component, text: str) -> None:
         """Refuse another size of arrays than the one that their FMU describes."""
-        if typed(str(port), component.variable(port.port), text) != component.start(port.port):
+        if component.variable(port.port).typed(text, str(port)) != component.start(port.port):
             raise InputError(f"{port} = {shortened(text)}: sizes of arrays cannot be changed")
 
 

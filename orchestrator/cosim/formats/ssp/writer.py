@@ -12,16 +12,14 @@ from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 from zipfile import ZipFile, ZipInfo
 
-from fmpy.model_description import ModelVariable
-
 from orchestrator.cosim.formats.ssp import LEFT_OPEN, OMS, ORDER, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.cosim.formats.ssp.nesting import End, Line, Nest, nested, offers, order_of
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.names import PortName, file_name, plain_file_names
 from orchestrator.cosim.system.structure import System, flattened
 from orchestrator.cosim.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
-from orchestrator.cosim.system.values import Value, literal, type_of
-from orchestrator.cosim.system.variables import array_of
+from orchestrator.cosim.system.values import Value, literal
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.machine.user_files import read_archive
 
@@ -120,14 +118,14 @@ def parameter_set_xml(
     """Values of one component by the names of its variables, as an SSV."""
     root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")
-    for port in dict.fromkeys(array_of(component.variable(port)) for port in values):
+    for port in dict.fromkeys(component.variable(port).array for port in values):
         members = component.elements(port)
         element = _add(parameters, "ssv:Parameter", name=port)
         texts = [_text(component, member, values) for member in members]
         # Choices are numbers, which OMSimulator takes and at which no other tool ends.
-        is_choice = type_of(members[0]) == "Enumeration"
+        is_choice = members[0].family == "Enumeration"
         value = _add(element, f"ssv:{'Integer' if is_choice else members[0].type}")
-        if not members[0].shape or type_of(members[0]) != "String":
+        if not members[0].shape or members[0].family != "String":
             value.set("value", " ".join(texts))
         else:
             for text in texts:
@@ -136,7 +134,7 @@ def parameter_set_xml(
     return serialised(root, component.name)
 
 
-def _text(component: Component, variable: ModelVariable, values: Mapping[str, Value]) -> str:
+def _text(component: Component, variable: Variable, values: Mapping[str, Value]) -> str:
     """A value as a parameter set has it."""
     value = values.get(variable.name, component.start(variable.name))
     if value is None:
@@ -150,8 +148,8 @@ def _text(component: Component, variable: ModelVariable, values: Mapping[str, Va
     return literal(value)
 
 
-def _add_dimensions(parent: Element, variable: ModelVariable) -> None:
-    for length in variable.shape or ():
+def _add_dimensions(parent: Element, variable: Variable) -> None:
+    for length in variable.shape:
         _add(parent, "ssc:Dimension", size=str(length))
 
 
@@ -215,7 +213,7 @@ def structure_xml(
     fed = {
         PortName(offer.component.name, element.name)
         for offer in offered
-        for element in offer.component.elements(array_of(offer.variable))
+        for element in offer.component.elements(offer.variable.array)
     }
     given = _Given(
         system,
@@ -321,7 +319,7 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
         numbers = {"factor": str(made.factor), "offset": str(made.offset)}
         _add(element, "ssc:LinearTransformation", **numbers)
     elif isinstance(made, Mapped) and made.pairs:
-        fmi_type = type_of(system.component(source.component).variable(source.port))
+        fmi_type = system.component(source.component).variable(source.port).family
         of = bool if fmi_type == "Boolean" else int
         # Numbers of an enumeration are integers as well.
         name = "BooleanMapping" if of is bool else "IntegerMapping"
@@ -371,11 +369,11 @@ def _add_component(
     connectors = _add(element, "ssd:Connectors")
     written = set[str]()
     for variable in component.variables.values():
-        name = array_of(variable)
+        name = variable.array
         # OMSimulator knows no connectors of texts, libcosim none of enumerations, and fmpy feeds an
         # input that no connection ends at from another's source. Parameter sets reach variables
         # without a connector.
-        is_plain = variable.causality != "parameter" or type_of(variable) not in _WITHOUT_CONNECTORS
+        is_plain = variable.causality != "parameter" or variable.family not in _WITHOUT_CONNECTORS
         is_out = PortName(component.name, variable.name) in left_out or name in written
         if variable.causality in ("input", "output", "parameter") and is_plain and not is_out:
             written.add(name)
@@ -385,12 +383,12 @@ def _add_component(
 
 
 def _add_connector(
-    connectors: Element, name: str, kind: str, variable: ModelVariable, unit: str | None
+    connectors: Element, name: str, kind: str, variable: Variable, unit: str | None
 ) -> None:
     connector = _add(connectors, "ssd:Connector", name=name, kind=kind)
     stated = {"unit": unit} if unit else {}
-    if type_of(variable) == "Enumeration" and variable.declaredType is not None:
-        stated = {"name": variable.declaredType.name}
+    if variable.enumeration is not None:
+        stated = {"name": variable.enumeration}
     _add(connector, f"ssc:{variable.type}", **stated)
     _add_dimensions(connector, variable)
 
@@ -404,18 +402,18 @@ def _add_geometry(element: Element, position: int) -> None:
 
 def _add_enumerations(root: Element, system: System) -> None:
     enumerations = {
-        variable.declaredType.name: variable.declaredType.items
+        variable.enumeration: variable.items
         for component in system.components.values()
         for variable in component.variables.values()
-        if type_of(variable) == "Enumeration" and variable.declaredType is not None
+        if variable.enumeration is not None
     }
     if not enumerations:
         return
     parent = _add(root, "ssd:Enumerations")
     for name in sorted(enumerations):
         element = _add(parent, "ssc:Enumeration", name=name)
-        for item in enumerations[name]:
-            _add(element, "ssc:Item", name=item.name, value=str(item.value))
+        for item, value in enumerations[name].items():
+            _add(element, "ssc:Item", name=item, value=value)
 
 
 def _add_units(root: Element, system: System) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim.system.names import port_name
-from orchestrator.cosim.system.values import named
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     END_TIMES,
@@ -311,4 +310,4 @@ def test_every_option_changes_the_system(scenario, option):
         changed = system.with_parameters({port_name(name): value})
         variable = system.component(port_name(name).component).variable(port_name(name).port)
         assert changed.value(port_name(name)) != system.value(port_name(name))
-        assert named(variable, changed.value(port_name(name))) == value
+        assert variable.shown(changed.value(port_name(name))) == value

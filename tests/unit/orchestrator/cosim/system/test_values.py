@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from math import nextafter
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,20 +14,20 @@ from orchestrator.cosim.system.values import (
     StringTable,
     are_of,
     is_finite,
-    is_of,
     literal,
     same,
-    typed,
 )
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
 from support.texts import mentions
 
-_SLOW, _FAST = SimpleNamespace(name="slow", value="2"), SimpleNamespace(name="fast", value="5")
-_SPEED = SimpleNamespace(items=[_SLOW, _FAST])
+_SPEED = {"slow": "2", "fast": "5"}
 
 
-def variable(kind: str, lower: str | None = None, upper: str | None = None, declared=None):
-    return SimpleNamespace(type=kind, min=lower, max=upper, declaredType=declared)
+def variable(
+    kind: str, lower: str | None = None, upper: str | None = None, items=MappingProxyType({})
+):
+    return Variable("x", kind, min=lower, max=upper, items=items or {})
 
 
 FLOATS = st.floats(allow_nan=False, allow_infinity=False)
@@ -39,28 +38,28 @@ TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"
 @given(FLOATS)
 def test_a_real_comes_back_from_its_text_bit_for_bit(value):
     for kind in ("Real", "Float64"):
-        found = typed("x", variable(kind), literal(value))
+        found = variable(kind).typed(literal(value), "x")
         assert struct.pack("d", found) == struct.pack("d", value)
-    assert is_of(variable("Real"), value)
+    assert variable("Real").holds(value)
 
 
 @given(INTEGERS, st.booleans(), TEXTS)
 def test_other_values_come_back_from_their_texts(number, truth, text):
     for kind, value in (("Integer", number), ("Int32", number), ("Boolean", truth)):
-        found = typed("x", variable(kind), literal(value))
+        found = variable(kind).typed(literal(value), "x")
         assert (type(found), found) == (type(value), value)
-        assert is_of(variable(kind), value)
-    assert typed("x", variable("Boolean"), str(truth).upper()) is truth
-    assert typed("x", variable("String"), literal(text)) == text
-    assert is_of(variable("String"), text)
+        assert variable(kind).holds(value)
+    assert variable("Boolean").typed(str(truth).upper(), "x") is truth
+    assert variable("String").typed(literal(text), "x") == text
+    assert variable("String").holds(text)
 
 
 def test_an_item_of_an_enumeration_may_be_named():
     for text in ("fast", "5", 5):
-        assert typed("x", variable("Enumeration", declared=_SPEED), text) == 5
+        assert variable("Enumeration", items=_SPEED).typed(text, "x") == 5
     for wrong in ("faster", 3, "0"):
         with pytest.raises(InputError) as error:
-            typed("x", variable("Enumeration", declared=_SPEED), wrong)
+            variable("Enumeration", items=_SPEED).typed(wrong, "x")
         assert mentions(str(error.value), f"x {wrong} slow fast")
 
 
@@ -95,7 +94,7 @@ def test_an_item_of_an_enumeration_may_be_named():
 )
 def test_what_the_variable_cannot_have_is_refused_by_name(of, value, words):
     with pytest.raises(InputError) as error:
-        typed("x", of, value)
+        of.typed(value, "x")
     assert mentions(str(error.value), f"x {words}")
 
 
@@ -104,15 +103,15 @@ def test_limits_themselves_are_taken():
         (variable("Real", "0", "2.5"), (0.0, 2.5)),
         (variable("Integer", "-9999999999", "9999999999"), (-(2**31), 2**31 - 1)),
     ):
-        assert tuple(typed("x", of, value) for value in limits) == limits
+        assert tuple(of.typed(value, "x") for value in limits) == limits
 
 
 def test_a_value_of_another_type_is_none_of_the_variable():
     values = {"Real": 1.0, "Integer": 1, "Boolean": True, "String": "1"}
     for kind in values:
-        assert [name for name, value in values.items() if is_of(variable(kind), value)] == [kind]
-    assert not is_of(variable("String"), "\udc80")
-    assert not is_of(variable("Integer"), 2**31)
+        assert [name for name, value in values.items() if variable(kind).holds(value)] == [kind]
+    assert not variable("String").holds("\udc80")
+    assert not variable("Integer").holds(2**31)
     ends = (-(2.0**31), 2.0**31 - 1)
     tried = np.array([ends[0] - 1, *ends, ends[1] + 1, 0.5])
     assert tried[are_of("Integer", tried)].tolist() == list(ends)
@@ -143,8 +142,8 @@ def test_an_integer_comes_back_from_the_row_whatever_its_size(values):
 
 def test_a_float32_is_what_the_fmu_will_hold():
     # 0.1 rounded to 24 bits: IEEE 754.
-    assert typed("x", variable("Float32", "0", "0.1"), "0.1") == 13421773 / 2**27
-    assert typed("x", variable("Float32"), "1e-50") == 0.0
+    assert variable("Float32", "0", "0.1").typed("0.1", "x") == 13421773 / 2**27
+    assert variable("Float32").typed("1e-50", "x") == 0.0
 
 
 @given(st.lists(TEXTS), st.lists(TEXTS))

@@ -61,6 +61,6 @@ def test_what_is_no_port_is_refused_by_name(component, name, words):
 
 
 def test_sizes_are_not_set_and_ranges_hold(component):
-    assert [*component.left_alone] == ["b", "c", "of_c", "none"]
+    assert [*component.unsupported] == ["b", "c", "of_c", "none"]
     assert not component.is_settable("n") and component.is_settable("u[1]")
     assert (component.variable("k").min, component.variable("k").max) == ("5", "9")
