@@ -24,9 +24,7 @@ from support.texts import mentions
 _SPEED = {"slow": "2", "fast": "5"}
 
 
-def variable(
-    kind: str, lower: str | None = None, upper: str | None = None, items=MappingProxyType({})
-):
+def variable(kind: str, lower: str | None = None, upper: str | None = None, items=None):
     return Variable("x", kind, min=lower, max=upper, items=items or {})
 
 
