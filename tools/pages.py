@@ -37,9 +37,9 @@ from auv_fmu.proof.gain_conditions import at_least, coupling
 from fmus.discovery import components, source_of
 from fmus.documentation import component_page
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
-from orchestrator.cosim.formats.schema import TomlTable, entries
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
+from orchestrator.machine.schema import TomlTable, entries
 from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile

@@ -24,13 +24,12 @@ from orchestrator.commands.streams import FAILED, OK, describe, say, show
 from orchestrator.cosim.experiment import INITIAL, ORDERS, read_order
 from orchestrator.cosim.formats.osp import write_osp
 from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.system.names import listed
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.components import definitions_of
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu

@@ -30,7 +30,6 @@ from orchestrator.cosim.schedule import (
     schedule,
     step_members,
 )
-from orchestrator.cosim.system.graph import has_feedthrough, rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError, StartError, shortened
@@ -186,7 +185,7 @@ class Coupling:
         self.plan, self._exchange = plan, exchange
         self._system, self._experiment = plan.system, plan.experiment
         self._instances, self._row, self._log = instances, row, log
-        self._rings = [self._ring(names) for names in rings(plan.system)]
+        self._rings = [self._ring(names) for names in plan.system.rings()]
         self._solved: list[Ring] = []
         self.sequence: list[list[str]] = []
 
@@ -247,7 +246,7 @@ class Coupling:
             for connection in self._system.connections
             if connection.source.component in ring_of
             and ring_of[connection.source.component] == ring_of.get(connection.target.component)
-            and has_feedthrough(self._system, connection)
+            and self._system.has_feedthrough(connection)
         ]
 
     def _order_taken(self) -> Order:
@@ -268,7 +267,7 @@ class Coupling:
             # Ours do what they declare, also where nothing happens to follow, as in a calm sea.
             if component.is_ours or component.digest in tried:
                 continue
-            if not has_feedthrough(self._system, connection):
+            if not self._system.has_feedthrough(connection):
                 continue
             tried.add(component.digest)
             if why := why_not_following(component, self._instances[component.name], self._row):
@@ -292,7 +291,7 @@ class Coupling:
             for name, n in self.plan.decimations.items():
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
-        solved = rings(system, system.components.keys() - reasons.keys())
+        solved = system.rings(system.components.keys() - reasons.keys())
         if coupling == SOLVE:
             for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
                 raise InputError(f"coupling solve: {delay}")

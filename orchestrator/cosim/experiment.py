@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
-from math import ceil, floor, gcd, isfinite, lcm, ulp
+from math import ceil, floor, isfinite, ulp
 from numbers import Real
 from typing import Literal, NamedTuple, TypeAlias, cast, get_args
 
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 
 #: Orders in which values pass and components are stepped; the first is the default where the FMUs
@@ -39,9 +36,6 @@ ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 
 #: More steps than this are taken for a mistake.
 MOST_STEPS = 1_000_000_000
-
-#: So many times a common measure of steps may go into the smallest of them.
-_MOST_PARTS = 1000
 
 
 def read_order(text: str) -> Order:
@@ -219,66 +213,3 @@ def _rounded(n: float) -> float:
     """A number of steps; a whole number where it is one apart from rounding."""
     nearest = round(n)
     return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
-
-
-def decimations(system: System, step: float) -> dict[str, int]:
-    """How many communication steps one step of each component spans.
-
-    Args:
-        system: that says which steps its components want.
-        step: the communication step [s].
-
-    Raises:
-        InputError: a component's step is not a multiple of it.
-
-    """
-    found = dict.fromkeys(system.components, 1)
-    for name, own in system.steps.items():
-        system.component(name)
-        number = isinstance(own, Real) and not isinstance(own, bool)
-        if not (number and isfinite(own) and own > 0.0):
-            raise InputError(f"step of {name} {own!r}: must be a positive number of seconds")
-        n = max(round(min(own / step, MOST_STEPS + 1.0)), 1)
-        if abs(own / step - n) > ROUNDING * n:
-            raise InputError(
-                f"{name} needs steps of {own:g} s, which are not a multiple of the communication "
-                f"step of {step:g} s"
-            )
-        found[name] = n
-    return found
-
-
-def with_common_step(system: System) -> System:
-    """A system that names no communication step with the longest that all components' fit.
-
-    They are the ones that it names for them, or else the FMUs name; it names none if neither does.
-
-    Raises:
-        InputError: they have none in common.
-
-    """
-    own = {name: step_of(component) for name, component in system.components.items()}
-    steps = {name: step for name, step in own.items() if step is not None} | dict(system.steps)
-    if not steps:
-        return system
-    return replace(system, steps=steps, step=_common_measure(steps.values()))
-
-
-def step_of(component: Component) -> float | None:
-    """The step that an FMU was made for [s]; None: it does not say."""
-    step = component.experiment("stepSize")
-    return step if step is not None and step > 0.0 else None
-
-
-def _common_measure(steps: Iterable[float]) -> float:
-    """The longest step of which all are multiples [s]: of the numbers as they are written."""
-    exact = [Fraction(str(step)) for step in steps]
-    denominator = lcm(*(step.denominator for step in exact))
-    common = Fraction(gcd(*(int(step * denominator) for step in exact)), denominator)
-    if min(exact) > _MOST_PARTS * common:
-        listed = ", ".join(f"{float(step):g}" for step in sorted(set(exact)))
-        raise InputError(
-            f"the components need steps of {listed} s, which have no common divisor; give a "
-            "communication step that divides all of them"
-        )
-    return float(common)

@@ -19,16 +19,11 @@ first in the system, which takes what feeds it at t_k.
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from hashlib import sha256
 from importlib.metadata import version
-from importlib.util import find_spec
 from math import lcm
-from pathlib import Path
 from platform import python_version
 
 from orchestrator.cosim.experiment import (
@@ -38,24 +33,12 @@ from orchestrator.cosim.experiment import (
     LINEAR,
     Experiment,
     Order,
-    decimations,
 )
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.graph import (
-    delayed_connections,
-    derived_order,
-    has_feedthrough,
-    in_stages,
-)
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError, shortened
-
-#: Packages whose versions the rows depend on.
-PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
-
-#: All that decides the numbers of a run: by names in words, each as text.
-Identity = Mapping[str, str]
+from orchestrator.machine.identity import PACKAGES, Identity, code_of
 
 
 @dataclass(frozen=True)
@@ -89,7 +72,7 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     check_order(system, experiment.order)
     if experiment.coupling == LINEAR:
         _check_linear(system)
-    found = decimations(system, experiment.step)
+    found = system.decimations(experiment.step)
     remarks = tuple(
         f"{name}: {component.remainder}"
         for name, component in system.components.items()
@@ -146,9 +129,9 @@ def stages(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -
         others = [name for name in system.components if name not in ringed]
         return [others, *map(list, solved)] if others else list(map(list, solved))
     if isinstance(order, str):
-        return in_stages(system, derived_order(system, solved), solved)
+        return system.in_stages(system.derived_order(solved), solved)
     check_order(system, order)
-    return in_stages(system, order, solved)
+    return system.in_stages(order, solved)
 
 
 def check_order(system: System, order: Order | None) -> None:
@@ -191,7 +174,7 @@ def delays(
     if not isinstance(order, str) or order == JACOBI:
         return []
     late: dict[str, list[PortName]] = {}
-    for connection in delayed_connections(system, derived_order(system, solved), solved):
+    for connection in system.delayed_connections(system.derived_order(solved), solved):
         late.setdefault(connection.target.component, []).append(connection.source)
     found = []
     for name, sources in late.items():
@@ -229,7 +212,7 @@ def gathered_connections(
             continue
         source, target = stage_of[start], stage_of[end]
         # An output without feedthrough is a state, and must be read before any component advances.
-        at_once = latest or (order != JACOBI and has_feedthrough(system, connection))
+        at_once = latest or (order != JACOBI and system.has_feedthrough(connection))
         there = order == FEEDTHROUGH or (at_once and source < target)
         found[target if there else 0].append(connection)
     return found
@@ -275,28 +258,3 @@ def _parameters(system: System) -> dict[str, str]:
         for name, value in system.parameters.items()
         if repr(value) != repr(system.components[name.component].starts.get(name.port))
     }
-
-
-def differences(one: Identity, other: Identity) -> list[str]:
-    """What makes two runs two, by the names of an identity."""
-    return sorted(dict(one.items() ^ other.items()))
-
-
-def digest_of(*identities: Identity) -> str:
-    """An identity, or several in their order, as a short text."""
-    return sha256(json.dumps(identities, sort_keys=True).encode()).hexdigest()
-
-
-@cache
-def code_of(*packages: str) -> str:
-    """Digest of the code of some packages, in Python and C."""
-    digest = sha256()
-    for package in packages:
-        specification = find_spec(package)
-        assert specification is not None and specification.submodule_search_locations
-        [root] = specification.submodule_search_locations
-        found = (path for path in Path(root).rglob("*") if path.suffix in (".c", ".h", ".py"))
-        for path in sorted(found):
-            digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
-            digest.update(path.read_bytes())
-    return digest.hexdigest()

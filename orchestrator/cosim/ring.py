@@ -20,9 +20,9 @@ from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import real
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import shortened
+from orchestrator.machine.texts import real
 
 #: A ring is at rest where what arrives at each input differs by no more than this, relatively or
 #: absolutely; what brings it nearer is done until it is within rounding.

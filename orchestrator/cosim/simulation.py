@@ -23,9 +23,10 @@ from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.row import Overrides, Row
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import literal, same
+from orchestrator.cosim.system.values import same
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
+from orchestrator.machine.texts import literal
 
 
 # What overflows on its way is named as the value of a port.

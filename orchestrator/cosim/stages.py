@@ -22,7 +22,6 @@ from orchestrator.cosim.experiment import FEEDTHROUGH, JACOBI, Order
 from orchestrator.cosim.plan import Plan, gathered_connections
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.graph import delayed_connections
 from orchestrator.cosim.system.names import PortName
 
 #: Which outputs are read: all; those with direct feedthrough; the others, which are states; of
@@ -240,7 +239,7 @@ def _passing_first(
     }
     # Whatever takes an output with direct feedthrough then, takes what follows from the inputs of
     # this step.
-    late = {one.source.component for one in delayed_connections(plan.system, [*place], rings)}
+    late = {one.source.component for one in plan.system.delayed_connections([*place], rings)}
 
     def stepped(name: str) -> Visit:
         if not direct[name]:

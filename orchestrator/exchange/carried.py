@@ -25,12 +25,12 @@ from orchestrator.cosim.hooks.timing import Playback
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_to_end
-from orchestrator.cosim.system.names import PortName, listed
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import finite
 from orchestrator.exchange.series import Series, comparison, read_series
 from orchestrator.exchange.verify import TOLERANCE, check_tolerance, enumerated
-from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.errors import Findings, InputError, listed
+from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors
 from orchestrator.runs.loading import first_given, read_fmu
 from orchestrator.runs.scenario import with_input_table

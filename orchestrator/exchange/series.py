@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.cosim.experiment import ROUNDING
-from orchestrator.cosim.formats.tables import places_of_time, port_of, records, time_of
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
+from orchestrator.runs.tables import places_of_time, port_of, records, time_of
 
 
 class Series(NamedTuple):

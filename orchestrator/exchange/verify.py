@@ -25,25 +25,17 @@ from orchestrator.cosim.experiment import (
     Order,
     format_order,
 )
-from orchestrator.cosim.formats.tables import (
-    SEPARATORS,
-    Record,
-    places_of_time,
-    port_of,
-    records,
-    time_of,
-)
 from orchestrator.cosim.hooks.events import Event, Events
 from orchestrator.cosim.hooks.hook import Hook, Run
 from orchestrator.cosim.observers.observer import Ending, Header, Observer
 from orchestrator.cosim.plan import check_order, make_plan
 from orchestrator.cosim.simulation import simulate_to_end
-from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import BOOLEANS, finite
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.texts import BOOLEANS, finite
 from orchestrator.runs.preparation import DEFAULT_STEP
+from orchestrator.runs.tables import SEPARATORS, Record, places_of_time, port_of, records, time_of
 
 #: How far values may differ where nothing else is said.
 TOLERANCE = 1e-6
@@ -254,7 +246,7 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
         if names != tuple(order):
             return
     # Other tools solve rings, or delay them.
-    for coupling in (None, DELAY) if rings(system) else (None,):
+    for coupling in (None, DELAY) if system.rings() else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)
         for one in ORDERS if order is None else (order,):
             named = format_order(one)

@@ -13,9 +13,9 @@ import numpy as np
 
 from fmus.kinds import AUTO, KindName
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import code_of, digest_of
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import code_of, digest_of
 from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
 from orchestrator.runs.folder import open_ledger

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.cosim.system.names import file_name, port_name
+from orchestrator.cosim.system.names import port_name
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.file_names import file_name
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import (
     escape_markdown,

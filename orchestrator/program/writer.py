@@ -31,10 +31,9 @@ from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Ord
 from orchestrator.cosim.plan import Plan, stages
 from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.graph import rings
-from orchestrator.cosim.system.names import PortName, listed
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.units import Linear, Mapped
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind
 from orchestrator.program.reducing import Looking
@@ -379,7 +378,7 @@ class Text:
 
         """
         system = self.plan.system
-        if closed_rings := rings(system):
+        if closed_rings := system.rings():
             names = listed(closed_rings[0])
             raise Unsupported(
                 f"direct feedthroughs of {names} form a ring, which no program can have"

@@ -12,12 +12,10 @@ from typing import Any, TypeVar
 
 from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
-from orchestrator.cosim.experiment import step_of
 from orchestrator.cosim.formats.osp import OSP_STRUCTURE, read_osp
 from orchestrator.cosim.formats.ssp import STRUCTURE
 from orchestrator.cosim.formats.ssp.reader import read_ssp
 from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.graph import unfed_inputs
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.run_figures import check_figure
@@ -180,7 +178,7 @@ def read_fmu(path: Path, findings: Findings | None = None) -> System:
         connections=(),
         start_time=component.experiment("startTime"),
         stop_time=component.experiment("stopTime"),
-        step=step_of(component),
+        step=component.step,
     )
 
 
@@ -238,7 +236,7 @@ def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
     if len(system.components) == 1:
         # No other one could feed it.
         return []
-    found = unfed_inputs(system, given), differing_vehicle(system)
+    found = system.unfed_inputs(given), differing_vehicle(system)
     return [text for text in found if text is not None]
 
 

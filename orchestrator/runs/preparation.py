@@ -13,7 +13,6 @@ from orchestrator.cosim.experiment import (
     GAUSS_SEIDEL,
     SOLVE,
     Experiment,
-    with_common_step,
 )
 from orchestrator.cosim.fmi.isolated import Isolation, isolation_of
 from orchestrator.cosim.hooks.events import Alter, Event, Events, Set
@@ -21,11 +20,12 @@ from orchestrator.cosim.hooks.hook import Hook
 from orchestrator.cosim.hooks.timing import InputTable, Playback, check_factor
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.cosim.observers.observer import Ending, Observer
-from orchestrator.cosim.plan import Identity, Plan, identity, make_plan
+from orchestrator.cosim.plan import Plan, identity, make_plan
 from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.names import port_name, role_of
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.identity import Identity
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
@@ -158,7 +158,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     system = replace(system, steps={**system.steps, **request.steps})
     step = first_given(request.step, scenario.step, system.step)
     if step is None:
-        system = with_common_step(system)
+        system = system.with_common_step()
         step = DEFAULT_STEP if system.step is None else system.step
     order = request.order or scenario.order or None
     coupling = first_given(request.coupling, scenario.coupling)

@@ -28,7 +28,7 @@ from orchestrator.cosim.hooks.checkpoint import check_every
 from orchestrator.cosim.loop import LOOPS, LoopName
 from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
 from orchestrator.cosim.observers.observer import check_interval
-from orchestrator.cosim.system.values import literal
+from orchestrator.machine.texts import literal
 
 
 class CliOption:

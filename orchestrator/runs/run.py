@@ -25,13 +25,13 @@ from orchestrator.cosim.observers.observer import (
     matches,
     matching,
 )
-from orchestrator.cosim.system.names import file_name
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.file_names import file_name
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, Ledger
 from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files

@@ -18,21 +18,18 @@ from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim.experiment import Order
-from orchestrator.cosim.formats.tables import read_columns, read_rows, records
 from orchestrator.cosim.hooks.timing import InputTable
-from orchestrator.cosim.system.names import PortName, file_name, flatten, for_each, port_name
+from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.cosim.system.structure import System, is_spread
-from orchestrator.cosim.system.values import (
-    TYPES,
-    Standing,
-    StringTable,
-    Value,
-    finite,
-)
+from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.file_names import file_name
+from orchestrator.machine.schema import flatten
+from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.runs import SCENARIOS_FOLDER
+from orchestrator.runs.tables import read_columns, read_rows, records
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
@@ -433,3 +430,21 @@ def _plain(name: str) -> str:
 
 def _are_of_waypoints(names: Sequence[str]) -> bool:
     return sorted(map(_plain, names)) in (_PLACE, _TIMED)
+
+
+def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with an entry for each name in the place of one with a star; others win.
+
+    Args:
+        star: that stands for a name, in keys, and in texts that are their values.
+        names: that it stands for.
+        table: by texts that may have it.
+
+    """
+    found = {
+        key.replace(star, name): value.replace(star, name) if isinstance(value, str) else value
+        for name in names
+        for key, value in table.items()
+        if star in key
+    }
+    return found | {key: value for key, value in table.items() if star not in key or not names}

@@ -20,17 +20,13 @@ from orchestrator.cosim.hooks.events import (
     Stop,
 )
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, flatten, paired, port_name
+from orchestrator.cosim.system.names import PortName, paired, port_name
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
-from orchestrator.cosim.system.values import (
-    TYPES,
-    Value,
-    finite,
-    is_finite,
-    literal,
-)
+from orchestrator.cosim.system.values import TYPES, Value
 from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.schema import flatten
+from orchestrator.machine.texts import finite, is_finite, literal
 
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 

@@ -14,14 +14,15 @@ import numpy as np
 from auv_fmu.language.variable import Refusal
 from fmus.ports.definition import Definition
 from fmus.ports.port import Port
-from orchestrator.cosim.experiment import Experiment, Order, decimations
+from orchestrator.cosim.experiment import Experiment, Order
 from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import code_of, make_plan
+from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
 from orchestrator.program.reducing import looking_at
@@ -126,7 +127,7 @@ class _Known:
 
         """
         if (order, step) not in self._found:
-            key = order, tuple(decimations(self.system, step).values())
+            key = order, tuple(self.system.decimations(step).values())
             if key not in self._ready:
                 self._ready[key] = self._written(order, step)
             self._found[order, step] = self._ready[key]

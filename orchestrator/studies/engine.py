@@ -15,10 +15,11 @@ from typing import Any, NamedTuple, Protocol
 
 from orchestrator.cosim.experiment import Order
 from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, choose_loop
-from orchestrator.cosim.plan import code_of, make_plan
+from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.system.names import port_name
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import code_of
 from orchestrator.machine.user_files import read_archive
 from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.own_indices import OwnIndex

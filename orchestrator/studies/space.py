@@ -13,13 +13,10 @@ import numpy as np
 
 from orchestrator.cosim.system.names import port_name
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import (
-    Value,
-    is_finite,
-    literal,
-)
+from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import Findings, InputError, reason, shortened
+from orchestrator.machine.texts import is_finite, literal
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario

@@ -21,9 +21,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.cosim.plan import differences
 from orchestrator.figures.study_values import CAUTION, FAILURE, SCENARIO
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.identity import differences
 from orchestrator.machine.ledger import Ledger, move_aside
 from orchestrator.runs.folder import open_ledger
 from orchestrator.studies.engine import Outcome

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.cosim.experiment import OrderName
-from orchestrator.cosim.system.names import file_name
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.file_names import file_name
 from orchestrator.machine.user_files import names_in, read_text
 
 #: What makes the runs; the first is the default.

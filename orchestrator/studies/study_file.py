@@ -15,10 +15,8 @@ import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from orchestrator.cosim.experiment import ORDERS
-from orchestrator.cosim.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
-from orchestrator.cosim.system.names import flatten, port_name
+from orchestrator.cosim.system.names import port_name
 from orchestrator.cosim.system.structure import is_spread
-from orchestrator.cosim.system.values import is_finite
 from orchestrator.figures.study_values import (
     CHARTS,
     INFLUENCE,
@@ -27,6 +25,8 @@ from orchestrator.figures.study_values import (
     is_known,
 )
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, flatten, needed
+from orchestrator.machine.texts import is_finite
 from orchestrator.machine.user_files import explain_errors, find_toml, read_text
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (

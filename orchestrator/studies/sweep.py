@@ -17,12 +17,12 @@ from typing import Annotated, Any, NamedTuple
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.cosim.experiment import LINEAR
 from orchestrator.cosim.loop import LOOPS, LoopName
-from orchestrator.cosim.observers.observer import progress_bar
-from orchestrator.cosim.plan import PACKAGES
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.identity import PACKAGES
+from orchestrator.machine.progress import progress_bar
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared

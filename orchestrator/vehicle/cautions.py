@@ -18,10 +18,11 @@ from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from fmus.ports.reducer import read_reducer
 from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.graph import reaching
-from orchestrator.cosim.system.names import PortName, listed, port_name
+from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value, literal
+from orchestrator.cosim.system.values import Value
+from orchestrator.machine.errors import listed
+from orchestrator.machine.texts import literal
 from orchestrator.vehicle.index import largest_bound, vertical_passed
 from orchestrator.vehicle.reduction import Reduction, reductions_of
 from orchestrator.vehicle.signals import (
@@ -284,9 +285,7 @@ def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
     vehicles = {connection.target.component for connection in system.fed.get(loop.controller, ())}
     if isinstance(loop, AllocatedLoop):
         vehicles = vehicles - {loop.allocation} | {loop.vehicle}
-    sources = (
-        connection.source for connection in reaching(system, loop.controller, until=vehicles)
-    )
+    sources = (connection.source for connection in system.reaching(loop.controller, until=vehicles))
     return sorted(
         {
             str(source)

@@ -12,9 +12,9 @@ import numpy as np
 from fmus.native.names import RUNTIME
 from fmus.ports.reducer import Reducer
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.plan import code_of
 from orchestrator.cosim.system.values import Value
 from orchestrator.machine.compilers import EXPORTED, FLAGS, MATHEMATICS
+from orchestrator.machine.identity import code_of
 from orchestrator.machine.libraries import (
     compile_text,
     find_fast_compiler,

@@ -59,7 +59,6 @@ from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.component import Component as Fmu
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection, can_feed
-from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped, Transformation
@@ -381,7 +380,7 @@ def _wired(system: System, draw: Random) -> System:
                 continue
             wire = Connection(source, target, change)
             more = replace(system, connections=(*system.connections, wire))
-            if not rings(more) and not any(more.problems()):
+            if not more.rings() and not any(more.problems()):
                 system = more
                 break
     return system

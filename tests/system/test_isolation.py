@@ -20,7 +20,6 @@ import pytest
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.formats.tables import read_rows
 from orchestrator.cosim.loop import choose_loop
 from orchestrator.cosim.observers.observer import Header
 from orchestrator.cosim.observers.table import Table
@@ -29,6 +28,7 @@ from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError, StartError
+from orchestrator.runs.tables import read_rows
 from orchestrator.runs.wiring import closed_loop
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents, start

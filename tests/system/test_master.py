@@ -20,7 +20,6 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.binary import check_place
 from orchestrator.cosim.formats.ssp.reader import read_ssp
 from orchestrator.cosim.formats.ssp.writer import ssp_bytes
-from orchestrator.cosim.formats.tables import read_columns, read_rows
 from orchestrator.cosim.loop import choose_loop
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan, stages
@@ -31,6 +30,7 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
+from orchestrator.runs.tables import read_columns, read_rows
 from support.machine import LOOPS
 from support.runs import run, write
 from support.texts import mentions

@@ -18,13 +18,13 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.formats.tables import read_columns, read_rows
 from orchestrator.cosim.plan import make_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.studies.engine import FmuEngine, Point
 from support.others import build, system_of
 from support.texts import mentions

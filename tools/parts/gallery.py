@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from orchestrator.cosim.system.names import flatten
 from orchestrator.figures.run_figures import FLEET
 from orchestrator.figures.study_values import Values
+from orchestrator.machine.schema import flatten
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import LABELS, FigureTable, read_study

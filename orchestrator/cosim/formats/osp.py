@@ -12,11 +12,12 @@ from orchestrator.cosim.formats.ssp.archive import Archive
 from orchestrator.cosim.formats.ssp.writer import serialised
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, listed
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, conversion, unit_of_port
-from orchestrator.cosim.system.values import Value, literal
-from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.cosim.system.values import Value
+from orchestrator.machine.errors import Findings, InputError, listed, reason
+from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import check_file, is_folder, read_archive
 
 #: The versions of FMI that libcosim knows and we can write.

@@ -20,7 +20,8 @@ from orchestrator.cosim.hooks.hook import NEVER, Run
 from orchestrator.cosim.observers.observer import Occurrence
 from orchestrator.cosim.row import Row
 from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.values import Value, literal, same
+from orchestrator.cosim.system.values import Value, same
+from orchestrator.machine.texts import literal
 
 #: Comparisons, as a scenario writes them.
 COMPARISONS: Mapping[str, Callable[[Any, float], bool]] = {

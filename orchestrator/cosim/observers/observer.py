@@ -6,15 +6,12 @@ step that ended there, and the inputs that this step was made with.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from ctypes import Structure, c_size_t, c_void_p
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
-from importlib import import_module
-from importlib.util import find_spec
 from time import monotonic
 from typing import Any, NamedTuple, Protocol
 
@@ -24,6 +21,7 @@ from orchestrator.cosim.experiment import ROUNDING, Experiment
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.values import Standing, as_float32
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
+from orchestrator.machine.progress import progress_bar
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2
@@ -331,12 +329,6 @@ def matches(name: str, pattern: str) -> bool:
     escaped = pattern.replace("[", "[[]")
     is_member = name.startswith((f"{pattern}.", f"{pattern}["))
     return name == pattern or is_member or fnmatchcase(name, escaped)
-
-
-def progress_bar(**options: Any) -> Any:
-    """A bar of tqdm: a widget in a notebook that has widgets, else a line on a terminal."""
-    is_widget = "ipykernel" in sys.modules and find_spec("ipywidgets") is not None
-    return import_module("tqdm.notebook" if is_widget else "tqdm").tqdm(**options)
 
 
 class Progress:

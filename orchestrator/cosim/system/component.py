@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 
-from orchestrator.cosim.system.values import Value, finite, integer, real
+from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import (
     Terminal,
     Variable,
@@ -23,6 +23,7 @@ from orchestrator.cosim.system.variables import (
     variables_of,
 )
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
+from orchestrator.machine.texts import finite, integer, real
 from orchestrator.machine.user_files import unpack, unpacked_folder
 
 _CAUSALITIES = {
@@ -308,6 +309,12 @@ class Component:
         with suppress(ValueError):
             return None if stated is None else finite(stated, name)
         return None
+
+    @property
+    def step(self) -> float | None:
+        """The step that the FMU was made for [s]; None: it names none."""
+        step = self.experiment("stepSize")
+        return step if step is not None and step > 0.0 else None
 
     def is_settable(self, name: str) -> bool:
         """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).

@@ -1,36 +1,39 @@
-"""The system that is simulated: components, connections and parameters, as an SSP holds them."""
+"""The system that is simulated: components, connections, parameters; rings, orders and stages."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
+from fractions import Fraction
 from functools import cached_property
+from math import gcd, isfinite, lcm
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from orchestrator.cosim.experiment import MOST_STEPS, ROUNDING
 from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.connection import Connection, check_connection
-from orchestrator.cosim.system.names import (
-    PortName,
-    likely_port,
-    listed,
-    paired,
-    plain_file_names,
-    port_name,
-    splits,
-)  # fmt: skip
-from orchestrator.cosim.system.values import Value, is_finite
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.cosim.system.connection import Connection, can_feed, check_connection
+from orchestrator.cosim.system.graph import in_levels, opened, strongly_connected, without_rings
+from orchestrator.cosim.system.names import PortName, likely_port, paired, port_name, splits
+from orchestrator.cosim.system.values import Value
+from orchestrator.cosim.system.variables import Variable
+from orchestrator.machine.errors import InputError, did_you_mean, listed
+from orchestrator.machine.file_names import plain_file_names
+from orchestrator.machine.texts import is_finite
 
 #: Values by the names of ports or of groups, taken apart or as text.
 Values = Mapping[PortName, object] | Mapping[str, object]
 
 #: Stands for any part of a component's name, between two dots.
 STAR = "*"
+
+#: So many times a common measure of steps may go into the smallest of them.
+_MOST_PARTS = 1000
 
 #: What is between the names of a group and of its members.
 _MEMBER = (".", "[")
@@ -293,44 +296,256 @@ class System:
                         if f"{rest}.{port}" in others:
                             yield f"two ports are named {name}.{port}"
 
+    def rings(self, among: Collection[str] | None = None) -> list[list[str]]:
+        """Rings of direct feedthroughs: components of which each waits for all others, or itself.
 
-def renamed(system: System, names: Mapping[str, str]) -> System:
-    """The same system with other names for some components, which are all different."""
+        Args:
+            among: components that count; None: all.
 
-    def name_of(component: str) -> str:
-        return names.get(component, component)
+        Returns:
+            Each ring in the order in which :meth:`derived_order` opens it.
 
-    def port_of(port: PortName) -> PortName:
-        return PortName(name_of(port.component), port.port)
+        """
+        sources = self._sources(among)
+        place = {name: i for i, name in enumerate(sources)}
+        return [
+            opened(part, sources, place)
+            for part in strongly_connected(sources)
+            if len(part) > 1 or part[0] in sources[part[0]]
+        ]
 
-    return replace(
-        system,
-        components={
-            name_of(name): replace(component, name=name_of(name))
-            for name, component in system.components.items()
-        },
-        connections=tuple(
-            replace(wire, source=port_of(wire.source), target=port_of(wire.target))
-            for wire in system.connections
-        ),
-        parameters={port_of(port): value for port, value in system.parameters.items()},
-        steps={name_of(name): step for name, step in system.steps.items()},
-        left_open={port_of(port) for port in system.left_open},
-    )
+    def derived_order(self, solved: Sequence[Sequence[str]] = ()) -> list[str]:
+        """All components: one with direct feedthrough comes before those that it feeds.
 
+        No order does that for every connection of a ring. The component of the ring that stands
+        first in the system then comes first, and takes one step late what feeds it; where the
+        others are a ring still, it is opened in the same way: see :meth:`delayed_connections`.
 
-def flattened(system: System) -> System:
-    """The same system for tools that know no systems in systems: `one.part` is `one_part`."""
-    taken = {name for name in system.components if "." not in name}
-    names = {}
-    for name in system.components:
-        if "." in name:
-            plain = name.replace(".", "_")
-            while plain in taken:
-                plain += "_"
-            names[name] = plain
-            taken.add(plain)
-    return renamed(system, names) if names else system
+        Args:
+            solved: rings that are stepped as one component each, after all that does not wait for
+                them: so they can be closed with the latest of what feeds them.
+
+        """
+        ring_of = {name: ring for ring in solved for name in ring}
+        # A ring stands where the first of its components stands.
+        place = {name: i for i, name in enumerate(self.components)}
+        firsts = [(min(ring, key=place.__getitem__), ring) for ring in solved]
+        lead = {name: first for first, ring in firsts for name in ring}
+        sources: dict[str, set[str]] = {lead.get(name, name): set() for name in self.components}
+        for name, feeding in self._sources().items():
+            own = lead.get(name, name)
+            sources[own] |= {lead.get(source, source) for source in feeding}
+            if name in lead:
+                sources[own].discard(own)
+        order = in_levels(without_rings(sources), set(lead.values()))
+        return [member for name in order for member in ring_of.get(name, (name,))]
+
+    def delayed_connections(
+        self, order: Sequence[str], solved: Iterable[Sequence[str]] = ()
+    ) -> list[Connection]:
+        """The connections with direct feedthrough that an order makes one step late.
+
+        Args:
+            order: all its components, one stepped after the other.
+            solved: rings that are stepped as one component each.
+
+        """
+        place = {name: i for i, name in enumerate(order)}
+        ring_of = {name: i for i, ring in enumerate(solved) for name in ring}
+        return [
+            connection
+            for connection in self.connections
+            if self.has_feedthrough(connection)
+            and place[source := connection.source.component]
+            >= place[target := connection.target.component]
+            and not (source in ring_of and ring_of[source] == ring_of.get(target))
+        ]
+
+    def in_stages(
+        self, order: Sequence[str], solved: Sequence[Sequence[str]] = ()
+    ) -> list[list[str]]:
+        """An order in stages: no component takes what another one of its stage has just computed.
+
+        Solved rings have their own stages, each in the place of its first component.
+        """
+        ring_of = {name: ring for ring in map(list, solved) for name in ring}
+        units: dict[str, list[str]] = {}
+        for name in order:
+            ring = ring_of.get(name, [name])
+            units.setdefault(ring[0], ring)
+        late = set(
+            self.delayed_connections([name for unit in units.values() for name in unit], solved)
+        )
+        feeding: dict[str, set[str]] = {name: set() for name in order}
+        for connection in self.connections:
+            if self.has_feedthrough(connection) and connection not in late:
+                feeding[connection.target.component].add(connection.source.component)
+        stages: list[list[str]] = []
+        stage_of: dict[str, int] = {}
+        for first, unit in units.items():
+            present = len(stages) - 1
+            fits = stages and (first in ring_of) == (stages[-1][0] in ring_of)
+            if not fits or any(stage_of.get(s) == present for name in unit for s in feeding[name]):
+                stages.append([])
+            stages[-1] += unit
+            stage_of |= dict.fromkeys(unit, len(stages) - 1)
+        return stages
+
+    def has_feedthrough(self, connection: Connection) -> bool:
+        """Whether the source of a connection depends on an input of the same instant."""
+        source = connection.source
+        return self.components[source.component].has_feedthrough(source.port)
+
+    def _sources(self, among: Collection[str] | None = None) -> dict[str, set[str]]:
+        counted = (name for name in self.components if among is None or name in among)
+        found: dict[str, set[str]] = {name: set() for name in counted}
+        for connection in self.connections:
+            source, target = connection.source.component, connection.target.component
+            if source in found and target in found and self.has_feedthrough(connection):
+                found[target].add(source)
+        return found
+
+    def reaching(self, component: str, until: set[str]) -> Iterator[Connection]:
+        """The connections through which values reach a component, directly or through others.
+
+        Args:
+            component: where the values arrive.
+            until: components that are not followed further.
+
+        """
+        seen, waiting = {component}, [component]
+        while waiting:
+            for connection in self.feeding[waiting.pop()]:
+                yield connection
+                source = connection.source.component
+                if source not in seen | until:
+                    seen.add(source)
+                    waiting.append(source)
+
+    def unfed_inputs(self, settled: Collection[PortName] = ()) -> str | None:
+        """The inputs that nothing feeds or sets, in words, with wires that could feed them.
+
+        Args:
+            settled: inputs that are set during a run.
+
+        Returns:
+            One line; None: there is no such input.
+
+        """
+        fed = {connection.target for connection in self.connections}
+        feeding = {
+            (connection.source.component, connection.target.port) for connection in self.connections
+        }
+        taken = {*fed, *self.parameters, *self.left_open, *settled}
+        labels: list[str] = []
+        wires: list[str] = []
+        giving: dict[str, list[str]] = {}
+        for name, component in self.components.items():
+            for output in component.having("output"):
+                giving.setdefault(output.name, []).append(name)
+        for name, component in self.components.items():
+            groups: dict[str, list[Variable]] = {}
+            for variable in component.having("input"):
+                groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
+            for group, members in groups.items():
+                found = [v for v in members if PortName(name, v.name) not in taken]
+                if not group or len(found) < len(members):
+                    labels += [f"{name}.{variable.name}" for variable in found]
+                    continue
+                labels.append(f"{name}.{group}.*")
+                # What feeds the same inputs of another component is that one's.
+                sources = (
+                    other
+                    for other in giving.get(members[0].name, ())
+                    if other != name
+                    and all(_could_feed(self.components[other], variable) for variable in members)
+                    and not any((other, variable.name) in feeding for variable in members)
+                )
+                first, second = next(sources, None), next(sources, None)
+                if first is not None and second is None:
+                    wires.append(f'"{name}.{group}" = "{first}.{group}"')
+        if not labels:
+            return None
+        wanted = f"; wire {listed(wires)}" if wires else ""
+        return f"nothing feeds or sets {listed(labels)}{wanted}"
+
+    def decimations(self, step: float) -> dict[str, int]:
+        """How many communication steps one step of each component spans.
+
+        Args:
+            step: the communication step [s].
+
+        Raises:
+            InputError: a component's step is not a multiple of it.
+
+        """
+        found = dict.fromkeys(self.components, 1)
+        for name, own in self.steps.items():
+            self.component(name)
+            number = isinstance(own, Real) and not isinstance(own, bool)
+            if not (number and isfinite(own) and own > 0.0):
+                raise InputError(f"step of {name} {own!r}: must be a positive number of seconds")
+            n = max(round(min(own / step, MOST_STEPS + 1.0)), 1)
+            if abs(own / step - n) > ROUNDING * n:
+                raise InputError(
+                    f"{name} needs steps of {own:g} s, which are not a multiple of the "
+                    f"communication step of {step:g} s"
+                )
+            found[name] = n
+        return found
+
+    def with_common_step(self) -> System:
+        """The same system with the longest step of which all its components' are multiples.
+
+        A component's step is the one that the system states, or else its FMU. It names none if
+        neither does.
+
+        Raises:
+            InputError: they have none in common.
+
+        """
+        own = {name: component.step for name, component in self.components.items()}
+        steps = {name: step for name, step in own.items() if step is not None} | dict(self.steps)
+        if not steps:
+            return self
+        return replace(self, steps=steps, step=_common_measure(steps.values()))
+
+    def flattened(self) -> System:
+        """The same system for tools that know no systems in systems: `one.part` is `one_part`."""
+        taken = {name for name in self.components if "." not in name}
+        names = {}
+        for name in self.components:
+            if "." in name:
+                plain = name.replace(".", "_")
+                while plain in taken:
+                    plain += "_"
+                names[name] = plain
+                taken.add(plain)
+        return self.renamed(names) if names else self
+
+    def renamed(self, names: Mapping[str, str]) -> System:
+        """The same system with other names for some components, which are all different."""
+
+        def name_of(component: str) -> str:
+            return names.get(component, component)
+
+        def port_of(port: PortName) -> PortName:
+            return PortName(name_of(port.component), port.port)
+
+        return replace(
+            self,
+            components={
+                name_of(name): replace(component, name=name_of(name))
+                for name, component in self.components.items()
+            },
+            connections=tuple(
+                replace(wire, source=port_of(wire.source), target=port_of(wire.target))
+                for wire in self.connections
+            ),
+            parameters={port_of(port): value for port, value in self.parameters.items()},
+            steps={name_of(name): step for name, step in self.steps.items()},
+            left_open={port_of(port) for port in self.left_open},
+        )
 
 
 def is_spread(value: object) -> bool:
@@ -339,6 +554,26 @@ def is_spread(value: object) -> bool:
     `{"each": [1, 2, 4]}` lists the values, `{"first": 1, "step": 2}` counts from the first on.
     """
     return isinstance(value, Mapping) and value.keys() in ({"each"}, {"first", "step"})
+
+
+def _could_feed(source: Component, variable: Variable) -> bool:
+    """Whether a component has an output of the name and type of an input."""
+    output = source.variables.get(variable.name)
+    return output is not None and output.causality == "output" and can_feed(output, variable)
+
+
+def _common_measure(steps: Iterable[float]) -> float:
+    """The longest step of which all are multiples [s]: of the numbers as they are written."""
+    exact = [Fraction(str(step)) for step in steps]
+    denominator = lcm(*(step.denominator for step in exact))
+    common = Fraction(gcd(*(int(step * denominator) for step in exact)), denominator)
+    if min(exact) > _MOST_PARTS * common:
+        listed = ", ".join(f"{float(step):g}" for step in sorted(set(exact)))
+        raise InputError(
+            f"the components need steps of {listed} s, which have no common divisor; give a "
+            "communication step that divides all of them"
+        )
+    return float(common)
 
 
 def _spread(name: PortName, value: Any, n: int) -> list[Any]:

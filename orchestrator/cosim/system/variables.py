@@ -15,18 +15,9 @@ from xml.etree import ElementTree
 
 from fmpy.model_description import ModelDescription, ModelVariable
 
-from orchestrator.cosim.system.values import (
-    BOOLEANS,
-    TYPES,
-    Value,
-    family_of,
-    finite,
-    integer,
-    real,
-    transferable,
-    whole,
-)
+from orchestrator.cosim.system.values import TYPES, Value, family_of
 from orchestrator.machine.errors import InputError, shortened
+from orchestrator.machine.texts import BOOLEANS, finite, integer, real, transferable, whole
 
 #: An array has no more elements than this: each is a column.
 MOST_ELEMENTS = 1_000_000

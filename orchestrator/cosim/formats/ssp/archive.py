@@ -16,10 +16,9 @@ from xml.parsers import expat
 
 from orchestrator.cosim.formats.ssp import NAMESPACES, STRUCTURE
 from orchestrator.cosim.formats.ssp.validity import VERSIONS, violations
-from orchestrator.cosim.system.names import listed
 from orchestrator.cosim.system.units import Linear, UndefinedUnit, Unit, conversion
-from orchestrator.cosim.system.values import finite, integer
-from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason
+from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed, reason
+from orchestrator.machine.texts import finite, integer
 from orchestrator.machine.user_files import check_file, is_folder, unpack
 
 #: Elements in which others than the standard's are at home.

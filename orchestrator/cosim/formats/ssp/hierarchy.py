@@ -11,11 +11,11 @@ from xml.etree.ElementTree import Element
 
 from orchestrator.cosim.formats.ssp.archive import Archive
 from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.names import listed
 from orchestrator.cosim.system.units import BASE_UNITS, Unit, Units, unit_of_port
-from orchestrator.cosim.system.values import family_of, integer
+from orchestrator.cosim.system.values import family_of
 from orchestrator.cosim.system.variables import MOST_ELEMENTS, element_names
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import InputError, listed
+from orchestrator.machine.texts import integer
 
 #: An enumeration's values by the names of its items.
 Items: TypeAlias = Mapping[str, int]

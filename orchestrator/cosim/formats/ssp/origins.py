@@ -21,11 +21,11 @@ from orchestrator.cosim.formats.ssp.hierarchy import (
     definitions_of,
     shape_of,
 )
-from orchestrator.cosim.system.names import listed
 from orchestrator.cosim.system.units import Linear, Mapped, Transformation, Unit, combine
-from orchestrator.cosim.system.values import BOOLEANS, family_of, finite, whole
+from orchestrator.cosim.system.values import family_of
 from orchestrator.cosim.system.variables import element_names
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError, did_you_mean, listed
+from orchestrator.machine.texts import BOOLEANS, finite, whole
 
 _TABLES = (
     "BooleanMappingTransformation", "IntegerMappingTransformation",

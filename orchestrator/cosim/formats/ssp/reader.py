@@ -23,11 +23,12 @@ from orchestrator.cosim.formats.ssp.hierarchy import (
 from orchestrator.cosim.formats.ssp.origins import Bindings, Segment, Values, segments_of
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, listed
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Mapped, Transformation, Unit, combine
-from orchestrator.cosim.system.values import BOOLEANS, Value, integer, real
-from orchestrator.machine.errors import Findings, InputError, shortened
+from orchestrator.cosim.system.values import Value
+from orchestrator.machine.errors import Findings, InputError, listed, shortened
+from orchestrator.machine.texts import BOOLEANS, integer, real
 
 #: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
 #: and ecos, of Vico, and of OMSimulator.

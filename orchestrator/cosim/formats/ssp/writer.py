@@ -15,12 +15,14 @@ from zipfile import ZipFile, ZipInfo
 from orchestrator.cosim.formats.ssp import LEFT_OPEN, OMS, ORDER, OSP, SSC, SSD, SSV, STRUCTURE
 from orchestrator.cosim.formats.ssp.nesting import End, Line, Nest, nested, offers, order_of
 from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.names import PortName, file_name, plain_file_names
-from orchestrator.cosim.system.structure import System, flattened
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
-from orchestrator.cosim.system.values import Value, literal
+from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError, shortened
+from orchestrator.machine.file_names import file_name, plain_file_names
+from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import read_archive
 
 #: Name of every parameter set: ecos applies the sets of the one name that it is given.
@@ -68,7 +70,7 @@ def ssp_bytes(system: System, flat: bool = False, connectors: bool = False) -> b
             :func:`offers <.nesting.offers>`.
 
     """
-    system = flattened(system) if flat else system
+    system = system.flattened() if flat else system
     sources = _sources(system, flat)
     archive = BytesIO()
     with ZipFile(archive, "w") as content:

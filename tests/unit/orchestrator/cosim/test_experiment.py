@@ -11,7 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from orchestrator.cosim.experiment import MOST_STEPS, Experiment, decimations
+from orchestrator.cosim.experiment import MOST_STEPS, Experiment
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load
 
@@ -100,7 +100,7 @@ def test_an_unknown_order_is_refused():
 def test_a_step_of_a_component_may_be_beyond_all_multiples():
     system = replace(load("fig4", "native"), steps={"plant": 1e308})
     with pytest.raises(InputError, match=r"steps of 1e\+308 s, which are not a multiple"):
-        decimations(system, 0.02)
+        system.decimations(0.02)
 
 
 @pytest.mark.parametrize(

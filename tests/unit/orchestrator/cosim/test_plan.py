@@ -20,12 +20,13 @@ from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.events import Event, Stop
 from orchestrator.cosim.hooks.timing import InputTable
 from orchestrator.cosim.loop import choose_loop
-from orchestrator.cosim.plan import delays, digest_of, gathered_connections, make_plan, stages
+from orchestrator.cosim.plan import delays, gathered_connections, make_plan, stages
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import digest_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import Request
 from support.relay import relay, system_of

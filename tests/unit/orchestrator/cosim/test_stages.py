@@ -7,7 +7,6 @@ import pytest
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.plan import make_plan, stages
 from orchestrator.cosim.stages import Decimation, Stage, Visit, stages_of
-from orchestrator.cosim.system.graph import rings
 from support.relay import relay, system_of
 from support.small_fmus import description, unknown, variable, write
 
@@ -99,7 +98,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory):
 )  # fmt: skip
 def test_stages_of_four_components_in_a_loop(fmus, wires, steps, order, passing, stepping):
     system = system_of(fmus, wires, steps=steps)
-    solved = rings(system)
+    solved = system.rings()
     plan = make_plan(system, Experiment(1.0, 0.1, order))
     found = stages_of(plan, stages(system, order, solved), solved)
     assert list(map(told, found.stepping)) == stepping

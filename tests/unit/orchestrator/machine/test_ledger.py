@@ -12,8 +12,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.cosim.system.names import file_name
 from orchestrator.machine.disk import sealed, unsealed
+from orchestrator.machine.file_names import file_name
 from orchestrator.machine.ledger import LEDGER, RECORD, Ledger, Taken, is_changed, move_aside
 from support.machine import contents
 

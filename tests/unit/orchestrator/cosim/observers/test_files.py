@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.formats.tables import read_columns, read_rows
 from orchestrator.cosim.observers.files import TABLE_FORMATS
 from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.runs.tables import read_columns, read_rows
 
 
 @pytest.mark.parametrize("ending", TABLE_FORMATS)

@@ -11,13 +11,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.graph import (
-    delayed_connections,
-    derived_order,
-    in_stages,
-    reaching,
-    rings,
-)
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 
@@ -83,33 +76,33 @@ def ends(connections: Iterable[Connection]) -> list[Edge]:
 def test_rings_are_the_components_that_reach_each_other(graph, some):
     names, through, states = graph
     system = system_of(names, through, states)
-    found = rings(system)
+    found = system.rings()
     assert {frozenset(ring) for ring in found} == strong_parts(names, through)
     assert len(found) == len(strong_parts(names, through))
     assert all(ring[0] == min(ring, key=names.index) for ring in found)
     within = {edge for edge in through if some.issuperset(edge)}
-    assert {frozenset(ring) for ring in rings(system, some)} == strong_parts(names, within)
+    assert {frozenset(ring) for ring in system.rings(some)} == strong_parts(names, within)
 
 
 @given(graphs())
 def test_only_what_opens_a_ring_is_late_in_the_derived_order(graph):
     names, through, states = graph
     system = system_of(names, through, states)
-    order = derived_order(system)
+    order = system.derived_order()
     assert sorted(order) == sorted(names)
     late = {(a, b) for a, b in through if order.index(a) >= order.index(b)}
     assert late == opened(names, through)
-    assert ends(delayed_connections(system, order)) == sorted(late)
+    assert ends(system.delayed_connections(order)) == sorted(late)
 
 
 @given(graphs())
 def test_nothing_is_late_where_rings_are_solved(graph):
     names, through, states = graph
     system = system_of(names, through, states)
-    solved = rings(system)
-    order = derived_order(system, solved)
+    solved = system.rings()
+    order = system.derived_order(solved)
     assert sorted(order) == sorted(names)
-    assert delayed_connections(system, order, solved) == []
+    assert system.delayed_connections(order, solved) == []
     for ring in solved:
         first = order.index(ring[0])
         assert order[first : first + len(ring)] == ring
@@ -119,11 +112,11 @@ def test_nothing_is_late_where_rings_are_solved(graph):
 def test_stages_keep_the_order_of_every_feedthrough(graph, random, are_solved):
     names, through, states = graph
     system = system_of(names, through, states)
-    solved = rings(system) if are_solved else []
-    order = derived_order(system, solved)
+    solved = system.rings() if are_solved else []
+    order = system.derived_order(solved)
     if not are_solved:
         random.shuffle(order)
-    stages = in_stages(system, order, solved)
+    stages = system.in_stages(order, solved)
     stage_of = {name: i for i, stage in enumerate(stages) for name in stage}
     assert sorted(name for stage in stages for name in stage) == sorted(names)
     one = {frozenset(ring) for ring in solved}
@@ -143,6 +136,6 @@ def test_stages_keep_the_order_of_every_feedthrough(graph, random, are_solved):
 
 def test_what_reaches_a_component_is_followed_upstream_to_where_it_may_go():
     system = system_of("abcde", [("a", "b"), ("b", "c"), ("c", "b")], [("d", "a"), ("c", "e")])
-    assert ends(reaching(system, "c", set())) == [("a", "b"), ("b", "c"), ("c", "b"), ("d", "a")]
-    assert ends(reaching(system, "c", {"b"})) == [("b", "c")]
-    assert ends(reaching(system, "d", set())) == []
+    assert ends(system.reaching("c", set())) == [("a", "b"), ("b", "c"), ("c", "b"), ("d", "a")]
+    assert ends(system.reaching("c", {"b"})) == [("b", "c")]
+    assert ends(system.reaching("d", set())) == []

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName, port_name
-from orchestrator.cosim.system.structure import System, _is_like, flattened, renamed
+from orchestrator.cosim.system.structure import System, _is_like
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
 from support.archives import fmu, variable
@@ -228,7 +228,7 @@ def chain_of(folder: Path, *names: str) -> System:
 
 
 def test_all_that_names_a_component_has_its_new_name(tmp_path: Path):
-    system = renamed(chain_of(tmp_path, "a", "b", "c"), {"a": "v.a", "c": "a"})
+    system = chain_of(tmp_path, "a", "b", "c").renamed({"a": "v.a", "c": "a"})
     assert [(name, part.name) for name, part in system.components.items()] == [
         ("v.a", "v.a"), ("b", "b"), ("a", "a"),
     ]  # fmt: skip
@@ -243,7 +243,7 @@ def test_all_that_names_a_component_has_its_new_name(tmp_path: Path):
 
 def test_flat_names_are_distinct(tmp_path: Path):
     names = ["v.a", "v_a", "v.a_", "w", "v_.a", "v.b.c", "v.b_c"]
-    system = flattened(chain_of(tmp_path, *names))
+    system = chain_of(tmp_path, *names).flattened()
     assert list(system.components) == ["v_a_", "v_a", "v_a__", "w", "v__a", "v_b_c", "v_b_c_"]
     flat = chain_of(tmp_path, "a", "b_c")
-    assert flattened(flat) is flat
+    assert flat.flattened() is flat

@@ -21,11 +21,11 @@ from orchestrator.cosim.formats.ssp.reader import read_ssp
 from orchestrator.cosim.formats.ssp.writer import write_ssp
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.graph import unfed_inputs
-from orchestrator.cosim.system.names import PortName, plain_file_names
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.file_names import plain_file_names
 from support import small_fmus, typed
 from support.archives import (
     archive,
@@ -145,8 +145,8 @@ def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
     again = read_ssp(path)
     assert again.left_open == left_open
     assert again.steps == found.steps
-    assert "inner.a b.c" in str(unfed_inputs(found))
-    assert "inner.a b.c" not in str(unfed_inputs(again))
+    assert "inner.a b.c" in str(found.unfed_inputs())
+    assert "inner.a b.c" not in str(again.unfed_inputs())
 
 
 @pytest.mark.parametrize("step", [0.02, 0.0125])

@@ -6,20 +6,15 @@ import csv
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from importlib import import_module
-from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.system.values import finite
-from orchestrator.machine.errors import InputError
+from orchestrator.cosim.observers.files import ROWS_AT_ONCE, parquet
+from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors, open_lines
-
-#: Rows that are read at once, and that are written to Parquet at once.
-ROWS_AT_ONCE = 8192
 
 #: What separates the values of a row.
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
@@ -162,18 +157,6 @@ def port_of(name: str, known: Collection[str], longest: int) -> str | None:
     end = plain[-longest - 1 :]
     ends = (end[i + 1 :] for i, character in enumerate(end) if character == ".")
     return next((ours for ours in (name, plain, *ends) if ours in known), None)
-
-
-def parquet() -> Any:
-    """Return the module that reads and writes Parquet.
-
-    Raises:
-        InputError: it is not installed.
-
-    """
-    if find_spec("pyarrow") is None:
-        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
-    return import_module("pyarrow.parquet")
 
 
 def _filled(lines: Iterable[str]) -> Iterator[str]:

@@ -10,8 +10,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from pydantic import ConfigDict, Field, model_validator
 
-from orchestrator.cosim.formats.schema import Names, OneOf, TomlTable, entries, entry, needed
 from orchestrator.machine.errors import Refused
+from orchestrator.machine.schema import Names, OneOf, TomlTable, entries, entry, flatten, needed
 from support.texts import mentions
 
 
@@ -136,3 +136,10 @@ def test_a_name_that_is_stated_twice_is_named_however_it_is_quoted(names):
         except Refused as error:
             problems = error.problems
         assert {*problems} == {f"a.toml: {where}: {name} is stated twice" for name in twice}
+
+
+def test_keys_may_be_quoted_or_dotted():
+    table = {"a": {"b": 1, "c.d": {"e": 2}}, "a.f": 3, "g": {"at": 4}}
+    assert dict(flatten(table)) == {"a.b": 1, "a.c.d.e": 2, "a.f": 3, "g.at": 4}
+    values = dict(flatten(table, lambda value: "at" in value))
+    assert values == {"a.b": 1, "a.c.d.e": 2, "a.f": 3, "g": {"at": 4}}

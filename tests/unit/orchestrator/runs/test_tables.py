@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cosim.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
+from orchestrator.runs.tables import read_columns, read_rows
 
 
 @pytest.mark.parametrize(
