@@ -237,19 +237,6 @@ class Coupling:
         own = [gather for ring in self._solved for gather in ring.gatherings]
         return found, found.gatherings + own
 
-    def delayed_ports(self) -> list[PortName]:
-        """The inputs that a ring feeds itself, for rings that are not solved as a whole."""
-        solved = [set(ring.names) for ring in self._solved]
-        left = [ring.names for ring in self._rings if set(ring.names) not in solved]
-        ring_of = {name: i for i, names in enumerate(left) for name in names}
-        return [
-            connection.target
-            for connection in self._system.connections
-            if connection.source.component in ring_of
-            and ring_of[connection.source.component] == ring_of.get(connection.target.component)
-            and has_feedthrough(self._system, connection)
-        ]
-
     def _order_taken(self) -> Order:
         """The order that is asked for, or else the best one that the FMUs allow.
 

@@ -44,6 +44,7 @@ class Steps(Protocol):
 
         Raises:
             ComponentFailed: by the step after them.
+            Ended: a component ends the run within that step.
 
         """
 

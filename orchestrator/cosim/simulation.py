@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from math import isfinite
 from time import monotonic
 
 import numpy as np
 
 from orchestrator.cosim.coupling import Coupling
-from orchestrator.cosim.early_end import make_steps
 from orchestrator.cosim.experiment import OURS, Exchange
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.cosim.fmi.isolated import Isolation
@@ -97,12 +95,6 @@ def simulate_plan(
             remark = None
             try:
                 failure = _advance(run, stepping, Hooks(run), order, surroundings)
-                if failure and (overflown := _overflown(row, coupling.delayed_ports())):
-                    failure += (
-                        f"; {overflown} is in a ring of direct feedthroughs that is delayed by a "
-                        "step, and may grow without bound; --coupling solve, if its FMUs allow "
-                        "it, or another --order may help"
-                    )
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -197,7 +189,7 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         hooks.act()
-        for _ in make_steps(stepping.steps, run):
+        for _ in stepping.steps(run):
             if run.made >= run.due:
                 hooks.act()
             if monotonic() > blocks.due:
@@ -225,11 +217,6 @@ def _advance(
         failure = f"stopped at t = {run.experiment.time(blocks.count):.12g} s: {wrong}"
     blocks.hand_over()
     return failure
-
-
-def _overflown(row: Row, ports: Iterable[PortName]) -> PortName | None:
-    """The first of some ports whose value is not finite."""
-    return next((port for port in ports if not isfinite(row.values[row.columns[port]])), None)
 
 
 @contextmanager

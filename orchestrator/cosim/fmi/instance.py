@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double
-from math import inf
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -39,18 +38,7 @@ class ComponentFailed(Exception):
 
 
 class Ended(Exception):
-    """The run ends here, and well; the text says why.
-
-    Attributes:
-        component: that has ended it in a step; empty: none has.
-        time: until which that component has computed [s].
-
-    """
-
-    def __init__(self, text: str, component: str = "", time: float = -inf) -> None:
-        """Say why."""
-        super().__init__(text)
-        self.component, self.time = component, time
+    """The run ends with the last step that was made, and well; the text says why."""
 
 
 class Part(NamedTuple):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from ctypes import c_double
 from dataclasses import dataclass
-from math import inf, isfinite
+from math import isfinite
 from numbers import Real
 from typing import Any
 
@@ -265,11 +265,7 @@ class IsolatedInstance:
         # Outputs of a step that has ended the run are there already.
         if self._steps:
             self._steps = False
-            try:
-                self._receive()
-            except Ended:
-                self._read_outputs()
-                raise
+            self._receive()
             self._read_outputs()
         return 0
 
@@ -333,7 +329,6 @@ class IsolatedInstance:
         fatal: bool = False,
         refused: str | None = None,
         ended: str | None = None,
-        until: float = -inf,
         strings: Sequence[str] = (),
     ) -> Any:
         for text in strings:
@@ -348,7 +343,7 @@ class IsolatedInstance:
         if refused is not None and self._doing == "instantiate":
             raise InputError(_line(refused))
         if ended is not None and self._doing == "doStep":
-            raise Ended(_line(ended), self.name, float(until))
+            raise Ended(_line(ended))
         if refused is not None or ended is not None:
             raise ValueError(f"it cannot end a run in {self._doing}")
         return value

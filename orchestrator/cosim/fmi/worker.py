@@ -15,13 +15,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from ctypes import c_double
 from functools import partial
-from math import inf
 from pathlib import Path
 from time import monotonic
 from typing import Any
 
 import numpy as np
-from fmpy.fmi2 import fmi2OK, fmi2Warning
 
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, MessageQueue
 from orchestrator.cosim.fmi.loaded import LoadedInstance, load_instance
@@ -209,10 +207,6 @@ class _Served:
         else:
             self._instance.exchange()
 
-    def _are_read(self) -> bool:
-        """Whether the outputs can be read after the last step."""
-        return all(call() in (fmi2OK, fmi2Warning) for call in self._instance.get_outputs)
-
     def _answered(self, call: Callable[[], Any]) -> bool:
         note: dict[str, Any] = {}
         try:
@@ -220,7 +214,7 @@ class _Served:
             if value is not None:
                 note["value"] = value
         except Ended as end:
-            note |= {"ended": str(end), "until": end.time if self._are_read() else -inf}
+            note["ended"] = str(end)
         except ComponentFailed as error:
             note |= {"failed": str(error), "fatal": error.fatal}
         except Exception as error:
