@@ -11,8 +11,7 @@ import numpy as np
 from orchestrator.cosim.coupling import Coupling
 from orchestrator.cosim.experiment import OURS, Exchange
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.fmi.placement import place_instances
+from orchestrator.cosim.fmi.isolated import Isolation, place_instances
 from orchestrator.cosim.fmi.surroundings import Surroundings, default_mode
 from orchestrator.cosim.hooks.hook import Hook, Hooks, Run
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim.fmi.instance import ComponentFailed, Instance, Log
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.fmi.placement import place_instances
+from orchestrator.cosim.fmi.isolated import Isolation, place_instances
 from orchestrator.cosim.row import Row
 from orchestrator.cosim.schedule import member, step_members
 from orchestrator.cosim.system.component import read_component
