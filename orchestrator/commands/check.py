@@ -15,7 +15,6 @@ from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
 from orchestrator.cosim.fmi.binary import binary_of, check_binary
 from orchestrator.cosim.formats.osp import OSP_STRUCTURE
 from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.variables import array_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
@@ -155,7 +154,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         to_know += [
             f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved if the FMUs "
             "compute their outputs between steps, else delayed by a step"
-            for ring in rings(prepared.system)
+            for ring in prepared.plan.rings
         ]
         to_know += prepared.doubts()
     return to_know

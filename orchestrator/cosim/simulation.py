@@ -79,18 +79,18 @@ def simulate_plan(
                 {str(port): standing for port, standing in row.standing.items()},
                 _units(system, row.columns),
             )
-        scheduled, gatherings = coupling.schedule()
+        (stages, passing), gatherings = coupling.stages()
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
             interrupts.hand_over = blocks.hand_over
-            if scheduled.passing is None:
+            if passing is None:
                 blocks.append(experiment.start_time, row.shown)
             overrides = Overrides(row, gatherings, system.connections)
             run = Run(
-                system, experiment, instances, row, scheduled.stepping, scheduled.passing,
+                system, experiment, instances, row, stages, passing,
                 overrides, blocks, log, interrupts, hooks,
             )  # fmt: skip
-            order = [name for names in coupling.sequence for name in names]
+            order = [name for names in coupling.plan.arrangement.stages for name in names]
             remark = None
             try:
                 failure = _advance(run, stepping, Hooks(run), order, surroundings)

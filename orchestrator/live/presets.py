@@ -28,7 +28,6 @@ from orchestrator.cosim.hooks.events import (
     Stop,
 )
 from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.graph import rings
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value, items_of, named
@@ -255,7 +254,7 @@ def _check(prepared: Prepared) -> None:
     system, experiment, loops = plan.system, plan.experiment, prepared.loops
     most_steps = _MOST_STEPS // len(loops)
     lacking = {
-        "rings of direct feedthroughs": rings(system),
+        "rings of direct feedthroughs": plan.rings,
         "linear inputs": experiment.coupling == LINEAR,
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,

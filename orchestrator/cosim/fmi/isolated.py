@@ -47,7 +47,7 @@ from orchestrator.cosim.fmi.loaded import load_instance
 from orchestrator.cosim.fmi.surroundings import Surroundings
 from orchestrator.cosim.fmi.transfer import CMember
 from orchestrator.cosim.row import Row, ports_of_type
-from orchestrator.cosim.schedule import member, step_members
+from orchestrator.cosim.stages import member, step_members
 from orchestrator.cosim.system.component import Component, read_description
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of, is_of

@@ -46,7 +46,7 @@ def test_values_rest_before_the_first_step_whatever_the_order_of_components(fold
     )  # fmt: skip
     coupling.initialise()
     assert [value(row, name) for name in ("a.y", "b.u", "b.y", "c.u", "c.y")] == [7, 7, 70, 70, 71]
-    assert coupling.sequence == [["a"], ["b"], ["c"]]
+    assert coupling.plan.arrangement.stages == [["a"], ["b"], ["c"]]
     assert log.messages == ()
 
 
@@ -68,11 +68,11 @@ def test_a_ring_rests_at_the_start_and_is_solved_unless_a_delay_is_wanted(folder
     # y = y / 2 + 3
     assert value(row, "c.y") == pytest.approx(6.0, abs=1e-9)
     if how == "delay":
-        assert coupling.sequence == [["a"], ["c", "b"]]
+        assert coupling.plan.arrangement.stages == [["a"], ["c", "b"]]
         assert mentions(" ".join(log.messages), "a b.y")
     else:
         assert log.messages == ()
-        assert coupling.sequence == [["a", "b"], ["c"]]
+        assert coupling.plan.arrangement.stages == [["a", "b"], ["c"]]
 
 
 @pytest.mark.parametrize(
