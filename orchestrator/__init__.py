@@ -1,6 +1,6 @@
 """Co-simulate an autonomous underwater vehicle from FMI components, or any system of an SSP.
 
-    from orchestrator import simulate
+    from auv_fmu import simulate
     result = simulate("fig4", {"plant.noise.std": 0.0})
     result.plot("plant.eta.*")
 
