@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from orchestrator.runs.loading import load
     from orchestrator.runs.result import Result, read
-    from orchestrator.runs.simulate import simulate
+    from orchestrator.runs.run import simulate
     from orchestrator.studies.study_result import StudyResult
     from orchestrator.studies.sweep import sweep
 
@@ -42,7 +42,7 @@ _MODULES = {
     "StudyResult": "studies.study_result",
     "load": "runs.loading",
     "read": "runs.result",
-    "simulate": "runs.simulate",
+    "simulate": "runs.run",
     "sweep": "studies.sweep",
 }
 

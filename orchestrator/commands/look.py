@@ -27,8 +27,8 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
-from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
+from orchestrator.runs.result import changed_files, read_record, read_result, table_in
 from orchestrator.vehicle.signals import loops_of
 
 #: The scenario that a live page opens unless another is named.

@@ -13,7 +13,7 @@ from orchestrator.cosim.observers.observer import Ending
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.request import Request, flag, option_fields
+from orchestrator.runs.request import Request, flags
 from orchestrator.runs.scenario import Scenario
 
 T = TypeVar("T")
@@ -41,17 +41,15 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
 
 def add_options(parser: argparse.ArgumentParser, declared: type[Any], *names: str) -> None:
     """Add the fields of a dataclass that are options: the named ones, or all."""
-    defaults = declared()
-    for name, one in option_fields(declared).items():
+    for name, flag, how in flags(declared):
         if not names or name in names:
-            default = getattr(defaults, name)
-            parser.add_argument(flag(name), default=default, help=one.help, **one.how)
+            parser.add_argument(flag, **how)
 
 
 def from_options(declared: type[T], options: argparse.Namespace) -> T:
     """Make a dataclass from the options that are its fields; other fields keep their defaults."""
     given = vars(options)
-    return declared(**{name: given[name] for name in option_fields(declared) if name in given})
+    return declared(**{name: given[name] for name, *_ in flags(declared) if name in given})
 
 
 def request(options: argparse.Namespace) -> Request:

@@ -66,13 +66,13 @@ def _run(options: argparse.Namespace) -> int:
     draw = None if files.no_figures or not _has_vehicle(runs[0]) else _drawing()
     # Until all is written: a user who stops a run several times wants to know where its rows are.
     with held_interrupts(_answer, is_last=True):
-        finished = run_into(folder, runs, files, options.command, say, draw)
+        place, finished = run_into(folder, runs, files, options.command, say, draw)
         for run in finished:
             _print_summary(run.metrics)
             for note in run.notes:
                 show(f"  {note}")
-        show(f"written to {finished[0].folder}{os.sep}")
-        if finished[0].folder != folder:
+        show(f"written to {place}{os.sep}")
+        if place != folder:
             say(f"{folder} still holds the earlier, complete result")
     return max(status(run.name, run.ending) for run in finished)
 

@@ -71,12 +71,18 @@ def load(
 
 
 @contextmanager
-def notes_as_warnings(strict: bool = False) -> Iterator[Findings]:
-    """Collect findings whose notes become warnings, as Python has them."""
+def notes_as_warnings(strict: bool = False, stacklevel: int = 4) -> Iterator[Findings]:
+    """Collect findings whose notes become Python's warnings.
+
+    Args:
+        strict: treat them as errors.
+        stacklevel: of the warnings; by default, they are for the caller of the caller.
+
+    """
     findings = Findings(strict)
     yield findings
     for note in findings.notes:
-        warnings.warn(note, stacklevel=4)
+        warnings.warn(note, stacklevel=stacklevel)
 
 
 def load_scenario(
