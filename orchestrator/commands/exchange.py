@@ -38,8 +38,7 @@ from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.runs.scenario_events import read_events
+from orchestrator.runs.scenario import read_events, read_scenario
 
 #: What a scenario can be exported as.
 EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"

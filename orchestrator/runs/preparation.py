@@ -29,8 +29,15 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
-from orchestrator.runs.scenario_events import read_events, shared_events
+from orchestrator.runs.scenario import (
+    Inputs,
+    Scenario,
+    check_events,
+    read_events,
+    read_inputs,
+    read_scenario,
+    shared_events,
+)
 from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from orchestrator.cosim.experiment import COUPLINGS
 from orchestrator.cosim.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
-from orchestrator.runs.scenario_events import ACTIONS
+from orchestrator.runs.scenario import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
 
 #: More vehicles take longer to put together than anyone waits.
