@@ -30,7 +30,7 @@ from orchestrator.machine.platforms import platforms
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
 
-#: Where `auv-fmu build` writes each kind unless another folder is named.
+#: Default folders of `auv-fmu build`.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
 #: Files beside the FMUs: the archive of the closed loop, the settings of the build, and checksums.
@@ -45,7 +45,7 @@ class BuildFailed(InputError):
 
 
 class Form(TypedDict, total=False):
-    """What FMUs are built as.
+    """Form of FMUs.
 
     Attributes:
         kind: one of :data:`fmus.kinds.KINDS`; by default the Python kind.
@@ -65,7 +65,7 @@ class Form(TypedDict, total=False):
 
 
 def words_of(form: Form) -> list[str]:
-    """What the build is told of a form."""
+    """The options of the build for a form."""
     texts = {name: value for name, value in form.items() if isinstance(value, str)}
     words = [word for name, value in texts.items() for word in (f"--{name}", value)]
     return words + ["--arrays"] * form.get("arrays", False)
@@ -94,7 +94,7 @@ def build_bundle(
 
     """
     with replace_files(folder, (ARCHIVE, MANIFEST, CHECKSUMS), force=force) as unfinished:
-        # What is up to date is taken along, and not written anew.
+        # FMUs that are up to date are kept.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
                 shutil.copy2(path, unfinished)
@@ -121,7 +121,7 @@ def write_checksums(folder: Path, files: Sequence[Path]) -> Path:
 
 
 def settings_of(folder: Path) -> dict[str, str]:
-    """How the FMUs in a folder were built: their kind, and more."""
+    """The settings of a build, such as the kind of the FMUs, from its folder."""
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     return dict(content["settings"])
 
@@ -202,14 +202,14 @@ def _best_fmus(fmi: str) -> Path:
     try:
         return current_fmus(NATIVE, fmi)
     except InputError as error:
-        # The command may be there, and what it needs not.
-        found = current_fmus(PYTHON, fmi)
+        # The compiler may be there without the files that it needs.
+        folder = current_fmus(PYTHON, fmi)
         warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
-        return found
+        return folder
 
 
 def key_of(kind: str, fmi: str) -> str:
-    """Of the FMUs that the installed sources give."""
+    """Cache key of the FMUs that the installed sources give."""
     return sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
 
 

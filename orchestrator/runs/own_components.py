@@ -27,13 +27,13 @@ from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
-#: What a component can be like at first.
+#: Templates of a component.
 LIKENESSES = ("controller", "plant", "filter", "empty")
 
-#: Names in the templates of a controller that give way to the user's own.
+#: Names in the templates of a controller, which the user's own replace.
 _CLASS, _MODULE = "OwnController", "own_controller"
 
-#: The same in those of a component; with what its README changes and looks at, by its likeness.
+#: The same in those of a component; the parameter and output of its README, by its template.
 _COMPONENT, _FILE = "OwnComponent", "own_component"
 _EXAMPLES = {
     "controller": ("K=4", "command"),
@@ -43,7 +43,7 @@ _EXAMPLES = {
 }
 _SETTING, _OUTPUT, _INPUT = "own_setting", "own_output", "own_input"
 
-#: How often files are looked at [s].
+#: Time between two looks at files [s].
 _INTERVAL = 0.2
 
 
@@ -156,7 +156,7 @@ def _names(name: str, what: str) -> tuple[str, str]:
     for word in (module, class_name):
         if keyword.iskeyword(word):
             raise InputError(f"{name!r}: {word} is a word of Python; choose another name")
-    # What a user has in this process already is not Python's.
+    # A module that the user has in this process already is not Python's.
     if module in sys.stdlib_module_names or PathFinder.find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name
@@ -214,7 +214,7 @@ def _home(script: Path, fmu: Path) -> Sequence[str]:
 
 
 def _built_from(script: Path, folder: Path) -> Iterator[Path]:
-    """The FMUs in a folder that were built from a script, and have the names that they got."""
+    """The FMUs in a folder that were built from a script, under the names of the build."""
     names = [script.name]
     if script.is_dir():
         names = [f"{script.resolve().name}.py", ""]

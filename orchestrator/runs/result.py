@@ -60,7 +60,7 @@ FILES = (*TABLES, METRICS, RECORD)
 #: Packages whose versions a result depends on.
 RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
 
-#: What a message says of a file that cannot be read.
+#: Messages about a file that cannot be read.
 _NOT_A_RECORD, _NOT_INDICES = "not the record of a run", "not the indices of a run"
 
 #: Texts in place of numbers that JSON does not have.
@@ -141,7 +141,7 @@ class Result(Table):
         )
 
     def _repr_html_(self) -> str:
-        """The same for a notebook, with the indices."""
+        """Show it in a notebook, with the indices."""
         rows = []
         with suppress(InputError):
             for vehicle, title, numbers in summary(self.metrics()):
@@ -215,9 +215,9 @@ class Result(Table):
         """
         from orchestrator.figures.plot import plot, told_apart  # noqa: PLC0415
 
-        others = [one for one in what if isinstance(one, Result)]
-        patterns = [one for one in what if not isinstance(one, Result)]
-        return plot(told_apart([one._drawn() for one in (self, *others)]), patterns)
+        results = [self, *(each for each in what if isinstance(each, Result))]
+        patterns = [each for each in what if not isinstance(each, Result)]
+        return plot(told_apart([result._drawn() for result in results]), patterns)
 
     def figure(self, *others: Result, name: str | None = None, vehicle: str = "") -> Figure:
         """Draw the figure of its scenario, or another, as `auv-fmu run` does.
@@ -239,7 +239,7 @@ class Result(Table):
         for other in others:
             if not isinstance(other, Result):
                 raise InputError(f"{other!r}: not a result; name= takes the name of a figure")
-        runs = told_apart([one._drawn() for one in (self, *others)])
+        runs = told_apart([result._drawn() for result in (self, *others)])
         return one_figure(name or self._scenario.figure, self._scenario.title, runs, vehicle)
 
     def save(
@@ -311,21 +311,22 @@ def read(path: str | Path) -> Result:
 
 
 def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
-    """What metrics.json holds, to be read by people.
+    """The indices of a run in words.
 
     Args:
-        values: of metrics.json.
+        values: content of metrics.json.
 
     Yields:
         The vehicle, empty if there is only one; an index with its members and unit; its numbers.
 
     """
-    for vehicle, found in of_vehicles(values).items():
+    for vehicle, indices in of_vehicles(values).items():
         for index in metrics():
-            if index.name in found:
+            if index.name in indices:
                 unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
                 title = f"{index.label} {index.members}{unit}"
-                yield vehicle, title, [*map(_number, np.atleast_1d(found[index.name]).tolist())]
+                numbers = np.atleast_1d(indices[index.name]).tolist()
+                yield vehicle, title, [*map(_number, numbers)]
     if SMALLEST_DISTANCE in values:
         yield "all", f"{SMALLEST_DISTANCE_LABEL} [m]", [_number(values[SMALLEST_DISTANCE])]
 
@@ -341,15 +342,15 @@ def _number(value: float) -> str:
 
 
 class Stopwatch:
-    """When something has begun, and how long it has taken, even if the clock is set meanwhile."""
+    """Start and duration; the duration is right even if the clock is set meanwhile."""
 
     def __init__(self) -> None:
-        """Begin now."""
+        """Start now."""
         self._started = datetime.now(UTC)
         self._tick = monotonic()
 
     def times(self) -> dict[str, object]:
-        """What a record says of it."""
+        """The entries of a record about it."""
         return {
             "started": self._started.isoformat(timespec="seconds"),
             "seconds": round(monotonic() - self._tick, 3),
@@ -390,11 +391,11 @@ def write_record(
 
     Args:
         folder: with all other files of the result.
-        prepared: what was run.
+        prepared: the run.
         header, ending: of its table.
-        command: that has run it.
-        clock: started with it.
-        remarks: what else there is to say of it.
+        command: of the run.
+        clock: started with the run.
+        remarks: further entries.
 
     """
     content = {
@@ -423,7 +424,7 @@ def write_record(
 
 
 def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[str, object]:
-    """What is written of a table: :func:`header_in`, `ending_in` and `loops_in` read it again."""
+    """The entries about a table; :func:`header_in`, `ending_in` and `loops_in` read them."""
     return {
         "failure": ending.failure,
         "remark": ending.remark,
@@ -457,7 +458,7 @@ def write_content(
 
 
 def copy_record(folder: Path, content: Mapping[str, object]) -> None:
-    """Write a record as it is, but for the names of all files beside it."""
+    """Write a record unchanged, except for the names of all files beside it."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     whole = {**content, "files": sorted(files | {RECORD})}
     (folder / RECORD).write_text(in_json(whole), encoding="utf-8")
@@ -469,7 +470,7 @@ def in_json(content: Mapping[str, object]) -> str:
 
 
 def _as_texts(content: object) -> object:
-    """The same with texts for numbers that are not finite."""
+    """Replace numbers that are not finite by texts."""
     if isinstance(content, Mapping):
         return {name: _as_texts(value) for name, value in content.items()}
     if isinstance(content, list | tuple):
@@ -478,7 +479,7 @@ def _as_texts(content: object) -> object:
 
 
 def _as_numbers(content: Any) -> Any:
-    """The same with the numbers for these texts."""
+    """Replace these texts by numbers."""
     if isinstance(content, dict):
         return {name: _as_numbers(value) for name, value in content.items()}
     if isinstance(content, list):
@@ -487,7 +488,7 @@ def _as_numbers(content: Any) -> Any:
 
 
 def ending_in(record: dict[str, Any]) -> Ending:
-    """How a run has ended, from its record."""
+    """The end of a run, from its record."""
     events = (
         Occurrence(float(e["time"]), str(e["text"]), str(e["label"]), int(e.get("event", 0)))
         for e in record.get("events", ())
@@ -528,7 +529,7 @@ def _types_in(record: dict[str, Any]) -> dict[str, str]:
 
 
 def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
-    """The loops of the vehicles of a run, from its record; of one without, the standard one."""
+    """The loops of the vehicles of a run, from its record; the standard loop if it names none."""
     return tuple(loop_of(names) for names in record.get("vehicles", ())) or (STANDARD,)
 
 
@@ -539,13 +540,12 @@ def read_result(
     path: Path,
     watched: Callable[[Sequence[str], Sequence[Loop]], Collection[str]] | None = None,
 ) -> Drawn:
-    """What can be seen of a stored result, by its name.
+    """Read a stored result for drawing: only some columns, and no more rows than can be seen.
 
     Args:
-        path: a folder that a run has written, or a table in CSV or Parquet. Of a table without a
-            record beside it, no parameters are known.
-        watched: chooses the columns that will be drawn among the ones there are, given the loops;
-            None: what the paper's figures draw.
+        path: a folder that a run has written, or a table in CSV or Parquet; without a record
+            beside it, the parameters are unknown.
+        watched: chooses among the columns, given the loops; None: those of the paper's figures.
 
     Raises:
         InputError: there is no result, or it cannot be read.
@@ -576,7 +576,7 @@ def stored_rows(file: Path, record: dict[str, Any]) -> tuple[Header, Iterator[np
     columns = read_columns(place)
     header = header_in(record, columns) if record else None
     standing = header.standing if header else {}
-    blocks = read_rows(place, {name: one.number for name, one in standing.items()})
+    blocks = read_rows(place, {name: column.number for name, column in standing.items()})
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
@@ -598,12 +598,12 @@ def table_in(path: Path) -> Path:
 
 
 def changed_files(table: Path) -> list[Path]:
-    """The table of a result and its record, as far as they are not what the run wrote."""
+    """The table of a result and its record, if they were changed since the run wrote them."""
     return [file for file in (table, table.with_name(RECORD)) if is_changed(file)]
 
 
 def read_record(table: Path) -> dict[str, Any]:
-    """The record of the run that has written a table; empty if none beside it names the table.
+    """The record of the run that wrote a table; empty if there is none that names the table.
 
     Raises:
         InputError: it is broken.
@@ -629,7 +629,7 @@ def read_record(table: Path) -> dict[str, Any]:
 
 
 def _header(columns: tuple[str, ...], rows: np.ndarray, file: Path) -> Header:
-    """The header of a table without a record: its first rows tell the step."""
+    """The header of a table without a record, with the step of its first rows."""
     step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
     if not 0.0 < step < inf:
         raise InputError(f"{file}: times must increase")

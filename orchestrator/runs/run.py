@@ -300,8 +300,7 @@ def run_into(
     # The library of numpy's algebra ends the process if there is no memory for it: not later, when
     # there are rows to lose.
     np.linalg.inv(np.eye(1))
-    below = _folders(runs)
-    names = _names(runs, below)
+    below, names = _places(runs)
     done: list[WrittenRun] = []
     with (
         held_interrupts() as interrupts,
@@ -458,34 +457,29 @@ def _figures(prepared: Prepared) -> list[str]:
     return figure_files(prepared.scenario.figure, prepared.scenario.stem, prepared.loops)
 
 
-def _folders(runs: Sequence[Prepared]) -> list[str]:
-    """The folder of each run, from the first one's on."""
-    figures = _figures(runs[0])
-    taken = [*FILES, _certificates(""), *figures, CHECKPOINTS, INCOMPLETE, LEDGER]
-    return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
-
-
-def _names(runs: Sequence[Prepared], folders: Sequence[str]) -> list[str]:
-    """The files that will be written, as far as they are known."""
-    names = _figures(runs[0])
-    for prepared, below in zip(runs, folders, strict=True):
+def _places(runs: Sequence[Prepared]) -> tuple[list[str], list[str]]:
+    """The folder of each run within that of the first, and all files as far as they are known."""
+    files = _figures(runs[0])
+    taken = [*FILES, _certificates(""), *files, CHECKPOINTS, INCOMPLETE, LEDGER]
+    below = ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
+    for prepared, name in zip(runs, below, strict=True):
         certificates = map(_certificates, suffixes(prepared.loops).values())
-        names += [Path(below, name).as_posix() for name in (*FILES, *certificates)]
-    return names
+        files += [Path(name, file).as_posix() for file in (*FILES, *certificates)]
+    return below, files
 
 
 def _certificates(vehicle: str) -> str:
-    """The file of the certificates of a loop, whose name ends with what tells it from others."""
+    """The file of the certificates of a loop, by the suffix that names its vehicle."""
     return f"certificates{vehicle}.csv"
 
 
 def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:
-    """The columns of a table.
+    """The columns of a table; None: all.
 
     Args:
-        system: that is run.
+        system: the system of the run.
         wanted: `all`, `outputs`, or patterns with commas between them.
-        is_companion: whether patterns may match nothing, because they are meant for another run.
+        is_companion: whether patterns may match nothing, as they may be for another run.
 
     Raises:
         InputError: a pattern matches no column.
@@ -526,22 +520,22 @@ def checkpoints_of(
     token: str = "",
     say: Callable[[str], None] = lambda _: None,
 ) -> list[Checkpoints]:
-    """The checkpoints of some runs, one after the other.
+    """The checkpoints of some runs, made one after the other.
 
     Args:
-        runs: whose results go into a folder: of the first into it, of the others below it.
+        runs: the runs.
         folders: of their checkpoints.
-        every: one for so many simulated seconds [s]; None: as often as before, if runs are resumed.
-        resume: begin with those that are there.
-        force: move aside what is there otherwise.
-        token: random, for new ones; empty: one is drawn.
+        every: time between two checkpoints [simulated s]; None: as before, if runs are resumed.
+        resume: begin with the checkpoints that are there.
+        force: move aside other files that are there.
+        token: random, for new checkpoints; empty: one is drawn.
         say: takes notes for the user.
 
     Returns:
-        None at all, if none are wanted.
+        Those of each run; an empty list if none are wanted.
 
     Raises:
-        InputError: there is nothing to resume, or something else; or an FMU has no state.
+        InputError: there is nothing to resume, or an FMU does not provide its state.
 
     """
     if resume and every is None:
@@ -555,27 +549,25 @@ def checkpoints_of(
         return []
     for prepared in runs:
         check_gives_states(prepared.system)
-    found = [
-        Checkpoints(folder, prepared.identity, every, resume, force, token)
-        for folder, prepared in zip(folders, runs, strict=True)
-    ]
-    for checkpoints in found:
+    kept = []
+    for folder, prepared in zip(folders, runs, strict=True):
+        checkpoints = Checkpoints(folder, prepared.identity, every, resume, force, token)
         # FMUs may change the current folder.
         checkpoints.folder = checkpoints.folder.absolute()
-    times = [checkpoints.time for checkpoints in found]
-    for prepared, time in zip(runs, times, strict=True):
-        if time is not None:
-            say(f"{prepared.scenario.name}: continues at t = {time:g} s")
-    if resume and not any(times):
+        kept.append(checkpoints)
+    for checkpoints, prepared in zip(kept, runs, strict=True):
+        if checkpoints.time is not None:
+            say(f"{prepared.scenario.name}: continues at t = {checkpoints.time:g} s")
+    if resume and not any(checkpoints.time for checkpoints in kept):
         say(f"nothing to resume in {folders[0]}: starts from the beginning")
-    return found
+    return kept
 
 
 def check_gives_states(system: System) -> None:
-    """Check that the states of all FMUs can be had.
+    """Check that all FMUs provide their state.
 
     Raises:
-        InputError: of one they cannot.
+        InputError: one does not.
 
     """
     for name, component in system.components.items():
@@ -589,15 +581,15 @@ def check_gives_states(system: System) -> None:
 def leave_checkpoints(
     kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Remove checkpoints that are not needed any more, or say where they are.
+    """Remove checkpoints of complete runs, or say where they are.
 
     Args:
         kept: of runs that belong together.
-        is_whole: whether all of these have come to their end.
+        is_whole: whether all of them are complete.
         say: takes notes for the user.
 
     """
-    # The folder with the first one's holds the others'.
+    # The folder of the first holds those of the others.
     for checkpoints in reversed(kept):
         if is_whole:
             checkpoints.remove()
@@ -607,7 +599,7 @@ def leave_checkpoints(
 
 
 def _shown(folder: Path) -> Path:
-    """A folder as it is called from the current one, if that holds it."""
+    """A folder, relative to the current one if it is in it."""
     with suppress(OSError, ValueError):
         return folder.relative_to(Path.cwd())
     return folder

@@ -74,7 +74,7 @@ _NOT_A_SCENARIO, _NO_INPUTS = "not a scenario", "not a table of inputs"
 #: The name of a scenario that has no file.
 _NAMELESS = "scenario"
 
-#: What is run besides the scenarios that come with the bundle.
+#: Systems that are run besides the scenarios of the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
 
 #: The largest difference of times, so that it can be computed [s].
@@ -105,8 +105,8 @@ class Inputs:
 
     Attributes:
         file: with the table.
-        between: what continuous Real inputs do between two rows, `linear` or `hold`.
-        wins: over the parameters of the scenario, as a table of the command line does.
+        between: interpolation of continuous Real inputs between two rows, `linear` or `hold`.
+        wins: over the parameters of the scenario, like a table of the command line.
 
     """
 
@@ -131,7 +131,7 @@ class Inputs:
         Systems whose variables are alike share what was read.
 
         Raises:
-            InputError: the table cannot be read, or holds what is not of such a type.
+            InputError: the table cannot be read, or holds a value of another type.
 
         """
         kinds = tuple((v.type, v.min, v.max, *items_of(v).items()) for v in variables)
@@ -143,8 +143,8 @@ class Inputs:
         strings = StringTable()
         numbers: dict[str, Callable[[object], float]] = {}
         for name, variable in zip(self.names, variables, strict=True):
-            of = TYPES[variable.type]
-            if of.stands or of.family in ("Boolean", "Enumeration"):
+            kind = TYPES[variable.type]
+            if kind.stands or kind.family in ("Boolean", "Enumeration"):
                 numbers[name] = partial(_stand_in, name, variable, strings)
         blocks = read_rows(self.file, numbers, _NO_INPUTS)
         rows = np.vstack([np.empty((0, 1 + len(variables))), *blocks])
@@ -158,7 +158,7 @@ class Inputs:
 
 
 def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: object) -> float:
-    """The number for a cell of a table.
+    """The number that stands for a cell of a table.
 
     Raises:
         ValueError: the variable cannot have this value.
@@ -172,7 +172,7 @@ def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: o
 
 @dataclass(frozen=True)
 class Scenario:
-    """What to run and how to show it; :mod:`.scenario_file` says what each entry means.
+    """A system to run and how to show it; :mod:`.scenario_file` explains each entry.
 
     Attributes:
         name: of the file, without its ending.
@@ -232,7 +232,7 @@ def read_scenario(name: str) -> Scenario:
 
 
 def scenario_of(content: Mapping[str, Any]) -> Scenario:
-    """A scenario from what its file would hold; paths in it are relative to the current folder.
+    """A scenario from the content of a file; paths in it are relative to the current folder.
 
     Raises:
         InputError: there is a mistake in it.
@@ -242,10 +242,10 @@ def scenario_of(content: Mapping[str, Any]) -> Scenario:
 
 
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Check what can be checked of events without a system.
+    """Check events as far as is possible without a system.
 
     Raises:
-        Refused: an event is not written as one.
+        Refused: one of them is no event.
 
     """
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
@@ -268,15 +268,15 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
             listed = dict.fromkeys(content[key])
             content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
     if "path" in content:
-        said, others = content.pop("path"), content["parameters"]
-        component = said.get("component", STANDARD.planner)
-        found = path_parameters(path.parent / said["file"], component)
-        for name in found.keys() & others.keys():
-            raise InputError(f"{path}: {name} is already given by {said['file']}")
-        content["parameters"] |= found
+        table = content.pop("path")
+        component = table.get("component", STANDARD.planner)
+        waypoints = path_parameters(path.parent / table["file"], component)
+        for name in waypoints.keys() & content["parameters"].keys():
+            raise InputError(f"{path}: {name} is already given by {table['file']}")
+        content["parameters"] |= waypoints
     if "inputs" in content:
-        said = content["inputs"]
-        content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
+        table = content["inputs"]
+        content["inputs"] = Inputs(**table | {"file": path.parent / table["file"]})
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else fmu
@@ -290,12 +290,12 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
 def read_inputs(
     inputs: Inputs, system: System, given: Collection[PortName]
 ) -> tuple[System, InputTable]:
-    """A system that begins with the first values of a table, and what follows.
+    """A system that begins with the first values of a table, and the values that follow.
 
     Args:
-        inputs: that are wanted.
-        system: that has them.
-        given: ports that have values from where the table is named: it must not name them, too.
+        inputs: the table.
+        system: with the inputs.
+        given: ports with other values from the same file or command, which the table must not name.
 
     Raises:
         InputError: the table cannot be read, or a column is not an available input.
@@ -326,15 +326,15 @@ def with_input_table(
     given: Collection[PortName] = (),
     between: str = "linear",
 ) -> tuple[System, InputTable]:
-    """A system that begins with the first values of inputs over time, and what follows.
+    """A system that begins with the first values of inputs over time, and the values that follow.
 
     Args:
-        system: that has the inputs.
+        system: with the inputs.
         names: of the inputs.
         times: of their values [s].
         columns: their values, of each input in its type or as doubles.
         given: ports that have values already.
-        between: what continuous Real inputs do between two rows.
+        between: interpolation of continuous Real inputs between two rows.
 
     Raises:
         InputError: a column is not an available input, or cannot be followed.
@@ -387,7 +387,7 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
 
 
 def _typed(system: System, target: PortName, value: Value) -> Value:
-    """A value of a table in the type of an input, which takes whole doubles as integers, too."""
+    """Convert a value of a table to the type of an input; integers may be whole doubles."""
     variable = system.component(target.component).variable(target.port)
     return typed(str(target), variable, f"{value:.17g}" if isinstance(value, float) else value)
 
@@ -402,8 +402,8 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
     """Parameters with which a planner runs through the waypoints of a table.
 
     Args:
-        path: CSV with a line of names, x, y, z and maybe t, and a line a waypoint.
-        component: that is the planner.
+        path: CSV with a line of names, x, y, z and maybe t, and a line for each waypoint.
+        component: the planner.
 
     Raises:
         InputError: there is no such table, or it has a mistake.
@@ -429,7 +429,7 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
 
 
 def impossible_paths(system: System) -> Iterator[str]:
-    """What PathPlanners of a system will refuse of their paths, without a run of them."""
+    """Find paths that PathPlanners of a system will refuse, without running them."""
     for name, component in system.components.items():
         if component.description.modelName != _PATH_PLANNER:
             continue
@@ -479,9 +479,9 @@ def read_events(
     """The events of a run.
 
     Args:
-        where: they are written, for messages.
+        where: place of the tables, for messages.
         tables: checked by :func:`check_events`.
-        system: that they happen to.
+        system: to act on.
         followed: its inputs that follow a table.
 
     Raises:
@@ -535,9 +535,9 @@ def _event(table: Mapping[str, Any], system: System, followed: Collection[PortNa
 
 
 def _things(value: Any) -> Iterator[str]:
-    """What an event acts on, in words."""
+    """Name the targets of an event, with their values."""
     if isinstance(value, Mapping):
-        yield from (f"{name} = {_shown(one)}" for name, one in flatten(value))
+        yield from (f"{name} = {_shown(each)}" for name, each in flatten(value))
     else:
         yield from [value] if isinstance(value, str) else value
 
@@ -561,19 +561,19 @@ def _condition(text: str, system: System) -> Condition:
         raise InputError(str(error)) from None
 
 
-# What there is in a system
+# Signals of events
 
 
 def _ports(
     system: System, text: str, causalities: Sequence[str], single: bool = False
 ) -> list[PortName]:
-    """The port of a name, or the ports of a group; of all components that a name with stars means.
+    """The port of a name, or the ports of a group; a star stands for several components.
 
     Args:
-        system: that has them.
+        system: with the ports.
         text: `component.port` or `component.group`.
-        causalities: that they may have.
-        single: whether a port is wanted, and no group.
+        causalities: allowed ones.
+        single: whether the name must be that of one port.
 
     Raises:
         InputError: there is none.
@@ -583,7 +583,7 @@ def _ports(
     if len(several) > 1:
         if single:
             raise InputError(f"{text} are {len(several)} signals; name one of them")
-        return [port for one in several for port in _ports(system, str(one), causalities)]
+        return [port for name in several for port in _ports(system, str(name), causalities)]
     port = system.named(several[0])
     if not system.has(port) and not single and (members := system.members(text, causalities)):
         return members
@@ -598,13 +598,13 @@ def _ports(
 
 
 def _routes(system: System, port: PortName) -> list[Connection | None]:
-    """The connections along which a signal reaches inputs; None: it is an input itself."""
+    """The connections from an output to inputs; None stands for an input itself."""
     if system.component(port.component).variable(port.port).causality == "input":
         return [None]
-    found: list[Connection | None] = [c for c in system.connections if c.source == port]
-    if not found:
+    routes: list[Connection | None] = [c for c in system.connections if c.source == port]
+    if not routes:
         raise InputError(f"{port} feeds nothing here: an event would change nothing")
-    return found
+    return routes
 
 
 def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
@@ -622,7 +622,7 @@ def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple
     return paired(name, ports, value if isinstance(value, list) else [value] * len(ports))
 
 
-# What events do
+# Actions of events
 
 
 def _altered(
@@ -632,34 +632,34 @@ def _altered(
 ) -> tuple[tuple[PortName, Value], ...]:
     """The inputs that some signals reach, with what arrives there of their values."""
     return tuple(
-        (route.target if route else port, arriving(system, port, route, one))
+        (route.target if route else port, arriving(system, port, route, each))
         for name, value in flatten(values)
-        for port, one in _members(name, value, _ports(system, name, ("input", "output")))
+        for port, each in _members(name, value, _ports(system, name, ("input", "output")))
         for route in _routes(system, port)
     )
 
 
 def _value(system: System, port: PortName, route: Connection | None, value: Any) -> Value:
-    """What an input takes where a signal is overridden."""
+    """Convert the value of an overridden signal to that of an input."""
     variable = system.component(port.component).variable(port.port)
-    found = typed(str(port), variable, _text(value))
+    taken = typed(str(port), variable, _text(value))
     match route:
         case Connection(transformation=Linear() as change):
-            return _arrived(port, route, value, change(float(found)))
+            return _arrived(port, route, value, change(float(taken)))
         case Connection(transformation=Mapped(pairs)):
-            assert not isinstance(found, str)
-            return dict(pairs).get(found, found)
-    return found
+            assert not isinstance(taken, str)
+            return dict(pairs).get(taken, taken)
+    return taken
 
 
 def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
-    """What is added to an input where a signal is biased."""
+    """Convert the bias of a signal to that of an input."""
     variable = system.component(port.component).variable(port.port)
-    of = TYPES[variable.type]
-    if of.family not in ("Real", "Integer") or of.is_wide:
+    kind = TYPES[variable.type]
+    if kind.family not in ("Real", "Integer") or kind.is_wide:
         raise InputError(f"{port} is of type {variable.type}: nothing can be added to it")
     if not is_finite(value) or (
-        of.family == "Integer" and (value != int(value) or abs(value) > of.most - of.least)
+        kind.family == "Integer" and (value != int(value) or abs(value) > kind.most - kind.least)
     ):
         raise InputError(f"{port}: {value!r} cannot be added to it")
     match route:
@@ -671,7 +671,7 @@ def _offset(system: System, port: PortName, route: Connection | None, value: Any
 
 
 def _arrived(port: PortName, route: Connection, value: Any, arriving: float) -> float:
-    """What a value of an event is at the end of its way, where it must be a number still."""
+    """Check that a value is finite where it arrives."""
     if not isfinite(arriving):
         raise InputError(f"{port}: {value!r} is {arriving:g} where it arrives, at {route.target}")
     return arriving
@@ -685,18 +685,18 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
     fed = {connection.target: connection.source for connection in system.connections}
     parameters, inputs = [], []
     for name, value in flatten(values):
-        for port, one in _members(name, value, _ports(system, name, ("parameter", "input"))):
+        for port, each in _members(name, value, _ports(system, name, ("parameter", "input"))):
             variable = system.component(port.component).variable(port.port)
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":
-                inputs.append((port, typed(str(port), variable, _text(one))))
+                inputs.append((port, typed(str(port), variable, _text(each))))
             elif variable.variability != "tunable":
                 raise InputError(
                     f"{port} is a {variable.variability} parameter: it cannot change during a run"
                 )
             else:
-                parameters.append((port, typed(str(port), variable, _text(one))))
+                parameters.append((port, typed(str(port), variable, _text(each))))
     return Set(tuple(parameters), tuple(inputs))
 
 
@@ -707,7 +707,7 @@ def _reset(names: Any, system: System) -> Action:
     return Reset(tuple(_things(names)))
 
 
-#: What an event can do, by the key of its table.
+#: Actions of events, by the key of their table.
 ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "set": _set,
     "override": lambda values, system: Alter("override", _altered(values, system, _value)),

@@ -1,4 +1,4 @@
-"""What a scenario file may hold; scenario-files.md and its JSON schema are made from this."""
+"""Entries of a scenario file; scenario-files.md and its JSON schema are made from them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from orchestrator.vehicle.signals import STANDARD
 #: More vehicles take longer to put together than anyone waits.
 MOST_VEHICLES = 10_000
 
-#: What an input does between two rows of its table; the first is the default.
+#: Interpolations of an input between two rows of its table; the first is the default.
 INTERPOLATIONS = ("linear", "hold")
 
 #: Actions of an event after which there is nothing left that could end.
@@ -89,8 +89,8 @@ class EventTable(TomlTable):
             raise ValueError("write when it happens: either at or when")
         actions = [action for action in ACTIONS if getattr(self, action) is not None]
         if len(actions) != 1:
-            said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(ACTIONS)}"
-            raise ValueError(f"write one thing that it does, {said}")
+            hint = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(ACTIONS)}"
+            raise ValueError(f"write one thing that it does, {hint}")
         if self.duration is not None and actions[0] in AT_ONCE:
             raise ValueError(f"{actions[0]} has no duration: leave `for` out")
         if self.repeat is not None and self.when is None:

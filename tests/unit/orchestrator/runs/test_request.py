@@ -15,6 +15,7 @@ from orchestrator import simulate, sweep
 from orchestrator.commands.many_runs import add_sweep
 from orchestrator.commands.options import from_options
 from orchestrator.commands.run_command import add_run
+from orchestrator.machine.errors import InputError
 from orchestrator.runs.request import Files, Options, Request
 from orchestrator.studies.sweep import Means
 
@@ -96,6 +97,13 @@ def test_an_option_takes_no_other_value(wrong, capsys):
     with pytest.raises(SystemExit):
         parser.parse_args(["fig4", *wrong.split()])
     assert wrong.split()[0] in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["interval", "real_time", "checkpoint_every"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
+def test_what_is_no_length_of_time_is_refused(name, value):
+    with pytest.raises(InputError, match=f"{value:g}"):
+        Files(**{name: value})
 
 
 def test_simulate_has_the_options_as_keywords_with_their_types():
