@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import wraps
-from inspect import Parameter, signature
+from inspect import signature
 from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
@@ -96,15 +96,13 @@ def takes_keywords(
     docstring, `{arguments}` stands for their help.
     """
     hints, shown = get_type_hints(declared), signature(declared)
-    parameters = [
-        one.replace(annotation=hints[one.name], default=_default(one))
-        for one in shown.parameters.values()
-    ]
     texts = {one.name: one.metadata["help"] for one in fields(declared)}  # type: ignore[arg-type]
-    described = [
-        textwrap.fill(f"{one.name}: {texts[one.name]}.", 92, subsequent_indent=" " * 4)
-        for one in parameters
-    ]
+    described, parameters = [], []
+    for name, one in shown.parameters.items():
+        described.append(textwrap.fill(f"{name}: {texts[name]}.", 92, subsequent_indent=" " * 4))
+        # A dataclass shows a placeholder for a new mapping.
+        default = {} if repr(one.default) == "<factory>" else one.default
+        parameters.append(one.replace(annotation=hints[name], default=default))
 
     def decorate(function: Callable[[T], R]) -> Callable[P, R]:
         arguments = textwrap.indent("\n".join(described), " " * 8).lstrip()
@@ -126,12 +124,6 @@ def takes_keywords(
         return call
 
     return decorate
-
-
-def _default(parameter: Parameter) -> Any:
-    """The default of an argument, where a dataclass shows a placeholder for a new mapping."""
-    is_made = repr(parameter.default) == "<factory>"
-    return {} if is_made else parameter.default
 
 
 #: The help of options that not only runs have.

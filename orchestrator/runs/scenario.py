@@ -39,7 +39,6 @@ from orchestrator.cosim.hooks.events import (
     Stop,
 )
 from orchestrator.cosim.hooks.timing import InputTable
-from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import (
     PortName,
     file_name,
@@ -49,7 +48,7 @@ from orchestrator.cosim.system.names import (
     port_name,
 )
 from orchestrator.cosim.system.structure import System, is_spread
-from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system.units import Linear, Mapped, Transformation
 from orchestrator.cosim.system.values import (
     TYPES,
     Standing,
@@ -597,11 +596,11 @@ def _ports(
     return [port]
 
 
-def _routes(system: System, port: PortName) -> list[Connection | None]:
-    """The connections from an output to inputs; None stands for an input itself."""
+def _routes(system: System, port: PortName) -> list[tuple[PortName, Transformation | None]]:
+    """The inputs that a port feeds, with the transformation on the way; an input feeds itself."""
     if system.component(port.component).variable(port.port).causality == "input":
-        return [None]
-    routes: list[Connection | None] = [c for c in system.connections if c.source == port]
+        return [(port, None)]
+    routes = [(c.target, c.transformation) for c in system.connections if c.source == port]
     if not routes:
         raise InputError(f"{port} feeds nothing here: an event would change nothing")
     return routes
@@ -610,10 +609,10 @@ def _routes(system: System, port: PortName) -> list[Connection | None]:
 def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
     """The inputs that some signals reach."""
     return tuple(
-        route.target if route else port
+        target
         for name in _things(names)
         for port in _ports(system, name, ("input", "output"))
-        for route in _routes(system, port)
+        for target, _ in _routes(system, port)
     )
 
 
@@ -628,31 +627,33 @@ def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple
 def _altered(
     values: Mapping[str, Any],
     system: System,
-    arriving: Callable[[System, PortName, Connection | None, Any], Value],
+    arriving: Callable[[System, PortName, Any, Transformation | None], Value],
 ) -> tuple[tuple[PortName, Value], ...]:
-    """The inputs that some signals reach, with what arrives there of their values."""
-    return tuple(
-        (route.target if route else port, arriving(system, port, route, each))
-        for name, value in flatten(values)
-        for port, each in _members(name, value, _ports(system, name, ("input", "output")))
-        for route in _routes(system, port)
-    )
+    """The inputs that some signals reach, with the values that arrive there."""
+    altered = []
+    for name, value in flatten(values):
+        for port, each in _members(name, value, _ports(system, name, ("input", "output"))):
+            for target, change in _routes(system, port):
+                arrived = arriving(system, port, each, change)
+                if isinstance(arrived, float) and not isfinite(arrived):
+                    raise InputError(
+                        f"{port}: {each!r} is {arrived:g} where it arrives, at {target}"
+                    )
+                altered.append((target, arrived))
+    return tuple(altered)
 
 
-def _value(system: System, port: PortName, route: Connection | None, value: Any) -> Value:
+def _value(system: System, port: PortName, value: Any, change: Transformation | None) -> Value:
     """Convert the value of an overridden signal to that of an input."""
     variable = system.component(port.component).variable(port.port)
     taken = typed(str(port), variable, _text(value))
-    match route:
-        case Connection(transformation=Linear() as change):
-            return _arrived(port, route, value, change(float(taken)))
-        case Connection(transformation=Mapped(pairs)):
-            assert not isinstance(taken, str)
-            return dict(pairs).get(taken, taken)
-    return taken
+    if change is None:
+        return taken
+    assert not isinstance(taken, str)
+    return change(taken)
 
 
-def _offset(system: System, port: PortName, route: Connection | None, value: Any) -> float:
+def _offset(system: System, port: PortName, value: Any, change: Transformation | None) -> float:
     """Convert the bias of a signal to that of an input."""
     variable = system.component(port.component).variable(port.port)
     kind = TYPES[variable.type]
@@ -662,19 +663,9 @@ def _offset(system: System, port: PortName, route: Connection | None, value: Any
         kind.family == "Integer" and (value != int(value) or abs(value) > kind.most - kind.least)
     ):
         raise InputError(f"{port}: {value!r} cannot be added to it")
-    match route:
-        case Connection(transformation=Linear(factor, _)):
-            return _arrived(port, route, value, factor * float(value))
-        case Connection(transformation=Mapped()):
-            raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
-    return float(value)
-
-
-def _arrived(port: PortName, route: Connection, value: Any, arriving: float) -> float:
-    """Check that a value is finite where it arrives."""
-    if not isfinite(arriving):
-        raise InputError(f"{port}: {value!r} is {arriving:g} where it arrives, at {route.target}")
-    return arriving
+    if isinstance(change, Mapped):
+        raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
+    return change.factor * float(value) if isinstance(change, Linear) else float(value)
 
 
 def _text(value: Any) -> Any:
