@@ -302,7 +302,7 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
     # Who listens hears something else, in its own units.
     assert through(degrees, bias={str(target): 2.0}) == Alter("bias", ((target, 2.0),))
     for kind in ("override", "bias"):
-        with pytest.raises(InputError, match=rf"phi: 1e\+300 arrives at {target} as inf"):
+        with pytest.raises(InputError, match=rf"phi: 1e\+300 is inf where it arrives, at {target}"):
             through(Linear(1e300), **{kind: {name: 1e300}})
     mapped = Mapped(((0.0, 7.0), (1.0, 5.0)))
     assert through(mapped, override={name: 1.0}) == Alter("override", ((target, 5.0),))
