@@ -1,6 +1,6 @@
 """Co-simulate an autonomous underwater vehicle from FMI components, or any system of an SSP.
 
-    from orchestrator import simulate
+    from auv_fmu import simulate
     result = simulate("fig4", {"plant.noise.std": 0.0})
     result.plot("plant.eta.*")
 
@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from orchestrator.runs.loading import load
     from orchestrator.runs.result import Result, read
-    from orchestrator.runs.simulate import simulate
+    from orchestrator.runs.run import simulate
     from orchestrator.studies.study_result import StudyResult
     from orchestrator.studies.sweep import sweep
 
@@ -42,7 +42,7 @@ _MODULES = {
     "StudyResult": "studies.study_result",
     "load": "runs.loading",
     "read": "runs.result",
-    "simulate": "runs.simulate",
+    "simulate": "runs.run",
     "sweep": "studies.sweep",
 }
 

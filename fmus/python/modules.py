@@ -81,7 +81,7 @@ def _root(top: str, packages: Mapping[str, Path], own: Path | None) -> Path | No
 
 def _imported(tree: ast.AST, package: str) -> Iterator[str]:
     """The names that may be of modules in the imports of a module; a star is one of them."""
-    for node in ast.walk(tree):
+    for node in _executed(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):
@@ -92,6 +92,17 @@ def _imported(tree: ast.AST, package: str) -> Iterator[str]:
             # Last in, first out: the package before what is in it.
             yield from (f"{base}.{alias.name}" for alias in node.names)
             yield base
+
+
+def _executed(tree: ast.AST) -> Iterator[ast.AST]:
+    """The nodes of a module, without those that only a type checker reads."""
+    nodes = [tree]
+    for node in nodes:
+        if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
+            nodes += node.orelse
+        else:
+            nodes += ast.iter_child_nodes(node)
+    return iter(nodes)
 
 
 # Other names

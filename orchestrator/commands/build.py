@@ -1,4 +1,4 @@
-"""`auv-fmu build`, `new` and `gains`: build FMUs, and answer without a run."""
+"""`auv-fmu build`, `new` and `gains`: build FMUs, write templates, check gains."""
 
 from __future__ import annotations
 
@@ -129,7 +129,7 @@ def add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_place(parser: argparse.ArgumentParser, what: str, examples: str) -> None:
-    """Declare name and folder of what is new."""
+    """Declare name and folder of a new component."""
     parser.add_argument("name", metavar="NAME", help=f"name of the {what}, for example {examples}")
     parser.add_argument(
         "folder",
@@ -199,7 +199,7 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 def _described(settings: Mapping[str, str]) -> str:
-    """How FMUs were built, in words."""
+    """Describe the settings of a build."""
     if settings["kind"] == PYTHON:
         return f"with the {settings['loader']} loader"
     return f"FMI {settings['fmi']}.0 for {settings['platforms']}, by {settings['compiler']}"
@@ -214,7 +214,7 @@ def _component(options: argparse.Namespace) -> int:
 
 
 def _next_steps(files: list[Path]) -> int:
-    """Say what was made, and what to do with it."""
+    """Show the new files and the next commands."""
     show(*files)
     script, tests = files[0], [path for path in files[1:] if path.suffix == ".py"]
     [scenario] = [path for path in files if path.suffix == ".toml"]

@@ -1,4 +1,4 @@
-"""`auv-fmu check`: what is wrong with files, without running them."""
+"""`auv-fmu check`: find mistakes in files without running them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
 
-#: What surprises the user of an FMU, by a flag of its description and the value that means it.
+#: Surprises for the user of an FMU, by a flag of its description and the value that means it.
 _SURPRISES = {
     ("canBeInstantiatedOnlyOncePerProcess", True): "allows one instance per process: each "
     "further one runs in a separate process",
@@ -60,11 +60,11 @@ def _check(options: argparse.Namespace) -> int:
         look = _fmu
     else:
         look = _study if is_study(options.file) else _system
-    to_know = look(options, findings)
+    remarks = look(options, findings)
     for kind, texts in (
         ("problem", findings.problems),
         ("note", findings.notes),
-        ("info", to_know),
+        ("info", remarks),
     ):
         for text in texts:
             show(f"{kind}: {text}")
@@ -75,9 +75,9 @@ def _check(options: argparse.Namespace) -> int:
 
 
 def _is_own(path: Path) -> bool:
-    """Whether a path is a script, or a folder with a component, which are imported.
+    """Tell whether a path is a script, or a folder with a component, to be imported.
 
-    A folder with a system or an FMU is none, whatever else is in it.
+    A folder with a system or an FMU is not, whatever else is in it.
     """
     others = (OSP_STRUCTURE, "modelDescription.xml")
     if any((path / name).is_file() for name in others) or any(path.glob("*.ssd")):
@@ -86,8 +86,8 @@ def _is_own(path: Path) -> bool:
 
 
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Check a study as `sweep` does before its first run; returns what to know of it."""
-    # For this alone it takes half a second.
+    """Check a study as `sweep` does before its first run; returns remarks."""
+    # Their import takes half a second.
     from orchestrator.studies.study import SOBOL  # noqa: PLC0415
     from orchestrator.studies.study_file import read_study  # noqa: PLC0415
     from orchestrator.studies.sweep import Means, check_installed, prepare_study  # noqa: PLC0415
@@ -103,7 +103,7 @@ def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
 
 
 def _script(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Check a component of the user's own; there is nothing else to know."""
+    """Check a component of the user's own; there are no remarks."""
     with TemporaryDirectory() as folder:
         process = run_module("fmus.check", options.file, "--out", folder)
         if process.returncode != 0:
@@ -117,7 +117,7 @@ def _script(options: argparse.Namespace, findings: Findings) -> list[str]:
 
 
 def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Check an FMU; returns what to know of it."""
+    """Check an FMU; returns remarks."""
     component = examine(Path(options.file), findings)
     if component is None:
         return []
@@ -127,7 +127,7 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
 
 
 def _binary(component: Component, findings: Findings) -> list[str]:
-    """Check the library of an FMU; returns what to know of it."""
+    """Check the library of an FMU; returns remarks."""
     with findings.collecting():
         check_binary(component, component.folder)
         if not binary_of(component, component.folder).is_file():
@@ -136,31 +136,31 @@ def _binary(component: Component, findings: Findings) -> list[str]:
 
 
 def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
-    """Check a system as a whole, then its components; returns what to know of it."""
-    to_know: list[str] = []
+    """Check a system as a whole, then its components; returns remarks."""
+    remarks: list[str] = []
     with findings.collecting():
         scenario, system = load_scenario(options.file, variant=options.variant, findings=findings)
         for name, component in system.components.items():
             known = (*_binary(component, findings), *surprises(component))
-            to_know += [f"{name}: {text}" for text in known]
+            remarks += [f"{name}: {text}" for text in known]
         request = Request()
         if scenario.stop_time is None and system.stop_time is None:
-            to_know.append("has no stop time: a run needs --stop-time")
+            remarks.append("has no stop time: a run needs --stop-time")
             request = Request(stop_time=(system.start_time or 0.0) + FALLBACK_STOP_TIME)
         prepared = prepare(scenario, system, request)
         for text in impossible_paths(prepared.system):
             findings.problem(text)
-        to_know += [
+        remarks += [
             f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved if the FMUs "
             "compute their outputs between steps, else delayed by a step"
             for ring in prepared.plan.rings
         ]
-        to_know += prepared.doubts()
-    return to_know
+        remarks += prepared.doubts()
+    return remarks
 
 
 def examine(fmu: Path, findings: Findings) -> Component | None:
-    """Note everything that is wrong with an FMU.
+    """Note all mistakes in an FMU.
 
     Args:
         fmu: the file.
@@ -191,7 +191,7 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 
 
 def surprises(component: Component) -> Iterator[str]:
-    """What an FMU cannot do, or does differently from most."""
+    """Name abilities that an FMU lacks, and its differences from most FMUs."""
     if component.unsupported:
         yield component.remainder
     if any(variable.type == "Clock" for variable in component.description.modelVariables):
@@ -211,7 +211,7 @@ def surprises(component: Component) -> Iterator[str]:
 
 
 def _flaws(fmu: Path) -> list[str]:
-    """What the standard's schema and rules have against the description."""
+    """Find violations of the standard's schema and rules in the description."""
     if not (unpack(fmu).folder / "modelDescription.xml").is_file():
         # The reader of the FMU says so.
         return []

@@ -37,10 +37,9 @@ from orchestrator.runs.folder import replace_files
 from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
 from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Files, Request
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.runs.scenario_events import read_events
+from orchestrator.runs.scenario import read_events, read_scenario
 
-#: What a scenario can be exported as.
+#: Formats of an export.
 EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"
 
 #: Options of `export` that are for one format only.
@@ -72,9 +71,8 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--flat",
         action="store_true",
-        help="write an SSP without systems in it, for tools that read none (libcosim, ecos, "
-        "OMSimulator's C++ program): auv1.plant becomes auv1_plant, and each component has a copy "
-        "of its FMU",
+        help="write a flat SSP, for tools without nested systems (libcosim, ecos, OMSimulator's "
+        "C++ program): auv1.plant becomes auv1_plant, and each component has a copy of its FMU",
     )
     parser.add_argument(
         "--connectors",
@@ -175,8 +173,8 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         choices=INITIAL,
         default=INITIAL[0],
         help="when the tool first exchanges values: full (in initialisation mode), none (just "
-        "before the first step) or zero (not before it; inputs begin with zeros or start "
-        f"values); default: {INITIAL[0]}",
+        "before the first step) or zero (inputs keep their start values, or zeros, during the "
+        f"first step); default: {INITIAL[0]}",
     )
     parser.add_argument(
         "--verbose", action="store_true", help="name everything that was not compared"
@@ -195,21 +193,21 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
         "--scenario",
         default="fig4",
         metavar="SCENARIO|FILE|DIR",
-        help="scenario that the other tool runs; default: fig4",
+        help="scenario to run; default: fig4",
     )
 
 
 def _export(options: argparse.Namespace) -> int:
-    for name, wanted in _OF_FORMAT.items():
-        if getattr(options, name) and options.format != wanted:
-            raise InputError(f"--{name} applies only to --format {wanted}: leave it out")
-    # One program is made of what the components' authors wrote, whatever their own FMUs are.
+    for name, format_name in _OF_FORMAT.items():
+        if getattr(options, name) and options.format != format_name:
+            raise InputError(f"--{name} applies only to --format {format_name}: leave it out")
+    # One program is made from the sources of the components, whatever kind their FMUs are.
     is_one = options.format in (FMU, C)
     chosen = (AUTO, FMI_VERSIONS[0]) if is_one else (options.kind, options.fmi)
     scenario, system = read_system(options, *chosen)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
-        # What names no end is written without one.
+        # A system without a stop time is written without one.
         stop_time=None if ends else (system.start_time or 0.0) + FALLBACK_STOP_TIME,
         step=options.step,
         parameters=assignments(options),
@@ -279,13 +277,13 @@ def _hosts(options: argparse.Namespace) -> int:
     agree = True
     for verdict in verdicts:
         host = HOSTS[verdict.host]
-        said = verdict.failure
-        if said is None:
+        text = verdict.failure
+        if text is None:
             order = f"{host.initial}: {host.order}{', after' if host.turned else ''}"
             microseconds = 1e6 / verdict.steps_per_second
             note = "" if verdict.agrees else f", above {BOUND:g}"
-            said = f"{order:42} {verdict.deviation:9.1e} {microseconds:8.1f}  {verdict.port}{note}"
-        show(f"{verdict.host:14} {verdict.package:28} {kind:15} {said}")
+            text = f"{order:42} {verdict.deviation:9.1e} {microseconds:8.1f}  {verdict.port}{note}"
+        show(f"{verdict.host:14} {verdict.package:28} {kind:15} {text}")
         agree &= verdict.agrees
     return OK if agree else FAILED
 
@@ -313,7 +311,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
 
 
 def _verify_carried(options: argparse.Namespace) -> int:
-    """Verify an FMU by what it carries; nothing less than agreement in all of it will do."""
+    """Verify an FMU by the results that it carries; all of them must agree."""
     carried = Carried(options.table, options.verbose)
     show(f"{options.table.name}: FMI-LS-REF {carried.version}")
     for note in carried.notes:

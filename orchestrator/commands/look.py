@@ -27,14 +27,14 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
-from orchestrator.runs.record import changed_files, read_record, read_result, table_in
 from orchestrator.runs.request import Files, Request
+from orchestrator.runs.result import changed_files, read_record, read_result, table_in
 from orchestrator.vehicle.signals import loops_of
 
 #: The scenario that a live page opens unless another is named.
 _OPENED = "fig4"
 
-#: What a plot can be written as.
+#: Formats of a plot.
 _PLOTS = (".png", ".svg", ".pdf")
 
 
@@ -93,8 +93,8 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu animate`."""
     describe(
         parser,
-        "Run a scenario and write a film of the vehicle with its errors and commands, or of "
-        "several vehicles with the sizes of their errors and their smallest distance.",
+        "Run a scenario and write a film of the vehicle with its errors and commands; for several "
+        "vehicles: error norms and smallest distance.",
         "animate fig4 --out fig4.gif",
     )
     add_system(parser)
@@ -134,7 +134,7 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _warn(table: Path) -> None:
-    """Say of a result that is not what the run wrote."""
+    """Warn of files that were changed since the run wrote them."""
     for file in changed_files(table):
         say(f"warning: {file} was changed since the run wrote it")
 
@@ -152,7 +152,7 @@ def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
 
 
 def _is_there(text: str) -> bool:
-    """Whether there is such a file or folder; not if the text cannot be the name of one."""
+    """Tell whether there is such a file or folder; a text that is no path names none."""
     with suppress(OSError):
         return Path(text).exists()
     return False
@@ -167,7 +167,7 @@ def _view(options: argparse.Namespace) -> int:
     run = read_result(file)
     record = read_record(file)
     title = str(record.get("title") or run.label)
-    # A title may name all runs that a scenario compares; the page shows one.
+    # A title may name all compared runs; the page shows one.
     if label := record.get("label"):
         title += f" (shown: {label})"
     try:
@@ -212,7 +212,7 @@ def _animate(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _written(file: Path, force: bool) -> Iterator[Path]:
-    """A folder to write a file into that then lies in its own, whole or not at all; says where."""
+    """Give a folder to write a file into, move the file to its own folder, and show its path."""
     with replace_files(file.parent, [file.name], force=force) as unfinished:
         yield unfinished
     show(file)

@@ -1,4 +1,4 @@
-"""The entry point of `auv-fmu`, which imports only what the named command needs."""
+"""The entry point of `auv-fmu`; it imports only the modules of the named command."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, StartError, did_you_mean, reason
 from orchestrator.machine.interrupts import orderly_end
 
-#: The commands: the module that has `add_COMMAND`, and what they are for.
+#: The commands: the module with `add_COMMAND`, and the purpose.
 COMMANDS = {
     "build": ("build", "build the bundle (every FMU, and auv.ssp), or your own component"),
     "list": ("listing", "list the scenarios"),
@@ -31,12 +31,12 @@ COMMANDS = {
     "sweep": ("many_runs", "run a study"),
     "plot": ("look", "plot signals of stored results"),
     "view": ("look", "write a page that plays a stored result in 3D"),
-    "live": ("look", "write a page in which a scenario runs while you change its settings"),
+    "live": ("look", "write an interactive page: move sliders, watch the loop"),
     "animate": ("look", "write a film of a scenario"),
     "new": ("build", "create a component or a controller from a template"),
     "report": ("many_runs", "run all scenarios and compare them with the paper"),
     "table": (
-        "many_runs", "compare the paper's table with every reading"
+        "many_runs", "try every interpretation of the paper's open points"
     ),
     "export": ("exchange", "write a scenario for other tools"),
     "release": ("exchange", "write the archives of a release"),
@@ -53,16 +53,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
             ends after it.
 
     """
-    # No matrix here is worth a thread, and where one cannot be had numpy's library ends in Ctrl-C.
+    # No matrix here is worth a thread, and numpy's library ends in Ctrl-C where it gets none.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Where it can keep no fonts it says so at length, and draws all the same.
+    # Without a folder for its fonts, it complains at length and draws all the same.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     streams.fill_streams()
     status = OK
     try:
         with orderly_end(arguments is None), warnings.catch_warnings():
             warnings.showwarning = partial(_warn, warnings.showwarning)
-            # What is in the current folder may belong to someone else.
+            # A file in the current folder may belong to someone else.
             imported_apart("matplotlib", "matplotlibrc")
             given = sys.argv[1:] if arguments is None else list(arguments)
             options = parser(given).parse_args(given)
@@ -83,14 +83,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say("interrupted")
         status = INTERRUPTED
     except (OSError, MemoryError, ImportError) as error:
-        # Whatever else this machine does not give.
+        # Limits of this machine.
         say(reason(error))
         status = BAD_INPUT
     return status if streams.finished() else status or FAILED
 
 
 def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *place: Any) -> None:
-    """Say what is for the user, without the line of the program that it comes from."""
+    """Say a warning for the user, without the line of code that it comes from."""
     if category is UserWarning:
         say(f"warning: {message}")
     else:
@@ -98,7 +98,7 @@ def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *plac
 
 
 def _check_no_empty(arguments: Sequence[str]) -> None:
-    """Check that all arguments say something: a variable of the shell may be unset.
+    """Check that no argument is empty, as that of an unset variable of the shell.
 
     Raises:
         InputError: one is empty.
@@ -112,10 +112,10 @@ def _check_no_empty(arguments: Sequence[str]) -> None:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that answers a mistake with two lines: the usage in short, and what is wrong."""
+    """A parser that answers a mistake with two lines: a short usage, and the mistake."""
 
     def parse_known_args(self, *arguments: Any, **more: Any) -> tuple[Any, list[str]]:
-        """Parse arguments, all of which must be known: else the whole program would complain."""
+        """Parse arguments; the parser of a command refuses unknown ones, with its own usage."""
         options, unknown = super().parse_known_args(*arguments, **more)
         if unknown:
             names = (word.partition("=")[0] for word in unknown if word.startswith("-"))
@@ -131,7 +131,7 @@ class Parser(argparse.ArgumentParser):
             raise argparse.ArgumentError(action, f"invalid choice: {value!r}{hint}")
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and end the process."""
+        """Print the mistake, and end the process."""
         words = []
         for action in self._get_positional_actions():
             many = "" if action.nargs in (None, argparse.OPTIONAL) else " ..."
@@ -146,8 +146,8 @@ def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
     """The parser of the command line.
 
     Args:
-        given: arguments; other commands have only their help, because importing all that a
-            command needs takes up to a second.
+        given: arguments; commands that they do not name have only their help, because importing
+            the modules of a command takes up to a second.
 
     """
     parser = Parser(

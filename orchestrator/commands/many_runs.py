@@ -63,7 +63,8 @@ def add_table(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu table`."""
     describe(
         parser,
-        "Compare the printed table of section 4.2 with every reading of the paper.",
+        "Try every interpretation of the paper's open points, and compare each with the printed "
+        "table of section 4.2.",
         "table --out results/table",
     )
     add_out(parser, Path("results", "table"))

@@ -1,4 +1,4 @@
-"""Options that several commands share, their meaning, and the report of a run's end."""
+"""Options that several commands share, and the report of the end of a run."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from orchestrator.cosim.observers.observer import Ending
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.request import Request, flag, option_fields
+from orchestrator.runs.request import Request, flags
 from orchestrator.runs.scenario import Scenario
 
 T = TypeVar("T")
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:
-    """What is run."""
+    """Declare the system to run."""
     parser.add_argument(
         "scenario",
         metavar="SCENARIO|FILE|DIR",
@@ -31,7 +31,7 @@ def add_system(parser: argparse.ArgumentParser) -> None:
 
 
 def add_variant(parser: argparse.ArgumentParser) -> None:
-    """Which system of an archive."""
+    """Declare the choice of a system in an archive."""
     parser.add_argument(
         "--variant",
         metavar="NAME",
@@ -41,26 +41,24 @@ def add_variant(parser: argparse.ArgumentParser) -> None:
 
 def add_options(parser: argparse.ArgumentParser, declared: type[Any], *names: str) -> None:
     """Add the fields of a dataclass that are options: the named ones, or all."""
-    defaults = declared()
-    for name, one in option_fields(declared).items():
+    for name, flag, how in flags(declared):
         if not names or name in names:
-            default = getattr(defaults, name)
-            parser.add_argument(flag(name), default=default, help=one.help, **one.how)
+            parser.add_argument(flag, **how)
 
 
 def from_options(declared: type[T], options: argparse.Namespace) -> T:
     """Make a dataclass from the options that are its fields; other fields keep their defaults."""
     given = vars(options)
-    return declared(**{name: given[name] for name in option_fields(declared) if name in given})
+    return declared(**{name: given[name] for name, *_ in flags(declared) if name in given})
 
 
 def request(options: argparse.Namespace) -> Request:
-    """What the user asks for."""
+    """Make a request from the options."""
     return replace(from_options(Request, options), parameters=assignments(options))
 
 
 def add_fmi(parser: argparse.ArgumentParser, *others: str) -> None:
-    """Which version of FMI; `others` are further options that can have the last one."""
+    """Declare the version of FMI; `others` are further options that can have the last one."""
     needs = " or ".join((f"--kind {NATIVE}", *others))
     parser.add_argument(
         "--fmi",
@@ -71,7 +69,7 @@ def add_fmi(parser: argparse.ArgumentParser, *others: str) -> None:
 
 
 def add_platforms(parser: argparse.ArgumentParser, what: str) -> None:
-    """Which platforms there are libraries for; `what` names the option that makes some."""
+    """Declare the platforms of libraries; `what` names the option that makes libraries."""
     parser.add_argument(
         "--platforms",
         metavar="NAME,...|all",
@@ -81,7 +79,7 @@ def add_platforms(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_kind(parser: argparse.ArgumentParser) -> None:
-    """Which kind of FMU goes to other tools: one that does not depend on the compiler here."""
+    """Declare the kind of FMUs for other tools; the default does not depend on a compiler here."""
     parser.add_argument(
         "--kind",
         choices=KINDS,
@@ -92,7 +90,7 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
-    """Values that win over the scenario's."""
+    """Declare values in place of the scenario's."""
     parser.add_argument(
         "--set",
         action="append",
@@ -103,7 +101,7 @@ def add_set(parser: argparse.ArgumentParser) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
-    """Where the files go: a path, or in words."""
+    """Declare the output folder; its default is a path, or a text for the help alone."""
     path = default if isinstance(default, Path) else None
     text = f"output folder; default: {default}"
     parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
@@ -115,15 +113,15 @@ def read_system(
     """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
     kind = options.kind if kind is None else kind
-    found = load_scenario(options.scenario, kind, fmi, options.variant, findings)
+    scenario, system = load_scenario(options.scenario, kind, fmi, options.variant, findings)
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")
-    return found
+    return scenario, system
 
 
 def status(name: str, ending: Ending) -> int:
-    """Exit status of a run, after saying what happened and what went wrong in it."""
+    """Say the events and the end of a run, and return its exit status."""
     failure = ending.failure or ""
     for message in ending.messages:
         if not failure.endswith(f": {message}"):
@@ -145,7 +143,7 @@ def assignments(options: argparse.Namespace) -> dict[str, object]:
         name, equals, value = map(str.strip, text.partition("="))
         if not equals:
             raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
-        # The last one wins, also over a group before it.
+        # The last assignment wins, also over a group before it.
         values.pop(name, None)
         values[name] = value
     return values

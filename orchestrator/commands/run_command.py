@@ -1,4 +1,4 @@
-"""`auv-fmu run`; it needs nothing of studies, which take a fifth of a second to import."""
+"""`auv-fmu run`, apart from the studies, which take a fifth of a second to import."""
 
 from __future__ import annotations
 
@@ -56,47 +56,47 @@ def _run(options: argparse.Namespace) -> int:
     step = runs[0].experiment.step
     if files.interval is not None and files.interval < step:
         findings.note(
-            f"--interval {files.interval:g}: shorter than the step of {step:g} s, so that the "
-            "table has a row for each step"
+            f"--interval {files.interval:g}: shorter than the step of {step:g} s: the table has "
+            "one row per step"
         )
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
     draw = None if files.no_figures or not _has_vehicle(runs[0]) else _drawing()
-    # Until all is written: a user who stops a run several times wants to know where its rows are.
+    # To the very end: after several interrupts, too, the user is told where the rows are.
     with held_interrupts(_answer, is_last=True):
-        finished = run_into(folder, runs, files, options.command, say, draw)
+        place, finished = run_into(folder, runs, files, options.command, say, draw)
         for run in finished:
             _print_summary(run.metrics)
             for note in run.notes:
                 show(f"  {note}")
-        show(f"written to {finished[0].folder}{os.sep}")
-        if finished[0].folder != folder:
+        show(f"written to {place}{os.sep}")
+        if place != folder:
             say(f"{folder} still holds the earlier, complete result")
     return max(status(run.name, run.ending) for run in finished)
 
 
 def _has_vehicle(prepared: Prepared) -> bool:
-    """Whether there is a vehicle, which all figures show."""
+    """Tell whether there is a vehicle, which all figures show."""
     return any(loop.vehicle in prepared.system.components for loop in prepared.loops)
 
 
 def _drawing() -> Callable[..., list[str]]:
-    """What draws: it takes as long to import as all else, and not when there are rows to lose."""
+    """Import the drawing function, which takes long, before there are rows to lose."""
     from orchestrator.figures.drawing import draw  # noqa: PLC0415
 
     return draw
 
 
 def _answer(interrupts: Interrupts) -> None:
-    """Tell the user at once what happens now, from within the handler of the signal."""
+    """Answer an interrupt from within the handler of its signal."""
     text = "stopping: writing and drawing the computed rows; interrupt again to skip the figures"
     if interrupts.urgent:
         text = (
             "stopping at once, without figures; a third interrupt ends an FMU that does not return"
         )
-    # print could have been interrupted itself, and must not be entered a second time.
+    # The signal may have interrupted print, which must not be entered a second time.
     with suppress(OSError):
         os.write(2, f"auv-fmu: {text}\n".encode())
 

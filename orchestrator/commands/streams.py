@@ -1,4 +1,4 @@
-"""What the command line says: lines, and its exit status. Streams may be closed or full."""
+"""Output of the command line and its exit statuses; streams may be closed or full."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class Unheard(Exception):
 
 
 def fill_streams() -> None:
-    """Put the null device where a standard stream is closed.
+    """Open the null device in place of closed standard streams.
 
-    The next file that is opened would take its place, and get what is printed.
+    Otherwise, the next file that is opened would take the place, and get the output.
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -36,7 +36,7 @@ def fill_streams() -> None:
 
 
 def say(text: str) -> None:
-    """A line for the user beside the output."""
+    """Write a line for the user to standard error."""
     with suppress(OSError):
         print(
             shortened(f"auv-fmu: {escape_unprintable(text)}", _LONGEST), file=sys.stderr, flush=True
@@ -44,7 +44,7 @@ def say(text: str) -> None:
 
 
 def show(*lines: object) -> None:
-    """Lines of output.
+    """Write lines of output.
 
     Raises:
         Unheard: they cannot be written.
@@ -59,13 +59,13 @@ def show(*lines: object) -> None:
 
 
 def _in_its_letters(stream: TextIO, text: str) -> str:
-    """A text with escapes for letters that a stream has not: Windows' code pages have few."""
+    """Escape letters that a stream cannot write: Windows' code pages have few."""
     encoding = stream.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def finished() -> bool:
-    """Whether all output could be written; says why, if it could not."""
+    """Tell whether all output could be written, and say why if not."""
     return all([_flushed(sys.stdout), _flushed(sys.stderr)])
 
 
@@ -81,11 +81,11 @@ def _flushed(stream: TextIO) -> bool:
 def _give_up(stream: TextIO, error: OSError) -> None:
     # Python would try again when the process ends, and complain.
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-    # Where a reader has gone, nobody misses the rest.
+    # If the reader has gone, nobody misses the rest.
     if not isinstance(error, BrokenPipeError):
         say(f"cannot write the output: {error.strerror}")
 
 
 def describe(parser: argparse.ArgumentParser, text: str, example: str) -> None:
-    """Say above the options what a command does, and give an example below them."""
+    """Set the description of a command, and an example below its options."""
     parser.description, parser.epilog = text, f"Example: auv-fmu {example}"

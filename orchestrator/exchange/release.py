@@ -15,7 +15,7 @@ from fmus.discovery import REFERENCE, components, licences, package_folder, sour
 from fmus.kinds import FMI_VERSIONS, NATIVE
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.platforms import platforms
-from orchestrator.runs.bundle import ARCHIVE, ZIG, build_bundle, settings_of, write_papers
+from orchestrator.runs.bundle import ARCHIVE, build_bundle, write_checksums
 from orchestrator.runs.folder import replace_files
 
 #: The page of an archive.
@@ -28,7 +28,8 @@ _REFERENCES = Path(__file__).with_name(REFERENCE), Path(__file__).parents[2] / R
 #: The version of SSP that goes with each of FMI.
 _SSP_VERSIONS: dict[str, str] = dict(zip(FMI_VERSIONS, ("1.0", "2.0"), strict=True))
 
-#: The licences of what ziglang links into libraries, where it has them.
+#: The licences of what ziglang links into libraries, where it has them: parts of zig's C library,
+#: and for Windows of mingw-w64's.
 _LINKED = {"zig.txt": "LICENSE", "mingw-w64.txt": "lib/libc/mingw/COPYING"}
 
 
@@ -68,7 +69,7 @@ def _contents(folder: Path, fmi: str, hear: Callable[[str], None]) -> Iterator[t
         path.write_bytes(content)
     # In an order of their own: a folder's is another one elsewhere.
     files = sorted((*folder.glob("*.fmu"), folder / ARCHIVE, *(folder / name for name in others)))
-    for path in (*files, *write_papers(folder, files, settings_of(folder))):
+    for path in (*files, write_checksums(folder, files)):
         yield path.relative_to(folder).as_posix(), path.read_bytes()
 
 
@@ -87,7 +88,7 @@ def _licences() -> Iterator[tuple[str, bytes]]:
     """Licences of the FMUs, and of what a compiler links into their libraries."""
     yield "licenses/auv-fmu.txt", licences(NATIVE).encode()
     for name, file in _LINKED.items():
-        yield f"licenses/{name}", (package_folder(ZIG) / file).read_bytes()
+        yield f"licenses/{name}", (package_folder("ziglang") / file).read_bytes()
 
 
 def _references() -> Iterator[tuple[str, bytes]]:

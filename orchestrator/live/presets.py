@@ -38,8 +38,7 @@ from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import Scenario, names, read_scenario
-from orchestrator.runs.scenario_events import read_events, shared_events
+from orchestrator.runs.scenario import Scenario, names, read_events, read_scenario, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics

@@ -20,8 +20,8 @@ from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
 from orchestrator.runs.folder import open_ledger
 from orchestrator.runs.preparation import Prepared, prepare_request
-from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request
+from orchestrator.runs.result import content_of, ending_in, header_in, loops_in
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.signals import STANDARD, Loop
 

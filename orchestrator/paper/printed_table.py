@@ -34,7 +34,7 @@ from orchestrator.paper.variants import (
     all_variants,
 )
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
+from orchestrator.runs.result import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES
 

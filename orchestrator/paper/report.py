@@ -29,7 +29,7 @@ from orchestrator.paper.sections import (
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import inner_folder, replace_files
-from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
+from orchestrator.runs.result import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check
 

@@ -1,4 +1,4 @@
-"""Building: the bundle of FMUs with its bill of materials, and the FMUs of runs.
+"""Building: the bundle of FMUs, and the FMUs of runs.
 
 `auv-fmu build` writes the bundle where the user wants it. Runs use FMUs of their own in the user's
 cache folder, one folder for each version of the sources and each kind of FMU, so that nothing
@@ -10,16 +10,15 @@ from __future__ import annotations
 import json
 import shutil
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypedDict, Unpack
+from typing import TypedDict, Unpack
 
 from fmus.discovery import fingerprint
-from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
+from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.cosim.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
 from orchestrator.machine.children import listen_to_module
@@ -31,19 +30,13 @@ from orchestrator.machine.platforms import platforms
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
 
-#: Where `auv-fmu build` writes each kind unless another folder is named.
+#: Default folders of `auv-fmu build`.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
-#: The archive of the closed loop, and what was built beside it, from what; with their papers.
-ARCHIVE, MANIFEST = "auv.ssp", "build.json"
-_CHECKSUMS, _BILL = "SHA256SUMS", "bom.cdx.json"
+#: Files beside the FMUs: the archive of the closed loop, the settings of the build, and checksums.
+ARCHIVE, MANIFEST, CHECKSUMS = "auv.ssp", "build.json", "SHA256SUMS"
 
-#: What libraries for other platforms are linked with: parts of zig's C library, and for Windows of
-#: mingw-w64's.
-ZIG = "ziglang"
-_LICENCES = {ZIG: ("MIT", "ZPL-2.1")}
-
-#: What the FMUs of runs are among what is kept.
+#: The folder of the FMUs of runs, in the user's cache folder.
 CATEGORY = "fmus"
 
 
@@ -52,7 +45,7 @@ class BuildFailed(InputError):
 
 
 class Form(TypedDict, total=False):
-    """What FMUs are built as.
+    """Form of FMUs.
 
     Attributes:
         kind: one of :data:`fmus.kinds.KINDS`; by default the Python kind.
@@ -72,7 +65,7 @@ class Form(TypedDict, total=False):
 
 
 def words_of(form: Form) -> list[str]:
-    """What the build is told of a form."""
+    """The options of the build for a form."""
     texts = {name: value for name, value in form.items() if isinstance(value, str)}
     words = [word for name, value in texts.items() for word in (f"--{name}", value)]
     return words + ["--arrays"] * form.get("arrays", False)
@@ -100,8 +93,8 @@ def build_bundle(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replace_files(folder, (ARCHIVE, MANIFEST, _CHECKSUMS, _BILL), force=force) as unfinished:
-        # What is up to date is taken along, and not written anew.
+    with replace_files(folder, (ARCHIVE, MANIFEST, CHECKSUMS), force=force) as unfinished:
+        # FMUs that are up to date are kept.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
                 shutil.copy2(path, unfinished)
@@ -111,7 +104,7 @@ def build_bundle(
             archive = unfinished / ARCHIVE
             archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
             files.append(archive)
-        write_papers(unfinished, files, settings_of(unfinished))
+        write_checksums(unfinished, files)
         for path in unfinished.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
@@ -120,79 +113,15 @@ def build_bundle(
     return [folder / name for name in written]
 
 
-def write_papers(
-    folder: Path, files: Sequence[Path], settings: Mapping[str, str]
-) -> Sequence[Path]:
-    """Write checksums and a bill of materials.
-
-    Args:
-        folder: that the files are in, and the papers go into.
-        files: that the papers are about.
-        settings: how the FMUs were built.
-
-    Returns:
-        The papers.
-
-    """
-    contained = [*CONTAINED[settings["kind"]]]
-    if settings.get("compiler", "").startswith(ZIG):
-        contained.append(ZIG)
-    digests = {path.relative_to(folder).as_posix(): sha256_of(path) for path in files}
-    # As `sha256sum --check` reads them.
-    lines = "".join(f"{digest}  {name}\n" for name, digest in digests.items())
-    (folder / _CHECKSUMS).write_bytes(lines.encode())
-    (folder / _BILL).write_bytes(_bill(digests, contained))
-    return folder / _CHECKSUMS, folder / _BILL
-
-
-def _bill(digests: Mapping[str, str], contained: Sequence[str]) -> bytes:
-    """CycloneDX 1.5: the files of the bundle and the packages whose code they contain.
-
-    Without time and serial number: the same bundle has the same bill.
-
-    Args:
-        digests: SHA-256 of the files of the bundle, by their names.
-        contained: the packages, besides ours.
-
-    """
-    ours, *others = map(_package, ("auv-fmu", *contained))
-    content = {
-        "bomFormat": "CycloneDX",
-        "specVersion": "1.5",
-        "version": 1,
-        "metadata": {"component": ours},
-        "components": [
-            *others,
-            *(
-                {
-                    "type": "file",
-                    "name": name,
-                    "hashes": [{"alg": "SHA-256", "content": digest}],
-                }
-                for name, digest in digests.items()
-            ),
-        ],
-        "dependencies": [
-            {"ref": ours["bom-ref"], "dependsOn": [package["bom-ref"] for package in others]}
-        ],
-    }
-    return (json.dumps(content, indent=2) + "\n").encode()
-
-
-def _package(name: str) -> dict[str, Any]:
-    reference = f"pkg:pypi/{name}@{version(name)}"
-    return {
-        "type": "library",
-        "bom-ref": reference,
-        "name": name,
-        "version": version(name),
-        "licenses": [{"license": {"id": licence}} for licence in _LICENCES.get(name, ("MIT",))],
-        "purl": reference,
-    }
+def write_checksums(folder: Path, files: Sequence[Path]) -> Path:
+    """Write the checksums of files in a folder, as `sha256sum --check` reads them."""
+    lines = (f"{sha256_of(path)}  {path.relative_to(folder).as_posix()}\n" for path in files)
+    (folder / CHECKSUMS).write_bytes("".join(lines).encode())
+    return folder / CHECKSUMS
 
 
 def settings_of(folder: Path) -> dict[str, str]:
-    """How the FMUs in a folder were built: their kind, and more."""
+    """The settings of a build, such as the kind of the FMUs, from its folder."""
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     return dict(content["settings"])
 
@@ -273,14 +202,14 @@ def _best_fmus(fmi: str) -> Path:
     try:
         return current_fmus(NATIVE, fmi)
     except InputError as error:
-        # The command may be there, and what it needs not.
-        found = current_fmus(PYTHON, fmi)
+        # The compiler may be there without the files that it needs.
+        folder = current_fmus(PYTHON, fmi)
         warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
-        return found
+        return folder
 
 
 def key_of(kind: str, fmi: str) -> str:
-    """Of the FMUs that the installed sources give."""
+    """Cache key of the FMUs that the installed sources give."""
     return sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
 
 

@@ -1,4 +1,4 @@
-"""From a name to a system: a scenario of the bundle, or a file that brings its own FMUs."""
+"""Load a system by name: a scenario of the bundle, or a file that brings its own FMUs."""
 
 from __future__ import annotations
 
@@ -69,12 +69,18 @@ def load(
 
 
 @contextmanager
-def notes_as_warnings(strict: bool = False) -> Iterator[Findings]:
-    """Collect findings whose notes become warnings, as Python has them."""
+def notes_as_warnings(strict: bool = False, stacklevel: int = 4) -> Iterator[Findings]:
+    """Collect findings whose notes become Python's warnings.
+
+    Args:
+        strict: treat them as errors.
+        stacklevel: of the warnings; by default, they are for the caller of the caller.
+
+    """
     findings = Findings(strict)
     yield findings
     for note in findings.notes:
-        warnings.warn(note, stacklevel=4)
+        warnings.warn(note, stacklevel=stacklevel)
 
 
 def load_scenario(
@@ -112,7 +118,7 @@ def load_scenario(
 
 
 def outdated(component: Component) -> str | None:
-    """That the FMU of a user's script is older than the script beside it; None: it is not."""
+    """Warn that the FMU of a user's script is older than the script; None: it is not."""
     record = component.folder / ORIGIN
     origin = origin_of(record.read_bytes()) if record.is_file() else None
     # Under another name it has been kept, and the script is meant to be newer.
@@ -192,12 +198,12 @@ _READERS: Mapping[str, Callable[..., System]] = {
 
 
 def is_path(name: str) -> bool:
-    """Whether a name is a path: anything else is the name of a scenario."""
+    """Tell whether a name is a path; otherwise it names a scenario."""
     return name.endswith((".toml", *_READERS))
 
 
 def _reader(path: Path) -> Callable[..., System] | None:
-    """What reads a file or folder; None: it is a scenario."""
+    """The reader of a file or folder; None: it is a scenario."""
     if path.suffix in _READERS or str(path) in names() or not is_folder(path):
         return _READERS.get(path.suffix)
     is_osp = (path / OSP_STRUCTURE).is_file() and not (path / STRUCTURE).is_file()
@@ -205,7 +211,7 @@ def _reader(path: Path) -> Callable[..., System] | None:
 
 
 def brings_its_own(name: str) -> bool:
-    """Whether a system comes with its FMUs, so that there is no choice of kind."""
+    """Tell whether a system comes with its own FMUs, so that there is no choice of kind."""
     return _reader(Path(name)) is not None
 
 
@@ -232,12 +238,12 @@ def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> No
 
 
 def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
-    """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
+    """Warnings about things that may be forgotten: inputs without a source, parts of a vehicle."""
     if len(system.components) == 1:
-        # No other one could feed it.
+        # No other component could feed it.
         return []
-    found = system.unfed_inputs(given), differing_vehicle(system)
-    return [text for text in found if text is not None]
+    warned = system.unfed_inputs(given), differing_vehicle(system)
+    return [text for text in warned if text is not None]
 
 
 def first_given(*values: T | None) -> T | None:

@@ -1,10 +1,11 @@
 """Small neural networks as components: from dense layers in a file to the language of equations.
 
 A file is an .onnx, or an .npz with the arrays `W1`, `b1`, `W2`, `b2` ... (a row of W is a neuron)
-and `activations`, one name a layer; without these, hidden layers have tanh and the last one none.
+and `activations`, a name for each layer; without these, hidden layers have tanh and the last has
+none.
 
-An .onnx is a graph of operators. What these mean is held against the ONNX standard: `_OPERATORS`
-computes what each does to arrays, and anything else is refused with the operator's name.
+An .onnx is a graph of operators. `_OPERATORS` computes each as the ONNX standard says; others are
+refused by name.
 """
 
 from __future__ import annotations
@@ -24,12 +25,12 @@ import numpy as np
 from fmus.ports.port import FAULT, H_MAX, TIME
 from orchestrator.machine.errors import InputError, escape_unprintable, reason
 
-#: What a layer may do with each of its sums z, in the language of equations; {} are numbers.
+#: Activations of a sum z, in the language of equations; {} are numbers.
 _ACTIVATIONS = {
     "none": "z",
     "tanh": "tanh(z)",
     "relu": "z if z > 0.0 else 0.0",
-    # Of two forms the one whose exp cannot be too large.
+    # The form whose exp cannot overflow.
     "sigmoid": "1.0 / (1.0 + exp(-z)) if z >= 0.0 else exp(z) / (1.0 + exp(z))",
     "softplus": "max(z, 0.0) + log1p(exp(-abs(z)))",
     "elu": "z if z > 0.0 else {} * expm1(z)",
@@ -39,22 +40,22 @@ _ACTIVATIONS = {
     "at most": "min(z, {})",
 }
 
-#: Those without numbers, by the names in an .npz.
+#: The names in an .npz: activations without numbers.
 ACTIVATIONS = tuple(name for name, text in _ACTIVATIONS.items() if "{" not in text)
 
-#: More numbers than the text of a component should hold.
+#: Limit of a network, for the length of its text.
 MOST_WEIGHTS = 100_000
 
-#: More than the language of equations takes in a matrix.
+#: Limit of the language of equations for a matrix.
 MOST_OF_A_LAYER = 65_536
 
-#: Inputs and neurons: each takes up to 8 of the numbers that a call of C may hold.
+#: Limit of inputs and neurons: each takes up to 8 of the numbers that a call of C may hold.
 MOST_NEURONS = 4096
 
-#: The largest number of single precision, which stands for no bound.
+#: The largest number of single precision stands for no bound.
 _FLOAT_MAX = float(np.finfo(np.float32).max)
 
-#: The activations of ONNX, and where their numbers are: attributes or inputs, and their defaults.
+#: The activations of ONNX, with the attributes or inputs of their numbers, and defaults.
 _OF_ONNX: dict[str, tuple[str, dict[str, float]]] = {
     "Tanh": ("tanh", {}),
     "Relu": ("relu", {}),
@@ -67,12 +68,12 @@ _OF_ONNX: dict[str, tuple[str, dict[str, float]]] = {
     "Min": ("at most", {"bound": _FLOAT_MAX}),
 }
 
-#: The types that it has numbers of, by its own numbers of them.
+#: The supported types of numbers, by their codes in ONNX.
 _FLOAT = 1
 _FLOATS = {_FLOAT: np.float32, 11: np.float64}
 _INTEGERS = {6: np.int32, 7: np.int64}
 
-#: Earlier ones have other operators by the same names; later ones are not known here.
+#: Earlier opsets have other operators by the same names; later ones are not known here.
 _OLDEST_OPSET, _NEWEST_OPSET = 7, 28
 
 #: Ports that every component has, or any may have.
@@ -91,7 +92,7 @@ class Dense(NamedTuple):
 
     @property
     def is_activation(self) -> bool:
-        """Whether its sums are its inputs."""
+        """Tell whether its sums are its inputs."""
         n, m = self.W.shape
         return n == m and np.array_equal(self.W, np.eye(n)) and not self.b.any()
 
@@ -100,7 +101,7 @@ class Network(NamedTuple):
     """Dense layers, one after the other."""
 
     layers: Sequence[Dense]
-    inputs: str  #: what its file calls the inputs
+    inputs: str  #: their name in the file
     outputs: str
 
     @property
@@ -111,17 +112,17 @@ class Network(NamedTuple):
     @property
     def output_port(self) -> str:
         """The group of ports of its outputs."""
-        found = _port(self.outputs, "y")
-        return f"{found}_out" if found == self.input_port else found
+        port = _port(self.outputs, "y")
+        return f"{port}_out" if port == self.input_port else port
 
     @property
     def n_inputs(self) -> int:
-        """How many numbers it takes."""
+        """The number of its inputs."""
         return int(self.layers[0].W.shape[1])
 
     @property
     def n_outputs(self) -> int:
-        """How many numbers it gives."""
+        """The number of its outputs."""
         return int(self.layers[-1].W.shape[0])
 
 
@@ -129,7 +130,7 @@ def read_network(path: Path) -> Network:
     """The network in a file.
 
     Raises:
-        InputError: it cannot be read, or has other layers than dense ones.
+        InputError: it cannot be read, or has layers that are not dense.
 
     """
     readers: dict[str, Callable[[Path], Network]] = {".npz": _from_npz, ".onnx": _from_onnx}
@@ -150,12 +151,12 @@ def read_network(path: Path) -> Network:
 
 
 def _check(network: Network) -> None:
-    """Refuse layers that do not follow each other, and numbers that no text should hold."""
-    for i, (one, other) in enumerate(pairwise(network.layers), start=1):
-        if one.W.shape[0] != other.W.shape[1]:
+    """Refuse layers that do not follow each other, numbers that are not finite, and sizes."""
+    for i, (layer, following) in enumerate(pairwise(network.layers), start=1):
+        if layer.W.shape[0] != following.W.shape[1]:
             raise InputError(
-                f"layer {i} gives {one.W.shape[0]} numbers, and layer {i + 1} takes "
-                f"{other.W.shape[1]}"
+                f"layer {i} gives {layer.W.shape[0]} numbers, and layer {i + 1} takes "
+                f"{following.W.shape[1]}"
             )
     sizes = [0 if layer.is_activation else layer.W.size for layer in network.layers]
     for i, (layer, size) in enumerate(zip(network.layers, sizes, strict=True), start=1):
@@ -185,8 +186,9 @@ def _from_npz(path: Path) -> Network:
                 raise InputError(f"it has {n} arrays W and no {name}")
             if file[name].ndim != (2 if name.startswith("W") else 1):
                 raise InputError(f"{name} has {file[name].ndim} dimensions")
-        said = [str(name) for name in file["activations"]] if "activations" in file.files else []
-        activations = said or ["tanh"] * (n - 1) + ["none"]
+        activations = ["tanh"] * (n - 1) + ["none"]
+        if "activations" in file.files:
+            activations = [*map(str, file["activations"])] or activations
         if len(activations) != n:
             raise InputError(f"it has {n} layers and {len(activations)} activations")
         for i, name in enumerate(activations, start=1):
@@ -274,22 +276,23 @@ def _one_row(given: Any) -> tuple[int, ...]:
 
 
 def _without_scalers(nodes: Sequence[Any], make: Any) -> Iterator[Any]:
-    """The same nodes, with Sub and Mul in place of the Scaler of scikit-learn."""
+    """Replace the Scaler of scikit-learn by Sub and Mul."""
     for node in nodes:
         if (node.domain, node.op_type) != ("ai.onnx.ml", "Scaler"):
             yield node
             continue
         [scaled] = node.output
         offset, scale, moved = (f"{scaled}.{name}" for name in ("offset", "scale", "moved"))
-        for said in node.attribute:
-            tensor = make.make_tensor("value", _FLOAT, [len(said.floats)], said.floats)
-            yield make.make_node("Constant", [], [f"{scaled}.{said.name}"], value=tensor)
+        for attribute in node.attribute:
+            floats = attribute.floats
+            tensor = make.make_tensor("value", _FLOAT, [len(floats)], floats)
+            yield make.make_node("Constant", [], [f"{scaled}.{attribute.name}"], value=tensor)
         yield make.make_node("Sub", [node.input[0], offset], [moved])
         yield make.make_node("Mul", [moved, scale], [scaled])
 
 
 def _known_shape(value: Any) -> tuple[str, tuple[int, ...] | None]:
-    """What a value is called, and its shape; None: it is not known before a run."""
+    """The name and the shape of a value; None: the shape is unknown before a run."""
     declared = value.type.tensor_type
     sizes = [size.dim_value if size.HasField("dim_value") else -1 for size in declared.shape.dim]
     is_known = declared.HasField("shape") and -1 not in sizes
@@ -297,7 +300,7 @@ def _known_shape(value: Any) -> tuple[str, tuple[int, ...] | None]:
 
 
 def _needed(graph: Any) -> Sequence[Any]:
-    """The nodes that the output depends on, but not those of which only a shape is asked."""
+    """The nodes that the output depends on, except those of which only a shape is used."""
     names, nodes = {graph.output[0].name}, []
     for node in reversed(graph.node):
         if names.intersection(node.output):
@@ -307,7 +310,7 @@ def _needed(graph: Any) -> Sequence[Any]:
 
 
 class _Value(NamedTuple):
-    """What a name in a graph stands for: a constant, or an affine function of a layer."""
+    """The value of a name in a graph: a constant, or an affine function of a layer."""
 
     offset: Any  #: array: the constant, or the value where the layer gives zeros
     slopes: Any = None  #: arrays: how each number of the layer changes it; None: a constant
@@ -350,7 +353,7 @@ class _Layers:
         outputs: Collection[str],
         attributes: Mapping[str, Any],
     ) -> None:
-        """Find what an operator gives.
+        """Evaluate an operator.
 
         Raises:
             InputError: it is not supported, or not with these inputs.
@@ -358,8 +361,8 @@ class _Layers:
 
         """
         [output, *_] = outputs
-        for one in {*inputs} & self._constants.keys():
-            self._known.setdefault(one, _Value(_numbers(self._constants[one])))
+        for constant in {*inputs} & self._constants.keys():
+            self._known.setdefault(constant, _Value(_numbers(self._constants[constant])))
         if name == "Shape":
             value = self._shape(inputs[0], **attributes)
         elif name in _OF_ONNX:
@@ -384,22 +387,22 @@ class _Layers:
         return _Value(np.array(shape, dtype=np.int64)[start:end])
 
     def _activated(self, name: str, inputs: Sequence[str], attributes: Mapping[str, Any]) -> _Value:
-        """What an activation gives. Its numbers may be attributes, or inputs after the first."""
+        """Evaluate an activation; its numbers may be attributes, or inputs after the first."""
         word, defaults = _OF_ONNX[name]
         if name in ("Max", "Min"):
-            # What depends on the input may stand anywhere.
-            inputs = sorted(inputs, key=lambda one: not self._is_variable(one))
+            # The variable may be any of the inputs.
+            inputs = sorted(inputs, key=lambda name: not self._is_variable(name))
         if len(inputs) > 1 + len(defaults):
             raise InputError("more than two inputs are not supported")
-        shapes = [self._known[one].offset.shape for one in inputs if one]
+        shapes = [self._known[each].offset.shape for each in inputs if each]
         if np.broadcast_shapes(*shapes) != shapes[0]:
             raise InputError("its inputs have shapes that do not fit")
-        said = {
-            place: self._number(one)
-            for place, one in zip(defaults, inputs[1:], strict=False)
-            if one
+        given = {
+            place: self._number(each)
+            for place, each in zip(defaults, inputs[1:], strict=False)
+            if each
         }
-        numbers = {**defaults, **attributes, **said}
+        numbers = {**defaults, **attributes, **given}
         return self._closed(inputs[0], word, tuple(numbers.values()))
 
     def _number(self, name: str) -> float:
@@ -414,9 +417,9 @@ class _Layers:
     def _computed(
         self, operator: _Operator, inputs: Sequence[str], attributes: Mapping[str, Any]
     ) -> _Value:
-        """What an operator gives that keeps its inputs constant or affine."""
+        """Evaluate an operator that keeps its inputs constant or affine."""
         function = partial(operator.function, **attributes)
-        places = [i for i, one in enumerate(inputs) if one and self._is_variable(one)]
+        places = [i for i, each in enumerate(inputs) if each and self._is_variable(each)]
         factors = [i for i in places if i in operator.factors]
         if len(factors) > 1 or not {*places} <= {*operator.factors, *operator.terms}:
             raise InputError(_PRODUCT)
@@ -424,7 +427,7 @@ class _Layers:
             if self._known[inputs[i]].is_sum:
                 # The product of the weights of two layers may be many more numbers.
                 self._known[inputs[i]] = self._closed(inputs[i], "none")
-        values = [self._known[one] if one else None for one in inputs]
+        values = [self._known[each] if each else None for each in inputs]
         offset = _numbers(function(*(value and value.offset for value in values)))
         if not places:
             return _Value(offset)
@@ -464,20 +467,20 @@ class _Layers:
         return Dense(W, value.offset.ravel(), activation, numbers)
 
     def _closed(self, name: str, activation: str, numbers: Sequence[float] = ()) -> _Value:
-        """End a layer; what it gives has the shape of its sums."""
+        """End a layer; its results have the shape of its sums."""
         value = self._variable(name)
         self._layers.append(self._ended(value, activation, numbers))
         return self._begun(value.offset.shape)
 
     def _begun(self, shape: tuple[int, ...]) -> _Value:
-        """The numbers that the last layer gives, or the inputs."""
+        """The results of the last layer, or the inputs."""
         n = math.prod(shape)
         if n > MOST_NEURONS:
             raise InputError(f"a row has {n} numbers; it may have {MOST_NEURONS}")
         return _Value(np.zeros(shape), np.eye(n).reshape(n, *shape), len(self._layers))
 
 
-#: What may be neither a constant nor affine.
+#: Message about a value that is neither constant nor affine.
 _PRODUCT = "it multiplies, divides or selects by what depends on the input"
 
 
@@ -489,8 +492,8 @@ def _numbers(array: Any) -> Any:
     return array.astype(float) if array.dtype.kind == "f" else array
 
 
-# What operators of ONNX make of arrays: inputs have places, attributes have names. Some inputs were
-# attributes in older opsets.
+# Operators of ONNX as functions of arrays. Inputs are positional, attributes have names. In older
+# opsets, some inputs are attributes.
 
 
 def _constant(**content: Any) -> Any:
@@ -524,7 +527,7 @@ def _divide(a: Any, b: Any) -> Any:
 
 
 def _cast(x: Any, *, to: int, saturate: int = 1, round_mode: str = "") -> Any:
-    """Between types for which the other two attributes have no meaning."""
+    """Convert between types for which the other two attributes have no meaning."""
     types = _FLOATS if x.dtype.kind == "f" else {**_FLOATS, **_INTEGERS}
     if to not in types:
         raise InputError("only a cast to float or double is supported")
@@ -537,41 +540,9 @@ def _dropout(x: Any, ratio: Any = None, training_mode: Any = None, *, seed: int 
     return x
 
 
-def _flatten(x: Any, *, axis: int = 1) -> Any:
-    return x.reshape(math.prod(x.shape[:axis]), -1)
-
-
 def _reshape(x: Any, shape: Any, *, allowzero: int = 0) -> Any:
     copied = [n or (0 if allowzero else x.shape[i]) for i, n in enumerate(shape)]
     return x.reshape(copied)
-
-
-def _squeeze(x: Any, axes: Any = None) -> Any:
-    return np.squeeze(x, None if axes is None else tuple(axes))
-
-
-def _unsqueeze(x: Any, axes: Any) -> Any:
-    return np.expand_dims(x, tuple(axes))
-
-
-def _transpose(x: Any, *, perm: Any = None) -> Any:
-    return np.transpose(x, perm)
-
-
-def _identity(x: Any) -> Any:
-    return x
-
-
-def _concat(*arrays: Any, axis: int) -> Any:
-    return np.concatenate(arrays, axis)
-
-
-def _expand(x: Any, shape: Any) -> Any:
-    return np.broadcast_to(x, np.broadcast_shapes(x.shape, tuple(shape)))
-
-
-def _gather(x: Any, indices: Any, *, axis: int = 0) -> Any:
-    return np.take(x, indices, axis)
 
 
 def _batch_normalization(
@@ -613,18 +584,22 @@ _OPERATORS = {
     "Mul": _Operator(np.multiply, (0, 1)),
     "Div": _Operator(_divide, (0,)),
     "BatchNormalization": _Operator(_batch_normalization, (0,), (2, 3)),
-    "Concat": _Operator(_concat, terms=range(MOST_NEURONS)),
+    "Concat": _Operator(lambda *x, axis: np.concatenate(x, axis), terms=range(MOST_NEURONS)),
     "Constant": _Operator(_constant),
     "Cast": _Operator(_cast, (0,)),
     "Dropout": _Operator(_dropout, (0,)),
-    "Expand": _Operator(_expand, (0,)),
-    "Flatten": _Operator(_flatten, (0,)),
-    "Gather": _Operator(_gather, (0,)),
-    "Identity": _Operator(_identity, (0,)),
+    "Expand": _Operator(
+        lambda x, shape: np.broadcast_to(x, np.broadcast_shapes(x.shape, tuple(shape))), (0,)
+    ),
+    "Flatten": _Operator(lambda x, *, axis=1: x.reshape(math.prod(x.shape[:axis]), -1), (0,)),
+    "Gather": _Operator(lambda x, indices, *, axis=0: np.take(x, indices, axis), (0,)),
+    "Identity": _Operator(lambda x: x, (0,)),
     "Reshape": _Operator(_reshape, (0,)),
-    "Squeeze": _Operator(_squeeze, (0,)),
-    "Transpose": _Operator(_transpose, (0,)),
-    "Unsqueeze": _Operator(_unsqueeze, (0,)),
+    "Squeeze": _Operator(
+        lambda x, axes=None: np.squeeze(x, None if axes is None else tuple(axes)), (0,)
+    ),
+    "Transpose": _Operator(lambda x, *, perm=None: np.transpose(x, perm), (0,)),
+    "Unsqueeze": _Operator(lambda x, axes: np.expand_dims(x, tuple(axes)), (0,)),
 }
 
 

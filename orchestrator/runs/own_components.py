@@ -1,4 +1,4 @@
-"""Components of the user's own: files to begin with, and their FMUs.
+"""Components of the user's own: templates, and their FMUs.
 
 `auv-fmu new` writes a folder from the templates, `auv-fmu build` builds what is in it.
 """
@@ -27,23 +27,16 @@ from orchestrator.runs.folder import replace_files
 
 _TEMPLATES = Path(__file__).with_name("templates")
 
-#: What a component can be like at first.
-LIKENESSES = ("controller", "plant", "filter", "empty")
-
-#: Names in the templates of a controller that give way to the user's own.
-_CLASS, _MODULE = "OwnController", "own_controller"
-
-#: The same in those of a component; with what its README changes and looks at, by its likeness.
-_COMPONENT, _FILE = "OwnComponent", "own_component"
+#: Templates of a component, each with the setting and the output in its README.
 _EXAMPLES = {
     "controller": ("K=4", "command"),
     "plant": ("a=0.002", "level"),
     "filter": ("f=0.5", "y"),
     "empty": ("x0=1", "x"),
 }
-_SETTING, _OUTPUT, _INPUT = "own_setting", "own_output", "own_input"
+LIKENESSES = tuple(_EXAMPLES)
 
-#: How often files are looked at [s].
+#: Time between two looks at files [s].
 _INTERVAL = 0.2
 
 
@@ -53,8 +46,8 @@ def new_controller(name: str, folder: Path | None = None, *, python: bool = Fals
     Args:
         name: of the controller, `MyLaw` or `my_law`.
         folder: made if it does not exist; None: one with the name of its module.
-        python: whether it is a class of PythonFMU, which may be any Python, and not a component in
-            the language of equations.
+        python: make it a class of PythonFMU in any Python, instead of a component in the language
+            of equations.
 
     Returns:
         The script, its tests if it is a component, the scenario, the README and the FMU.
@@ -68,11 +61,12 @@ def new_controller(name: str, folder: Path | None = None, *, python: bool = Fals
     contents = {
         f"{module}.py": f"{form}.py.txt",
         **({} if python else {f"test_{module}.py": "test.py.txt"}),
-        f"{module}.toml": f"{_MODULE}.toml",
+        f"{module}.toml": "own_controller.toml",
         "README.md": f"{form}.md",
     }
     texts = {target: _template(f"controller/{file}") for target, file in contents.items()}
-    names = {_CLASS: class_name if python else name_of(module), _MODULE: module}
+    component = class_name if python else name_of(module)
+    names = {"OwnController": component, "own_controller": module}
     files = _write(folder or Path(module), texts, names)
     return [*files, build_own(files[0])]
 
@@ -83,7 +77,7 @@ def new_component(
     like: str = LIKENESSES[0],
     network: Path | None = None,
 ) -> list[Path]:
-    """Make a folder with a component, whose file is both kinds of FMU.
+    """Make a folder with a component, whose file becomes both kinds of FMU.
 
     Args:
         name: of the component, `WaterTank` or `water_tank`.
@@ -100,25 +94,25 @@ def new_component(
 
     """
     module, _ = _names(name, "component")
-    names = {_COMPONENT: name_of(module), _FILE: module}
+    names = {"OwnComponent": name_of(module), "own_component": module}
     if network is None:
         text = _template(f"component/{like}.py.txt")
         setting, output = _EXAMPLES[like]
     else:
-        # numpy is for this alone.
+        # Only this needs numpy.
         from orchestrator.runs.networks import component_text, read_network  # noqa: PLC0415
 
-        like, found = "network", read_network(network)
-        text = component_text(name_of(module), found, network.name)
-        names[_INPUT] = found.input_port
-        setting, output = f"'{found.input_port}[1]=0.5'", f"{found.output_port}[1]"
+        like, layers = "network", read_network(network)
+        text = component_text(name_of(module), layers, network.name)
+        names["own_input"] = layers.input_port
+        setting, output = f"'{layers.input_port}[1]=0.5'", f"{layers.output_port}[1]"
     texts = {
         f"{module}.py": text,
         f"test_{module}.py": _template(f"component/test_{like}.py.txt"),
         f"{module}.toml": _template(f"component/{like}.toml"),
         "README.md": _template("component/README.md"),
     }
-    names |= {_SETTING: setting, _OUTPUT: output}
+    names |= {"own_setting": setting, "own_output": output}
     return _write(folder or Path(module), texts, names)
 
 
@@ -142,7 +136,7 @@ def _names(name: str, what: str) -> tuple[str, str]:
     """Names of the module and of the class.
 
     Raises:
-        InputError: Python would not take them, or has such a module already.
+        InputError: Python does not allow them, or has such a module already.
 
     """
     if not (name.isascii() and name.isidentifier() and name[0].isalpha()):
@@ -156,7 +150,7 @@ def _names(name: str, what: str) -> tuple[str, str]:
     for word in (module, class_name):
         if keyword.iskeyword(word):
             raise InputError(f"{name!r}: {word} is a word of Python; choose another name")
-    # What a user has in this process already is not Python's.
+    # A module that the user has in this process already is not Python's.
     if module in sys.stdlib_module_names or PathFinder.find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name
@@ -203,10 +197,9 @@ def build_own(
 
 
 def _home(script: Path, fmu: Path) -> Sequence[str]:
-    """The option that says where the folder of a script is, seen from that of its FMU.
+    """The option with the path to the folder of a script from that of its FMU, for its record.
 
-    It is recorded in the FMU. So it is left out where it would have names of folders that are not
-    of the project, which is the current folder.
+    It is left out where it would name folders outside of the project, which is the current folder.
     """
     here, folders = Path.cwd(), (script.resolve(), fmu.resolve())
     is_within = all(here in (folder, *folder.parents) for folder in folders)
@@ -214,7 +207,7 @@ def _home(script: Path, fmu: Path) -> Sequence[str]:
 
 
 def _built_from(script: Path, folder: Path) -> Iterator[Path]:
-    """The FMUs in a folder that were built from a script, and have the names that they got."""
+    """The FMUs in a folder that were built from a script, under the names of the build."""
     names = [script.name]
     if script.is_dir():
         names = [f"{script.resolve().name}.py", ""]
@@ -243,11 +236,10 @@ def changes(script: Path) -> Iterator[None]:
 def _versions(script: Path) -> dict[Path, tuple[int, int]]:
     """The modules beside a script, and in folders beside it, as they are now."""
     folder = script if script.is_dir() else script.parent
-    found = {}
+    versions = {}
     for path in (*folder.glob("*.py"), *folder.glob("*/*.py")):
-        try:
+        # It may just have been removed.
+        with suppress(OSError):
             status = path.stat()
-        except OSError:
-            continue  # it has just been removed
-        found[path] = (status.st_mtime_ns, status.st_size)
-    return found
+            versions[path] = (status.st_mtime_ns, status.st_size)
+    return versions

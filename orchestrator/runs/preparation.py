@@ -14,7 +14,7 @@ from orchestrator.cosim.experiment import (
 from orchestrator.cosim.fmi.isolated import Isolation, isolation_of
 from orchestrator.cosim.hooks.events import Alter, Event, Events, Set
 from orchestrator.cosim.hooks.hook import Hook
-from orchestrator.cosim.hooks.timing import InputTable, Playback, RealTime
+from orchestrator.cosim.hooks.timing import InputTable, Playback
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.cosim.observers.observer import Ending, Observer
 from orchestrator.cosim.plan import Plan, make_plan
@@ -30,11 +30,12 @@ from orchestrator.runs.scenario import (
     Inputs,
     Scenario,
     check_events,
+    read_events,
     read_inputs,
     read_scenario,
     role_of,
+    shared_events,
 )
-from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
@@ -57,7 +58,6 @@ class Prepared:
         plan: the system, and its steps.
         isolation: of the FMUs in processes of their own; None: they run in this one.
         stepping: how its steps are made.
-        real_time: simulated seconds in a second; None: as many as can be had.
         events: that happen to it.
         input_table: values of inputs over time; None: they keep their values.
 
@@ -67,7 +67,6 @@ class Prepared:
     plan: Plan
     isolation: Isolation | None = None
     stepping: Stepping = PYTHON_LOOP
-    real_time: float | None = None
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None
 
@@ -176,9 +175,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     findings.refuse()
     isolation = isolation_of(request.isolate, request.step_timeout)
     stepping = choose_loop(request.loop, experiment, isolation)
-    if request.real_time is not None:
-        RealTime.check(request.real_time)
-    return Prepared(scenario, plan, isolation, stepping, request.real_time, events, input_table)
+    return Prepared(scenario, plan, isolation, stepping, events, input_table)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

@@ -1,20 +1,22 @@
-"""What a user asks for when making a run: each option is declared once.
+"""Options of a run, each declared once: its type, its default and its help.
 
-The command line makes its options of these fields (`commands/options.py`), `simulate` its keywords,
-and the report calls a request by the command that makes it.
+The fields of these dataclasses are the options of the command line (`commands/options.py`), and
+those of :class:`Options` also keywords of `simulate`, with one help text for both.
 """
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import wraps
+from inspect import signature
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
-from fmus.kinds import AUTO, KINDS, KindName
+from fmus.kinds import AUTO, KindName
 from orchestrator.cosim.experiment import (
-    COUPLINGS,
     ORDERS,
     CouplingName,
     Order,
@@ -23,219 +25,241 @@ from orchestrator.cosim.experiment import (
 )
 from orchestrator.cosim.fmi.isolated import STEP_TIMEOUT
 from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim.hooks.timing import RealTime
 from orchestrator.cosim.loop import LOOPS, LoopName
-from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
+from orchestrator.cosim.observers.files import TableFormat
 from orchestrator.cosim.observers.observer import Selection
 from orchestrator.machine.texts import literal
 
-
-class CliOption:
-    """How the command line describes and reads a field that is an option there."""
-
-    def __init__(self, help: str, **how: Any) -> None:  # noqa: A002
-        """Take the help, and whatever else `argparse` needs."""
-        self.help, self.how = help, how
+P = ParamSpec("P")
+T = TypeVar("T")
+R = TypeVar("R")
 
 
-def option_fields(declared: type[Any]) -> dict[str, CliOption]:
-    """The fields of a dataclass that are options."""
-    hints = get_type_hints(declared, include_extras=True)
-    return {
-        name: one
-        for name, hint in hints.items()
-        for one in getattr(hint, "__metadata__", ())
-        if isinstance(one, CliOption)
-    }
+def option(
+    default: Any, text: str, *, is_flag: bool = True, is_hashed: bool = True, **how: Any
+) -> Any:
+    """Declare a field of a dataclass as an option.
+
+    Args:
+        default: its value where the user gives none.
+        text: its help, on the command line and in Python.
+        is_flag: whether it is an option of the command line.
+        is_hashed: whether it counts in the hash of the object.
+        how: arguments of `add_argument` that do not follow from the type of the field.
+
+    """
+    metadata = {"help": text, "is_flag": is_flag, "how": how}
+    if default == {}:
+        return field(default_factory=dict, hash=is_hashed, metadata=metadata)
+    return field(default=default, hash=is_hashed, metadata=metadata)
 
 
-def flag(name: str) -> str:
-    """The option of the command line that a field is."""
-    return "--" + name.replace("_", "-")
+def flags(declared: type[Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """The options of the command line among the fields of a dataclass.
+
+    Yields:
+        The name of a field, its flag, and the arguments of `add_argument`.
+
+    """
+    hints = get_type_hints(declared)
+    for one in fields(declared):
+        if one.metadata.get("is_flag"):
+            how = {**_read_as(hints[one.name]), **one.metadata["how"]}
+            text = one.metadata["help"]
+            flag = "--" + one.name.replace("_", "-")
+            yield one.name, flag, {"default": one.default, "help": text, **how}
 
 
-#: Which FMUs of the bundle.
-KindOption = Annotated[
-    KindName,
-    CliOption(
-        "kind of the bundle's FMUs: python (source code) or native (its translation to C); both "
-        f"give the same numbers; default: {AUTO} (native if it is present or can be built)",
-        choices=(AUTO, *KINDS),
-    ),
-]
+def _read_as(hint: Any) -> dict[str, Any]:
+    """The arguments of `add_argument` that follow from a type."""
+    for kind in [hint] if get_origin(hint) is Literal else get_args(hint) or [hint]:
+        if kind is bool:
+            return {"action": "store_true"}
+        if kind in (float, int):
+            return {"type": kind, "metavar": "S" if kind is float else "N"}
+        if kind is Path:
+            return {"type": Path, "metavar": "FILE"}
+        if get_origin(kind) is Literal:
+            return {"choices": get_args(kind)}
+    return {}
 
-#: What makes the steps.
-LoopOption = Annotated[
-    LoopName,
-    CliOption(
-        "stepping loop: python, or compiled (in C); both give the same rows; default: auto "
-        "(compiled where available)",
-        choices=LOOPS,
-    ),
-]
 
-#: Whether the user's files that are in the way are moved.
-Force = Annotated[
-    bool,
-    CliOption(
-        "move your own files out of the way, to NAME.~1~; without this option they stay and "
-        "nothing is written",
-        action="store_true",
-    ),
-]
+def takes_keywords(
+    declared: Callable[P, T],
+) -> Callable[[Callable[[T], R]], Callable[P, R]]:
+    """Let a function of a dataclass take the fields of the dataclass as arguments.
+
+    Signature, type hints and docstring become those of a function with these arguments; in the
+    docstring, `{arguments}` stands for their help.
+    """
+    hints, shown = get_type_hints(declared), signature(declared)
+    texts = {one.name: one.metadata["help"] for one in fields(declared)}  # type: ignore[arg-type]
+    described, parameters = [], []
+    for name, one in shown.parameters.items():
+        described.append(textwrap.fill(f"{name}: {texts[name]}.", 92, subsequent_indent=" " * 4))
+        # A dataclass shows a placeholder for a new mapping.
+        default = {} if repr(one.default) == "<factory>" else one.default
+        parameters.append(one.replace(annotation=hints[name], default=default))
+
+    def decorate(function: Callable[[T], R]) -> Callable[P, R]:
+        arguments = textwrap.indent("\n".join(described), " " * 8).lstrip()
+
+        @wraps(function)
+        def call(*positional: P.args, **keywords: P.kwargs) -> R:
+            try:
+                shown.bind(*positional, **keywords)
+            except TypeError as error:
+                raise TypeError(f"{function.__name__}() {error}") from None
+            return function(declared(*positional, **keywords))
+
+        call.__doc__ = (function.__doc__ or "").replace("{arguments}", arguments)
+        returned = get_type_hints(function)["return"]
+        call.__annotations__ = {**hints, "return": returned}
+        call.__signature__ = shown.replace(  # type: ignore[attr-defined]
+            parameters=parameters, return_annotation=returned
+        )
+        return call
+
+    return decorate
+
+
+#: The help of options that not only runs have.
+KIND = (
+    "kind of the bundle's FMUs: python (source code) or native (its translation to C), with the "
+    f"same numbers; default: {AUTO} (native if it is present or can be built)"
+)
+LOOP = (
+    "stepping loop: python, or compiled (in C), with the same rows; default: auto (compiled where "
+    "available)"
+)
+FORCE = "rename your own files that are in the way to NAME.~1~; default: stop"
+CHECKPOINT_EVERY = "time between checkpoints [simulated s]; default: none, or as before if resumed"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of every run; None: as the scenario has it."""
+
+    stop_time: float | None = option(None, "end of the run [s]; default: the scenario's")
+    step: float | None = option(
+        None,
+        "communication step [s]; default: the scenario's, else the longest that divides the "
+        "default steps of the FMUs, else 0.02",
+    )
+    order: Order | None = option(
+        None,
+        "order in which values pass and components are stepped: feedthrough (values of one time "
+        "pass before all are stepped), gauss-seidel (the paper's), jacobi (all in parallel, with "
+        "the outputs of the last communication point), or the names of all components; default: "
+        "the scenario's, else feedthrough where the outputs of the FMUs follow their inputs "
+        "between steps, else gauss-seidel",
+        type=read_order,
+        choices=None,
+        metavar=f"{'|'.join(ORDERS)}|NAME,...",
+    )
+    coupling: CouplingName | None = option(
+        None,
+        "method for algebraic loops: solve them, delay them by one step, or solve them with inputs "
+        "that change linearly within the step; default: the scenario's, else solve where the FMUs "
+        "allow it",
+    )
+    kind: KindName = option(AUTO, KIND)
+    events: str | Sequence[Mapping[str, Any]] | None = option(
+        None,
+        "scenario whose events happen in this run, or, in Python, tables as in a scenario file; "
+        "default: the scenario's own",
+        is_hashed=False,
+        metavar="SCENARIO|FILE.toml",
+    )
+    inputs: str | Path | None = option(
+        None,
+        "table (CSV or Parquet) of unconnected inputs over time; default: the scenario's own",
+    )
+    loop: LoopName = option(LOOPS[0], LOOP)
+    isolate: bool = option(
+        False,
+        "run each FMU in a separate process, so that a crash or hang cannot take the run down",
+    )
+    step_timeout: float | None = option(
+        None, f"time limit for one call of an isolated FMU [s]; default: {STEP_TIMEOUT:g}"
+    )
+    strict: bool = option(False, "treat warnings as errors")
+    steps: Mapping[str, float] = option(
+        {},
+        "longer steps of single components [s], multiples of the communication step, in place of "
+        "the scenario's",
+        is_flag=False,
+        is_hashed=False,
+    )
 
 
 @dataclass(frozen=True)
-class Request:
-    """A scenario and what the user changes of it; None: as the scenario has it.
+class Request(Options):
+    """A scenario, and what the user changes of it.
 
     Attributes:
         scenario: its name, or the path of a file; empty where a system is given instead.
-        parameters: values that win over the scenario's, by `component.parameter`.
-        events: another scenario that has them, or tables as in a scenario file.
-        steps: of components with longer steps [s]; they win over the scenario's.
+        parameters: values in place of the scenario's, by `component.parameter`.
 
     """
 
     scenario: str = ""
     parameters: Mapping[Any, Any] = field(default_factory=dict, hash=False)
-    stop_time: Annotated[
-        float | None,
-        CliOption("end time of the run [s]; default: from the scenario", type=float, metavar="S"),
-    ] = None
-    step: Annotated[
-        float | None,
-        CliOption(
-            "communication step [s]; default: from the scenario, else from the FMUs, else 0.02",
-            type=float,
-            metavar="S",
-        ),
-    ] = None
-    order: Annotated[
-        Order | None,
-        CliOption(
-            f"order in which values pass and components are stepped: {', '.join(ORDERS)}, or the "
-            f"names of all components; default: from the scenario, else feedthrough where the "
-            f"outputs of the FMUs follow their inputs between steps, else gauss-seidel",
-            type=read_order,
-            metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        ),
-    ] = None
-    coupling: Annotated[
-        CouplingName | None,
-        CliOption(
-            "method for algebraic loops: solve them, delay them by one step, or solve them with "
-            "inputs that change linearly within the step; default: from the scenario, else solve "
-            "where the FMUs allow it",
-            choices=COUPLINGS,
-        ),
-    ] = None
-    kind: KindOption = AUTO
-    events: Annotated[
-        str | Sequence[Mapping[str, Any]] | None,
-        CliOption(
-            "scenario whose events happen in this run",
-            metavar="SCENARIO|FILE.toml",
-        ),
-    ] = field(default=None, hash=False)
-    inputs: Annotated[
-        str | Path | None,
-        CliOption(
-            "table (CSV or Parquet) with values over time for unconnected inputs",
-            type=Path,
-            metavar="FILE",
-        ),
-    ] = None
-    loop: LoopOption = LOOPS[0]
-    isolate: Annotated[
-        bool,
-        CliOption(
-            "run each FMU in a separate process, so that a crash or hang cannot take the run down",
-            action="store_true",
-        ),
-    ] = False
-    step_timeout: Annotated[
-        float | None,
-        CliOption(
-            f"time limit for one call of an isolated FMU [s]; default: {STEP_TIMEOUT:g}; needs "
-            "--isolate",
-            type=float,
-            metavar="S",
-        ),
-    ] = None
-    real_time: Annotated[
-        float | None,
-        CliOption("limit the speed to FACTOR times real time", type=float, metavar="FACTOR"),
-    ] = None
-    strict: Annotated[bool, CliOption("treat warnings as errors", action="store_true")] = False
-    steps: Mapping[str, float] = field(default_factory=dict, hash=False)
 
     @property
     def label(self) -> str:
-        """What it is called: words after `auv-fmu run`, and in parentheses what has no option."""
-        words, untouched = [self.scenario], Request()
+        """Its words after `auv-fmu run`, then in parentheses what the command line has not."""
+        words = [self.scenario]
         rest = {"steps": ", ".join(f"{name} = {_text(h)} s" for name, h in self.steps.items())}
-        for name, one in option_fields(Request).items():
+        for name, flag, how in flags(Request):
             value = getattr(self, name)
-            if value == getattr(untouched, name):
+            if value == how["default"]:
                 continue
             if name == "events" and not isinstance(value, str):
                 # Tables; the option takes the scenario that has them.
                 rest[name] = ", ".join(map(str, value)) or "none"
                 continue
-            words.append(flag(name))
-            if one.how.get("action") != "store_true":
+            words.append(flag)
+            if how.get("action") != "store_true":
                 words.append(format_order(value) if name == "order" else _text(value))
         for name, value in self.parameters.items():
             words += ["--set", f"{name}={_text(value)}"]
-        told = "; ".join(f"{name}: {text}" for name, text in rest.items() if text)
-        return shlex.join(words) + f" ({told})" * bool(told)
+        added = "; ".join(f"{name}: {text}" for name, text in rest.items() if text)
+        return shlex.join(words) + f" ({added})" * bool(added)
 
 
 @dataclass(frozen=True)
 class Files:
-    """What a run leaves in its folder.
+    """Files of a run, and what is only for a run that writes files.
 
     Raises:
-        InputError: an interval makes no sense.
+        InputError: an interval or a factor makes no sense.
 
     """
 
-    interval: Annotated[
-        float | None,
-        CliOption(
-            "time between rows in the table [s]; default: a row for each step",
-            type=float,
-            metavar="S",
-        ),
-    ] = None
-    columns: Annotated[
-        str,
-        CliOption(
-            "columns of the table, for example plant.y.*,controller.tau; default: all",
-            metavar="outputs|all|PATTERN,...",
-        ),
-    ] = "all"
-    format: Annotated[
-        TableFormat,
-        CliOption("file format of the table; default: csv", choices=tuple(TABLE_FORMATS)),
-    ] = "csv"
-    no_figures: Annotated[bool, CliOption("do not draw figures", action="store_true")] = False
-    checkpoint_every: Annotated[
-        float | None,
-        CliOption(
-            "write a checkpoint to DIR/checkpoint every S simulated seconds",
-            type=float,
-            metavar="S",
-        ),
-    ] = None
-    resume: Annotated[
-        bool, CliOption("continue from the last checkpoint in DIR/checkpoint", action="store_true")
-    ] = False
-    force: Force = False
+    interval: float | None = option(
+        None, "time between rows in the table [s]; default: a row for each step"
+    )
+    columns: str = option(
+        "all",
+        "columns of the table, for example plant.y.*,controller.tau; default: all",
+        metavar="outputs|all|PATTERN,...",
+    )
+    format: TableFormat = option("csv", "file format of the table; default: csv")
+    no_figures: bool = option(False, "do not draw figures")
+    real_time: float | None = option(
+        None, "limit the speed to FACTOR times real time", metavar="FACTOR"
+    )
+    checkpoint_every: float | None = option(None, f"{CHECKPOINT_EVERY}; they go to DIR/checkpoint")
+    resume: bool = option(False, "continue from the last checkpoint in DIR/checkpoint")
+    force: bool = option(False, FORCE)
 
     def __post_init__(self) -> None:
         if self.interval is not None:
             Selection.check(self.interval)
+        if self.real_time is not None:
+            RealTime.check(self.real_time)
         if self.checkpoint_every is not None:
             Checkpoints.check(self.checkpoint_every)
 

@@ -1,49 +1,76 @@
-"""What a run gives to Python, when it was made or when it is read again."""
+"""A result: its record `run.json`, its table and indices, in memory and in files."""
 
 from __future__ import annotations
 
+import json
+import platform
+import sys
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import asdict, fields, replace
+from datetime import UTC, datetime
 from functools import cached_property
 from html import escape
+from importlib.metadata import version
 from importlib.util import find_spec
+from itertools import chain
+from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from time import monotonic
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import format_order
+from fmus.kinds import NATIVE, PYTHON
+from orchestrator.cosim.experiment import Experiment, format_order
+from orchestrator.cosim.fmi.binary import runs_python
+from orchestrator.cosim.loop import PYTHON_LOOP
 from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
-from orchestrator.cosim.observers.observer import Occurrence
+from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import TYPES, Standing, StringTable
 from orchestrator.figures.style import Drawn, printed_unit
+from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.machine.ledger import locate
+from orchestrator.machine.identity import PACKAGES, digest_of
+from orchestrator.machine.ledger import RECORD, is_changed, locate
+from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.record import (
-    FILES,
-    METRICS,
-    changed_files,
-    copy_record,
-    ending_in,
-    loops_in,
-    read_metrics,
-    read_record,
-    stored_rows,
-    table_in,
-    write_metrics,
-)
+from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
-from orchestrator.vehicle.indices import metrics, of_vehicles
-from orchestrator.vehicle.signals import Loop
+from orchestrator.vehicle.indices import metrics, metrics_of, of_vehicles
+from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
+
+#: The file of the indices of a run.
+METRICS = "metrics.json"
+
+#: The table of a run, in one format or the other, and all files that every run writes.
+TABLES = tuple(f"result.{ending}" for ending in TABLE_FORMATS)
+FILES = (*TABLES, METRICS, RECORD)
+
+#: Packages whose versions a result depends on.
+RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
+
+#: Messages about a file that cannot be read.
+_NOT_A_RECORD, _NOT_INDICES = "not the record of a run", "not the indices of a run"
+
+#: Texts in place of numbers that JSON does not have.
+_NOT_FINITE = {text: float(text) for text in ("inf", "-inf", "nan")}
+
+#: Entries of the indices that hold texts of the user.
+_TEXTS = ("scenario", "order", "parameters")
+
+
+# Results in memory
 
 
 class Parameters(Mapping[Any, Any]):
@@ -65,43 +92,13 @@ class Parameters(Mapping[Any, Any]):
         return self._values[str(name)]
 
     def __iter__(self) -> Iterator[str]:
-        """Their names."""
         return iter(self._values)
 
     def __len__(self) -> int:
-        """How many there are."""
         return len(self._values)
 
     def __repr__(self) -> str:
-        """As a dictionary."""
         return repr(self._values)
-
-
-class Origin(Protocol):
-    """Where a result comes from: a run of this process, or the files of one."""
-
-    @property
-    def scenario(self) -> Scenario:
-        """What was run, as far as its figures need it."""
-        ...
-
-    @property
-    def loops(self) -> Sequence[Loop]:
-        """Of its vehicles."""
-        ...
-
-    @property
-    def system(self) -> System:
-        """What was run."""
-        ...
-
-    def metrics(self, result: Result) -> dict[str, Any]:
-        """What metrics.json holds."""
-        ...
-
-    def write_ends(self, folder: Path, result: Result) -> None:
-        """Write metrics.json and run.json, after everything else."""
-        ...
 
 
 class Result(Table):
@@ -116,30 +113,42 @@ class Result(Table):
 
     """
 
-    def __init__(self, origin: Origin) -> None:
-        """Take the rows of a run."""
+    def __init__(
+        self, scenario: Scenario, loops: Sequence[Loop], prepared: Prepared | None = None
+    ) -> None:
+        """Take the rows of a run.
+
+        Args:
+            scenario: that is run, as far as figures need it.
+            loops: of its vehicles.
+            prepared: the run, if it is made in this process.
+
+        """
         super().__init__()
-        self._origin = origin
         self.resumed_at: float | None = None
+        self._scenario, self._loops, self._clock = scenario, loops, Stopwatch()
+        # Without its loop, whose library another process could not have.
+        self._prepared = prepared and replace(prepared, stepping=PYTHON_LOOP)
+        self._file, self._record = Path(), dict[str, Any]()
 
     def __repr__(self) -> str:
         """One line: the scenario, and how far it came."""
         end = f", {self.failure}" if self.failure else ""
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         return (
-            f"<Result {self._origin.scenario.name}: {len(self)} rows of {len(self.columns)} "
+            f"<Result {self._scenario.name}: {len(self)} rows of {len(self.columns)} "
             f"columns, {first:g} to {last:g} s, {format_order(self.header.experiment.order)}{end}>"
         )
 
     def _repr_html_(self) -> str:
-        """The same for a notebook, with the indices."""
+        """Show it in a notebook, with the indices."""
         rows = []
         with suppress(InputError):
             for vehicle, title, numbers in summary(self.metrics()):
                 cells = "".join(f"<td>{number}</td>" for number in numbers)
                 heading = escape(", ".join(filter(None, (vehicle, title))))
                 rows.append(f"<tr><th style='text-align: left'>{heading}</th>{cells}</tr>")
-        title = escape(self._origin.scenario.title or self._origin.scenario.name)
+        title = escape(self._scenario.title or self._scenario.name)
         return (
             f"<div><b>{title}</b><br><code>{escape(repr(self))}</code>"
             f"<table>{''.join(rows)}</table></div>"
@@ -158,7 +167,9 @@ class Result(Table):
             ValueError: the result was read from files, which do not hold it.
 
         """
-        return self._origin.system
+        if self._prepared is None:
+            raise InputError(f"{self._file}: a stored result has no system; load() gives it")
+        return self._prepared.system
 
     @property
     def events(self) -> tuple[Occurrence, ...]:
@@ -167,7 +178,11 @@ class Result(Table):
 
     def metrics(self) -> dict[str, Any]:
         """The indices, as in metrics.json."""
-        return self._origin.metrics(self)
+        if self._prepared is None:
+            # The stored table may have fewer rows and columns than the run.
+            return read_metrics(locate(self._file.with_name(METRICS)))
+        indices = metrics_of(self, self._loops)
+        return indices.content(self._scenario.name, self._prepared.system)
 
     def to_dataframe(self) -> pd.DataFrame:
         """All columns as a pandas DataFrame, with the time as its index.
@@ -200,9 +215,9 @@ class Result(Table):
         """
         from orchestrator.figures.plot import plot, told_apart  # noqa: PLC0415
 
-        others = [one for one in what if isinstance(one, Result)]
-        patterns = [one for one in what if not isinstance(one, Result)]
-        return plot(told_apart([one._drawn() for one in (self, *others)]), patterns)
+        results = [self, *(each for each in what if isinstance(each, Result))]
+        patterns = [each for each in what if not isinstance(each, Result)]
+        return plot(told_apart([result._drawn() for result in results]), patterns)
 
     def figure(self, *others: Result, name: str | None = None, vehicle: str = "") -> Figure:
         """Draw the figure of its scenario, or another, as `auv-fmu run` does.
@@ -224,9 +239,8 @@ class Result(Table):
         for other in others:
             if not isinstance(other, Result):
                 raise InputError(f"{other!r}: not a result; name= takes the name of a figure")
-        scenario = self._origin.scenario
-        runs = told_apart([one._drawn() for one in (self, *others)])
-        return one_figure(name or scenario.figure, scenario.title, runs, vehicle)
+        runs = told_apart([result._drawn() for result in (self, *others)])
+        return one_figure(name or self._scenario.figure, self._scenario.title, runs, vehicle)
 
     def save(
         self,
@@ -258,65 +272,18 @@ class Result(Table):
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)
-            self._origin.write_ends(unfinished, self)
+            if self._prepared is not None or self._record:
+                write_metrics(unfinished, self.metrics())
+            if self._prepared is not None:
+                write_record(
+                    unfinished, self._prepared, self.header, self.ending, sys.argv, self._clock
+                )
+            elif self._record:
+                copy_record(unfinished, self._record)
         return folder
 
     def _drawn(self) -> Drawn:
-        scenario = self._origin.scenario
-        return Drawn(scenario.legend, self, scenario.z_up, self._origin.loops)
-
-
-def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
-    """What metrics.json holds, to be read by people.
-
-    Args:
-        values: of metrics.json.
-
-    Yields:
-        The vehicle, empty if there is only one; an index with its members and unit; its numbers.
-
-    """
-    for vehicle, found in of_vehicles(values).items():
-        for index in metrics():
-            if index.name in found:
-                unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
-                title = f"{index.label} {index.members}{unit}"
-                yield vehicle, title, [*map(_number, np.atleast_1d(found[index.name]).tolist())]
-    if SMALLEST_DISTANCE in values:
-        yield "all", f"{SMALLEST_DISTANCE_LABEL} [m]", [_number(values[SMALLEST_DISTANCE])]
-
-
-def _number(value: float) -> str:
-    """Four digits; an exponent only where zeros would be all that is seen."""
-    if value and not 1e-4 <= abs(value) < 1e7:
-        return f"{value:.3e}"
-    return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
-
-
-class _OnDisk:
-    """Where a result comes from that was read from files."""
-
-    def __init__(self, file: Path, record: dict[str, Any]) -> None:
-        self._file, self._record = file, record
-        self.loops: Sequence[Loop] = loops_in(record)
-        shown = {"title", "label", "z_up", "figure"} & record.keys()
-        said = {name: record[name] for name in shown}
-        self.scenario = Scenario(str(record.get("scenario", file.stem)), **said)
-
-    @property
-    def system(self) -> System:
-        """Nothing: files do not hold it."""
-        raise InputError(f"{self._file}: a stored result has no system; load() gives it")
-
-    def metrics(self, _: Result) -> dict[str, Any]:
-        """What the run wrote: the table may have fewer rows and columns."""
-        return read_metrics(locate(self._file.with_name(METRICS)))
-
-    def write_ends(self, folder: Path, result: Result) -> None:
-        """Write what the files hold, once more."""
-        if self._record:
-            write_metrics(folder, self.metrics(result))
-            copy_record(folder, self._record)
+        return Drawn(self._scenario.legend, self, self._scenario.z_up, self._loops)
 
 
 def read(path: str | Path) -> Result:
@@ -335,7 +302,335 @@ def read(path: str | Path) -> Result:
     record = read_record(file)
     for changed in changed_files(file) if record else ():
         warnings.warn(f"{changed} was changed since the run wrote it", stacklevel=2)
-    result = Result(_OnDisk(file, record))
+    shown = {name: record[name] for name in ("title", "label", "z_up", "figure") if name in record}
+    result = Result(Scenario(str(record.get("scenario", file.stem)), **shown), loops_in(record))
+    result._file, result._record = file, record
     header, blocks = stored_rows(file, record)
     result.hold(header, np.concatenate(list(blocks)), ending_in(record))
     return result
+
+
+def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
+    """The indices of a run in words.
+
+    Args:
+        values: content of metrics.json.
+
+    Yields:
+        The vehicle, empty if there is only one; an index with its members and unit; its numbers.
+
+    """
+    for vehicle, indices in of_vehicles(values).items():
+        for index in metrics():
+            if index.name in indices:
+                unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
+                title = f"{index.label} {index.members}{unit}"
+                numbers = np.atleast_1d(indices[index.name]).tolist()
+                yield vehicle, title, [*map(_number, numbers)]
+    if SMALLEST_DISTANCE in values:
+        yield "all", f"{SMALLEST_DISTANCE_LABEL} [m]", [_number(values[SMALLEST_DISTANCE])]
+
+
+def _number(value: float) -> str:
+    """Four digits; an exponent only where zeros would be all that is seen."""
+    if value and not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.3e}"
+    return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
+
+
+# The record and the indices
+
+
+class Stopwatch:
+    """Start and duration; the duration is right even if the clock is set meanwhile."""
+
+    def __init__(self) -> None:
+        """Start now."""
+        self._started = datetime.now(UTC)
+        self._tick = monotonic()
+
+    def times(self) -> dict[str, object]:
+        """The entries of a record about it."""
+        return {
+            "started": self._started.isoformat(timespec="seconds"),
+            "seconds": round(monotonic() - self._tick, 3),
+        }
+
+
+def write_metrics(folder: Path, values: Mapping[str, Any]) -> None:
+    """Write metrics.json into a folder."""
+    (folder / METRICS).write_text(in_json(values), encoding="utf-8")
+
+
+def read_metrics(path: Path) -> dict[str, Any]:
+    """Read metrics.json.
+
+    Raises:
+        InputError: it cannot be read.
+
+    """
+    with explain_errors(path, _NOT_INDICES):
+        values = json.loads(read_text(path, _NOT_INDICES))
+        if not isinstance(values, dict):
+            raise ValueError("it holds no names")
+        return {
+            name: value if name in _TEXTS else _as_numbers(value) for name, value in values.items()
+        }
+
+
+def write_record(
+    folder: Path,
+    prepared: Prepared,
+    header: Header,
+    ending: Ending,
+    command: Sequence[str],
+    clock: Stopwatch,
+    remarks: Mapping[str, object] | None = None,
+) -> None:
+    """Write the record of a run into the folder of its files.
+
+    Args:
+        folder: with all other files of the result.
+        prepared: the run.
+        header, ending: of its table.
+        command: of the run.
+        clock: started with the run.
+        remarks: further entries.
+
+    """
+    content = {
+        "scenario": prepared.scenario.name,
+        "title": prepared.scenario.title,
+        "label": prepared.scenario.label,
+        "z_up": prepared.scenario.z_up,
+        "figure": prepared.scenario.figure,
+        "sha256": prepared.scenario.digest,
+        "identity": digest_of(prepared.identity),
+        "command": list(command),
+        **clock.times(),
+        **content_of(header, ending, prepared.loops),
+        "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
+        **(remarks or {}),
+        "fmus": {
+            component.name: {
+                "file": component.fmu.name,
+                "sha256": component.digest,
+                "kind": PYTHON if runs_python(component.folder) else NATIVE,
+            }
+            for component in prepared.system.components.values()
+        },
+    }
+    write_content(folder, content)
+
+
+def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[str, object]:
+    """The entries about a table; :func:`header_in`, `ending_in` and `loops_in` read them."""
+    return {
+        "failure": ending.failure,
+        "remark": ending.remark,
+        "messages": list(ending.messages),
+        "experiment": vars(header.experiment),
+        "loop": header.loop,
+        "types": {
+            **{n: header.standing[n].fmi_type for n in header.columns if n in header.standing},
+            **{str(n): "String" for n, value in header.parameters.items() if type(value) is str},
+        },
+        "units": dict(header.units),
+        "vehicles": [asdict(loop) for loop in loops],
+        "events": [occurrence._asdict() for occurrence in ending.events],
+        "parameters": {str(name): value for name, value in header.parameters.items()},
+    }
+
+
+def write_content(
+    folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED_PACKAGES
+) -> None:
+    """Write a record, with versions, the platform, and the names of all files beside it."""
+    versions = {package: version(package) for package in packages}
+    copy_record(
+        folder,
+        {
+            **content,
+            "versions": {"python": platform.python_version()} | versions,
+            "platform": platform.platform(),
+        },
+    )
+
+
+def copy_record(folder: Path, content: Mapping[str, object]) -> None:
+    """Write a record unchanged, except for the names of all files beside it."""
+    files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    whole = {**content, "files": sorted(files | {RECORD})}
+    (folder / RECORD).write_text(in_json(whole), encoding="utf-8")
+
+
+def in_json(content: Mapping[str, object]) -> str:
+    """A record or indices as JSON, with texts for numbers that are not finite."""
+    return json.dumps(_as_texts(content), indent=2, allow_nan=False) + "\n"
+
+
+def _as_texts(content: object) -> object:
+    """Replace numbers that are not finite by texts."""
+    if isinstance(content, Mapping):
+        return {name: _as_texts(value) for name, value in content.items()}
+    if isinstance(content, list | tuple):
+        return list(map(_as_texts, content))
+    return str(content) if isinstance(content, float) and not isfinite(content) else content
+
+
+def _as_numbers(content: Any) -> Any:
+    """Replace these texts by numbers."""
+    if isinstance(content, dict):
+        return {name: _as_numbers(value) for name, value in content.items()}
+    if isinstance(content, list):
+        return list(map(_as_numbers, content))
+    return _NOT_FINITE.get(content, content) if isinstance(content, str) else content
+
+
+def ending_in(record: dict[str, Any]) -> Ending:
+    """The end of a run, from its record."""
+    events = (
+        Occurrence(float(e["time"]), str(e["text"]), str(e["label"]), int(e.get("event", 0)))
+        for e in record.get("events", ())
+    )
+    return Ending(
+        record.get("failure"),
+        record.get("remark"),
+        tuple(record.get("messages", ())),
+        events=tuple(events),
+    )
+
+
+def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
+    """The header of a table, from the record beside it."""
+    stated = record["experiment"]
+    known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
+    types, strings = _types_in(record), StringTable()
+    return Header(
+        columns,
+        Experiment(**known),
+        {
+            PortName.read(name): value if types.get(name) == "String" else _as_numbers(value)
+            for name, value in record["parameters"].items()
+        },
+        record.get("loop", "python"),
+        {name: Standing(types[name], strings) for name in columns if name in types},
+        record.get("units", {}),
+    )
+
+
+def _types_in(record: dict[str, Any]) -> dict[str, str]:
+    """The types of columns and parameters that hold anything but doubles."""
+    # Earlier versions named columns of texts only.
+    types = record.get("types", dict.fromkeys(record.get("texts", ()), "String"))
+    if not all(TYPES[fmi_type].stands for fmi_type in types.values()):
+        raise ValueError("it holds types that no run has")
+    return dict(types)
+
+
+def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
+    """The loops of the vehicles of a run, from its record; the standard loop if it names none."""
+    return tuple(loop_of(names) for names in record.get("vehicles", ())) or (STANDARD,)
+
+
+# Stored tables
+
+
+def read_result(
+    path: Path,
+    watched: Callable[[Sequence[str], Sequence[Loop]], Collection[str]] | None = None,
+) -> Drawn:
+    """Read a stored result for drawing: only some columns, and no more rows than can be seen.
+
+    Args:
+        path: a folder that a run has written, or a table in CSV or Parquet; without a record
+            beside it, the parameters are unknown.
+        watched: chooses among the columns, given the loops; None: those of the paper's figures.
+
+    Raises:
+        InputError: there is no result, or it cannot be read.
+
+    """
+    file = table_in(path)
+    record = read_record(file)
+    header, blocks = stored_rows(file, record)
+    loops = loops_in(record)
+    drawn = {name for loop in loops for name in loop.drawn()}
+    table = VisibleRows(drawn if watched is None else watched(header.columns, loops))
+    table.begin(header)
+    for rows in blocks:
+        table.take(rows)
+    table.end(ending_in(record))
+    label = str(record.get("label") or record.get("scenario") or file.stem)
+    return Drawn(label, table, bool(record.get("z_up")), loops)
+
+
+def stored_rows(file: Path, record: dict[str, Any]) -> tuple[Header, Iterator[np.ndarray]]:
+    """The header and the rows of a stored table, block by block.
+
+    Raises:
+        InputError: it cannot be read, or has no rows.
+
+    """
+    place = locate(file)
+    columns = read_columns(place)
+    header = header_in(record, columns) if record else None
+    standing = header.standing if header else {}
+    blocks = read_rows(place, {name: column.number for name, column in standing.items()})
+    first = next(blocks, None)
+    if first is None:
+        raise InputError(f"{file}: has no rows")
+    return header or _header(columns, first, file), chain([first], blocks)
+
+
+def table_in(path: Path) -> Path:
+    """The file with the table of a result.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    with explain_errors(path, "not the name of a result"):
+        for file in (path, *(path / name for name in TABLES)):
+            if locate(file).is_file():
+                return file
+    raise InputError(f"{path}: holds no result.csv or result.parquet")
+
+
+def changed_files(table: Path) -> list[Path]:
+    """The table of a result and its record, if they were changed since the run wrote them."""
+    return [file for file in (table, table.with_name(RECORD)) if is_changed(file)]
+
+
+def read_record(table: Path) -> dict[str, Any]:
+    """The record of the run that wrote a table; empty if there is none that names the table.
+
+    Raises:
+        InputError: it is broken.
+
+    """
+    file = locate(table.with_name(RECORD))
+    if not file.exists():
+        return {}
+    with explain_errors(file, _NOT_A_RECORD):
+        record = json.loads(read_text(file, _NOT_A_RECORD))
+        try:
+            if table.name not in record["files"]:
+                return {}
+            header, *_ = header_in(record, ()), ending_in(record), loops_in(record)
+        except (KeyError, TypeError, AttributeError):
+            raise ValueError("it lacks what a run writes") from None
+        except InputError as error:
+            raise ValueError(str(error)) from None
+        for name, value in header.parameters.items():
+            if not isinstance(value, float | int | str):
+                raise ValueError(f"the parameter {name} is {value!r}")
+    return dict(record)
+
+
+def _header(columns: tuple[str, ...], rows: np.ndarray, file: Path) -> Header:
+    """The header of a table without a record, with the step of its first rows."""
+    step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
+    if not 0.0 < step < inf:
+        raise InputError(f"{file}: times must increase")
+    return Header(columns, Experiment(step, step))

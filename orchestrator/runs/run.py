@@ -1,10 +1,12 @@
-"""One run and its files: the table as it is computed, then metrics, figures and record."""
+"""Making runs: `simulate` in memory, `run_into` into a folder; checkpoints of both."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
@@ -34,48 +36,235 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.ledger import LEDGER, Ledger
-from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files
-from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import (
-    CHECKPOINTS,
-    FILES,
-    Stopwatch,
-    checkpoints_of,
-    leave_checkpoints,
-    write_metrics,
-    write_record,
+from orchestrator.runs.folder import (
+    INCOMPLETE,
+    inner_folder,
+    lock_folder,
+    make_folder,
+    place_of,
+    publish,
+    replace_files,
 )
-from orchestrator.runs.request import Files
+from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
+from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.request import (
+    CHECKPOINT_EVERY,
+    Files,
+    Options,
+    Request,
+    option,
+    takes_keywords,
+)
+from orchestrator.runs.result import FILES, Result, Stopwatch, write_metrics, write_record
+from orchestrator.runs.scenario import Scenario
 from orchestrator.vehicle.cautions import Watch, cautions, cautions_beside, values_of
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import suffixes
 
+#: The folder of checkpoints, within the folder of the result.
+CHECKPOINTS = "checkpoint"
+
 #: A file that keeps room for the files written last, so that a full disk does not cost the record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
 
-#: Exit status of a process that a run has to end with.
+#: The caller of :func:`simulate`, seen from where it warns: the decorator adds a level.
+_STACK_LEVEL = 5
+
+#: Exit status of a process that a run has to end.
 _FAILED = 1
 
 
+# Runs in memory
+
+
 @dataclass(frozen=True)
-class Finished:
-    """A run whose files are written.
+class SimulateOptions(Options):
+    """Arguments of :func:`simulate`."""
+
+    system: str | Path | Mapping[str, Any] | System = field(
+        metadata={
+            "help": "name of a scenario, path of a file such as .toml or .ssp, a dictionary with "
+            "the entries of a scenario file, or a system from `load`"
+        }
+    )
+    parameters: Mapping[str, object] | None = option(
+        None,
+        "values in place of the scenario's, by `component.parameter`: numbers, Booleans, names, or "
+        "text as on the command line; for a group, such as `plant.eta0`, a list with a value for "
+        "each member",
+    )
+    _: KW_ONLY
+    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
+    variant: str | None = option(None, "name of a system description in an SSP")
+    checkpoint: str | Path | None = option(
+        None,
+        "folder for checkpoints, from which another process can continue the run; it is removed "
+        "when the run is complete",
+    )
+    checkpoint_every: float | None = option(None, CHECKPOINT_EVERY)
+    resume: bool = option(
+        False,
+        "continue from the last checkpoint. The result has all rows, as if the run had not been "
+        "interrupted; its `resumed_at` has the time at which it continued",
+    )
+
+
+@takes_keywords(SimulateOptions)
+def simulate(options: SimulateOptions) -> Result:
+    """Run a scenario, an SSP or a system.
+
+        result = simulate("fig4", {"controller.eps_t": 10.0}, stop_time=50.0)
+        result["plant.eta.x"], result.metrics(), result.plot("plant.tau.*")
+
+    Args:
+        {arguments}
+
+    Returns:
+        The computed rows: all of them, or the rows before a failure, which `Result.failure` then
+        describes.
+
+    Raises:
+        ValueError: a name, a value or a file is not usable; the message says what to change.
+        KeyboardInterrupt: Ctrl-C, after the current step.
+
+    """
+    system, strict = options.system, options.strict
+    if isinstance(system, System):
+        check_brings_its_own(str(system), options.kind)
+        if options.variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
+        scenario = Scenario(system.name)
+    else:
+        with notes_as_warnings(strict, _STACK_LEVEL) as findings:
+            scenario, system = load_scenario(
+                system, options.kind, variant=options.variant, findings=findings
+            )
+            findings.refuse()
+    parameters = {} if options.parameters is None else options.parameters
+    if not isinstance(parameters, Mapping):
+        raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
+    changes = {one.name: getattr(options, one.name) for one in fields(Options)}
+    changes["steps"] = options.steps or {}
+    prepared = prepare(scenario, system, Request("", parameters, **changes))
+    if options.system is not system:
+        with notes_as_warnings(strict, _STACK_LEVEL) as findings:
+            for doubt in prepared.doubts():
+                findings.note(doubt)
+            findings.refuse()
+    result = Result(scenario, prepared.loops, prepared)
+    observers: list[Observer] = [result, *([Progress(scenario.name)] * options.progress)]
+    with _checkpoints_for(prepared, options) as kept:
+        result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
+        ending = prepared.run([*observers, *kept], kept)
+        leave_checkpoints(kept, ending.failure is None)
+    for number in ending.interrupts:
+        # Held back while the FMUs computed; now it acts as usual.
+        signal.raise_signal(number)
+    return result
+
+
+@contextmanager
+def _checkpoints_for(
+    prepared: Prepared, options: SimulateOptions
+) -> Iterator[Sequence[Checkpoints]]:
+    """The checkpoints of a run, in a folder kept from other runs; none, if none are wanted."""
+    folder, every, resume = options.checkpoint, options.checkpoint_every, options.resume
+    if folder is None and every is None and not resume:
+        yield ()
+        return
+    if folder is None or (every is None and not resume):
+        raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
+    place = Path(folder)
+    try:
+        with make_folder(place), lock_folder(place):
+            yield checkpoints_of([prepared], [place], every, resume)
+    except OSError as error:
+        raise InputError(f"cannot write into {place}: {reason(error)}") from error
+
+
+# Runs into a folder
+
+
+class WrittenRun:
+    """A run whose rows go into files, with what is known of it once it has ended.
 
     Attributes:
-        folder: of its files.
-        name: of the scenario.
-        metrics: what metrics.json holds.
+        prepared: the run.
         ending: how it has ended.
-        notes: what else there is to say of it, in lines.
+        metrics: content of metrics.json.
 
     """
 
-    folder: Path
-    name: str
-    metrics: dict[str, Any]
-    ending: Ending
-    notes: Sequence[str] = ()
+    def __init__(
+        self,
+        folder: Path,
+        prepared: Prepared,
+        files: Files,
+        columns: Sequence[str] | None,
+        checkpoints: Checkpoints | None,
+    ) -> None:
+        """Open its files.
+
+        Args:
+            folder: of its files, for now.
+            prepared: the run.
+            files: the files to write.
+            columns: of its table; None: all.
+            checkpoints: that it writes and continues from; None: there are none.
+
+        """
+        self.folder, self.prepared = folder, prepared
+        self.ending, self.metrics = Ending(), dict[str, Any]()
+        self.name, loops = prepared.scenario.name, prepared.loops
+        # Without figures only references are compared.
+        self.seen = VisibleRows(
+            {name for one in loops for name in (one.y_d if files.no_figures else one.drawn())}
+        )
+        self.watch, self._metrics = Watch(loops), Metrics(loops)
+        self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
+        self._real_time = None if files.real_time is None else RealTime(files.real_time)
+        self._resumed_at = checkpoints and checkpoints.time
+        self._hooks: list[Hook] = [one for one in (checkpoints, self._real_time) if one]
+        self._observers: list[Observer] = [
+            Selection(self._table, files.interval, columns),
+            *(
+                CertificatesFile(folder / _certificates(vehicle), files.interval, loop)
+                for loop, vehicle in suffixes(loops).items()
+            ),
+            self._metrics,
+            self.watch,
+            self.seen,
+            Progress(self.name),
+            *([checkpoints] if checkpoints else []),
+        ]
+
+    def make(self) -> None:
+        """Step it to its end."""
+        self.ending = self.prepared.run(self._observers, self._hooks)
+        self.metrics = self._metrics.content(self.name, self.prepared.system)
+
+    def give_up(self) -> None:
+        """End it from another thread, while an FMU does not return."""
+        self.ending = Ending("was ended: an FMU did not return from its step")
+        self._table.end(self.ending)
+        self.metrics = {"scenario": self.name, "failure": self.ending.failure}
+
+    def write_ends(self, command: Sequence[str], clock: Stopwatch) -> None:
+        """Write metrics.json, and the record of all files beside and below it."""
+        remarks: dict[str, object] = {}
+        if self._real_time is not None:
+            remarks["real_time"] = self._real_time.record()
+        if self._resumed_at is not None:
+            remarks["resumed_at"] = self._resumed_at
+        write_metrics(self.folder, self.metrics)
+        header = self.seen.whole_header
+        write_record(self.folder, self.prepared, header, self.ending, command, clock, remarks)
+
+    @property
+    def notes(self) -> list[str]:
+        """Lines for the user."""
+        return [] if self._real_time is None else [str(self._real_time)]
 
 
 def run_into(
@@ -85,16 +274,20 @@ def run_into(
     command: Sequence[str],
     say: Callable[[str], None],
     draw: Callable[..., list[str]] | None,
-) -> list[Finished]:
+) -> tuple[Path, list[WrittenRun]]:
     """Run a scenario, and those it is compared with, and write the files of all.
 
     Args:
         folder: for the files of the first; the others go into folders below it.
         runs: the scenario, and those it is compared with.
-        files: what to keep.
+        files: the files to write.
         command: for the record.
         say: takes notes for the user while it goes on.
         draw: the figures, :func:`.drawing.draw`; None: there are none.
+
+    Returns:
+        The folder of the files, which is another one if a run failed and `folder` holds an earlier
+        result; the runs.
 
     Raises:
         InputError: a run cannot be made, or its files cannot be written.
@@ -107,119 +300,46 @@ def run_into(
     # The library of numpy's algebra ends the process if there is no memory for it: not later, when
     # there are rows to lose.
     np.linalg.inv(np.eye(1))
-    clock = Stopwatch()
-    done: list[_Running] = []
-    folders = _folders(runs)
-    names = _names(runs, folders)
+    below, names = _places(runs)
+    done: list[WrittenRun] = []
     with (
         held_interrupts() as interrupts,
         replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as path,
     ):
         kept = checkpoints_of(
             runs,
-            [inner_folder(folder, CHECKPOINTS, *filter(None, [below])) for below in folders],
+            [inner_folder(folder, CHECKPOINTS, *filter(None, [name])) for name in below],
             files.checkpoint_every,
             files.resume,
             files.force,
             Ledger(folder).token,
             say,
         )
-        unfinished = _Unfinished(path, folder, done, command, clock, say)
+        output = _Output(path, folder, done, command, say)
         try:
-            for prepared, below, columns, checkpoints in zip_longest(runs, folders, tables, kept):
+            for prepared, name, columns, checkpoints in zip_longest(runs, below, tables, kept):
                 step, loops = prepared.experiment.step, prepared.loops
                 before = cautions(values_of(prepared.system), step, loops)
-                unfinished.caution(prepared, (caution.text for caution in before))
-                target = unfinished.begin(below)
-                run = _Running(target, prepared, files, columns, checkpoints)
-                unfinished.make(run, interrupts)
+                output.warn(prepared, (caution.text for caution in before))
+                output.latest = path / name
+                output.latest.mkdir(exist_ok=True)
+                output.make(
+                    WrittenRun(output.latest, prepared, files, columns, checkpoints), interrupts
+                )
                 if interrupts:
                     break
             if draw is not None:
-                unfinished.draw(draw, interrupts)
+                output.draw(draw, interrupts)
         except (OSError, MemoryError) as error:
-            unfinished.rescue(error)
-        place = unfinished.finish()
+            output.rescue(error)
+        place = output.finish()
     is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
     leave_checkpoints(kept, is_whole, say)
-    return [
-        Finished(place, run.prepared.scenario.name, run.metrics, run.ending, run.notes)
-        for run in done
-    ]
+    return place, done
 
 
-class _Running:
-    """A run, the observers of its rows, and its results once it has ended."""
-
-    def __init__(
-        self,
-        folder: Path,
-        prepared: Prepared,
-        files: Files,
-        columns: Sequence[str] | None,
-        checkpoints: Checkpoints | None,
-    ) -> None:
-        self.folder, self.prepared = folder, prepared
-        self.ending, self.metrics = Ending(), dict[str, Any]()
-        loops = prepared.loops
-        self._metrics = Metrics(loops)
-        self.watch = Watch(loops)
-        # Without figures only references are compared.
-        self.seen = VisibleRows(
-            {name for one in loops for name in (one.y_d if files.no_figures else one.drawn())}
-        )
-        self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
-        self.observers: list[Observer] = [
-            Selection(self._table, files.interval, columns),
-            *(
-                CertificatesFile(folder / _certificates(vehicle), files.interval, loop)
-                for loop, vehicle in suffixes(loops).items()
-            ),
-            self._metrics,
-            self.watch,
-            self.seen,
-            Progress(prepared.scenario.name),
-        ]
-        self.hooks: list[Hook] = []
-        self._real_time = None if prepared.real_time is None else RealTime(prepared.real_time)
-        self._resumed_at = None
-        if checkpoints is not None:
-            self.observers.append(checkpoints)
-            self.hooks.append(checkpoints)
-            self._resumed_at = checkpoints.time
-        if self._real_time is not None:
-            self.hooks.append(self._real_time)
-
-    def end(self, ending: Ending) -> None:
-        """Take note of the end, of which its observers have been told."""
-        self.ending = ending
-        self.metrics = self._metrics.content(self.prepared.scenario.name, self.prepared.system)
-
-    def give_up(self) -> None:
-        """End it without what else can end it."""
-        self.ending = Ending("was ended: an FMU did not return from its step")
-        self._table.end(self.ending)
-        self.metrics = {
-            "scenario": self.prepared.scenario.name,
-            "failure": self.ending.failure,
-        }
-
-    @property
-    def remarks(self) -> dict[str, object]:
-        """What else the record says."""
-        return {
-            **({} if self._real_time is None else {"real_time": self._real_time.record()}),
-            **({} if self._resumed_at is None else {"resumed_at": self._resumed_at}),
-        }
-
-    @property
-    def notes(self) -> list[str]:
-        """What else the user is told, in lines."""
-        return [] if self._real_time is None else [str(self._real_time)]
-
-
-class _Unfinished:
-    """The folder that runs are made in, until its files take their places.
+class _Output:
+    """The folder that runs are written into, before its files take their places.
 
     A step that never returns or a full disk costs what is not written yet, not what is.
     """
@@ -228,43 +348,35 @@ class _Unfinished:
         self,
         path: Path,
         folder: Path,
-        done: list[_Running],
+        done: list[WrittenRun],
         command: Sequence[str],
-        clock: Stopwatch,
         say: Callable[[str], None],
     ) -> None:
         """Take the path that the folder has for now, and keep room there for the record."""
         self._path, self._folder, self._done = path, folder, done
-        self._command, self._clock, self._say = command, clock, say
-        self._latest = path
+        self._command, self._clock, self._say = command, Stopwatch(), say
+        #: The folder of the latest run.
+        self.latest = path
         self._spare = path / _SPARE
         # No zeros: some file systems need no room for them.
         self._spare.write_bytes(os.urandom(_SPARE_BYTES))
 
-    def caution(self, prepared: Prepared, said: Iterable[str]) -> None:
-        """Tell the user what to be wary of in a run."""
-        for caution in said:
-            self._say(f"warning: {prepared.scenario.name}: {caution}")
+    def warn(self, prepared: Prepared, texts: Iterable[str]) -> None:
+        """Pass on warnings about a run."""
+        for text in texts:
+            self._say(f"warning: {prepared.scenario.name}: {text}")
 
-    def begin(self, below: str) -> Path:
-        """Make the folder of the next run."""
-        self._latest = self._path / below
-        self._latest.mkdir(exist_ok=True)
-        return self._latest
-
-    def make(self, run: _Running, interrupts: Interrupts) -> None:
-        """Make a run, and tell what is to be said of it beside the first."""
-        prepared = run.prepared
+    def make(self, run: WrittenRun, interrupts: Interrupts) -> None:
+        """Make a run, and warn of what it shows, also beside the first."""
         with interrupts.insistence(partial(self._give_up, run)):
-            ending = prepared.run(run.observers, run.hooks)
-        run.end(ending)
+            run.make()
         self._done.append(run)
-        first, missed = self._done[0], [] if ending.failure else prepared.missed(ending)
-        said = [f"did not happen: {event}" for event in missed]
-        compared = first.prepared
-        said += cautions_beside(run.seen, compared.scenario.name, first.seen, compared.loops)
-        said += [caution.text for caution in run.watch.found()]
-        self.caution(prepared, said)
+        first, prepared = self._done[0], run.prepared
+        missed = [] if run.ending.failure else prepared.missed(run.ending)
+        self.warn(prepared, (f"did not happen: {event}" for event in missed))
+        loops = first.prepared.loops
+        self.warn(prepared, cautions_beside(run.seen, first.name, first.seen, loops))
+        self.warn(prepared, (caution.text for caution in run.watch.found()))
 
     def draw(self, draw: Callable[..., list[str]], interrupts: Interrupts) -> None:
         """Draw all figures or, where one of them cannot be written, none."""
@@ -297,13 +409,13 @@ class _Unfinished:
         """Go on with the runs that are done, where another or the figures cannot be written."""
         if not self._done:
             raise error
-        if self._latest != self._done[-1].folder and self._latest.is_dir():
-            rmtree(self._latest)
+        if self.latest != self._done[-1].folder and self.latest.is_dir():
+            rmtree(self.latest)
         first, failure = self._done[0], f"could not be written in full: {reason(error)}"
         first.ending = replace(first.ending, failure=first.ending.failure or failure)
 
     def finish(self) -> Path:
-        """Write what is written last, and say where all will be.
+        """Write what is written last, and return the folder that all files will be in.
 
         Raises:
             InputError: the folder is gone.
@@ -318,14 +430,14 @@ class _Unfinished:
         self._write_ends(self._done)
         return place_of(self._path, self._folder)
 
-    def _give_up(self, run: _Running) -> None:
+    def _give_up(self, run: WrittenRun) -> None:
         """Keep what is there and end the process; the thread that steps the FMUs never will."""
         try:
             self._spare.unlink()
             run.give_up()
             self._write_ends([*self._done, run])
             place = publish(Ledger(self._folder))
-            self._say(f"{run.prepared.scenario.name} {run.ending.failure}; its rows are in {place}")
+            self._say(f"{run.name} {run.ending.failure}; its rows are in {place}")
             rmtree(process_folder(), ignore_errors=True)
         except Exception as error:
             self._say(
@@ -334,14 +446,10 @@ class _Unfinished:
         finally:
             os._exit(_FAILED)
 
-    def _write_ends(self, done: Sequence[_Running]) -> None:
-        """Write what is written last; the record of the first names the files of all."""
+    def _write_ends(self, done: Sequence[WrittenRun]) -> None:
+        # The record of the first names the files of all.
         for run in reversed(done):
-            write_metrics(run.folder, run.metrics)
-            write_record(
-                run.folder, run.prepared, run.seen.whole_header, run.ending, self._command,
-                self._clock, run.remarks,
-            )  # fmt: skip
+            run.write_ends(self._command, self._clock)
 
 
 def _figures(prepared: Prepared) -> list[str]:
@@ -349,34 +457,29 @@ def _figures(prepared: Prepared) -> list[str]:
     return figure_files(prepared.scenario.figure, prepared.scenario.stem, prepared.loops)
 
 
-def _folders(runs: Sequence[Prepared]) -> list[str]:
-    """The folder of each run, from the first one's on."""
-    figures = _figures(runs[0])
-    taken = [*FILES, _certificates(""), *figures, CHECKPOINTS, INCOMPLETE, LEDGER]
-    return ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
-
-
-def _names(runs: Sequence[Prepared], folders: Sequence[str]) -> list[str]:
-    """The files that will be written, as far as they are known."""
-    names = _figures(runs[0])
-    for prepared, below in zip(runs, folders, strict=True):
+def _places(runs: Sequence[Prepared]) -> tuple[list[str], list[str]]:
+    """The folder of each run within that of the first, and all files as far as they are known."""
+    files = _figures(runs[0])
+    taken = [*FILES, _certificates(""), *files, CHECKPOINTS, INCOMPLETE, LEDGER]
+    below = ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
+    for prepared, name in zip(runs, below, strict=True):
         certificates = map(_certificates, suffixes(prepared.loops).values())
-        names += [Path(below, name).as_posix() for name in (*FILES, *certificates)]
-    return names
+        files += [Path(name, file).as_posix() for file in (*FILES, *certificates)]
+    return below, files
 
 
 def _certificates(vehicle: str) -> str:
-    """The file of the certificates of a loop, whose name ends with what tells it from others."""
+    """The file of the certificates of a loop, by the suffix that names its vehicle."""
     return f"certificates{vehicle}.csv"
 
 
 def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:
-    """The columns of a table.
+    """The columns of a table; None: all.
 
     Args:
-        system: that is run.
+        system: the system of the run.
         wanted: `all`, `outputs`, or patterns with commas between them.
-        is_companion: whether patterns may match nothing, because they are meant for another run.
+        is_companion: whether patterns may match nothing, as they may be for another run.
 
     Raises:
         InputError: a pattern matches no column.
@@ -403,3 +506,100 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
     if is_companion:
         return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
     return matching(names, patterns)
+
+
+# Checkpoints
+
+
+def checkpoints_of(
+    runs: Sequence[Prepared],
+    folders: Sequence[Path],
+    every: float | None,
+    resume: bool,
+    force: bool = False,
+    token: str = "",
+    say: Callable[[str], None] = lambda _: None,
+) -> list[Checkpoints]:
+    """The checkpoints of some runs, made one after the other.
+
+    Args:
+        runs: the runs.
+        folders: of their checkpoints.
+        every: time between two checkpoints [simulated s]; None: as before, if runs are resumed.
+        resume: begin with the checkpoints that are there.
+        force: move aside other files that are there.
+        token: random, for new checkpoints; empty: one is drawn.
+        say: takes notes for the user.
+
+    Returns:
+        Those of each run; an empty list if none are wanted.
+
+    Raises:
+        InputError: there is nothing to resume, or an FMU does not provide its state.
+
+    """
+    if resume and every is None:
+        every = Checkpoints.interval_in(folders[0])
+        if every is None:
+            raise InputError(
+                f"nothing to resume in {folders[0]}; a run with "
+                "--checkpoint-every writes checkpoints there"
+            )
+    if every is None:
+        return []
+    for prepared in runs:
+        check_gives_states(prepared.system)
+    kept = []
+    for folder, prepared in zip(folders, runs, strict=True):
+        checkpoints = Checkpoints(folder, prepared.identity, every, resume, force, token)
+        # FMUs may change the current folder.
+        checkpoints.folder = checkpoints.folder.absolute()
+        kept.append(checkpoints)
+    for checkpoints, prepared in zip(kept, runs, strict=True):
+        if checkpoints.time is not None:
+            say(f"{prepared.scenario.name}: continues at t = {checkpoints.time:g} s")
+    if resume and not any(checkpoints.time for checkpoints in kept):
+        say(f"nothing to resume in {folders[0]}: starts from the beginning")
+    return kept
+
+
+def check_gives_states(system: System) -> None:
+    """Check that all FMUs provide their state.
+
+    Raises:
+        InputError: one does not.
+
+    """
+    for name, component in system.components.items():
+        if not component.gives_state:
+            raise InputError(
+                f"{name}: its FMU {component.fmu.name} does not provide its state "
+                "(canGetAndSetFMUstate and canSerializeFMUstate): a run with it has no checkpoints"
+            )
+
+
+def leave_checkpoints(
+    kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
+) -> None:
+    """Remove checkpoints of complete runs, or say where they are.
+
+    Args:
+        kept: of runs that belong together.
+        is_whole: whether all of them are complete.
+        say: takes notes for the user.
+
+    """
+    # The folder of the first holds those of the others.
+    for checkpoints in reversed(kept):
+        if is_whole:
+            checkpoints.remove()
+        elif checkpoints.time is not None:
+            place = _shown(checkpoints.folder)
+            say(f"--resume continues from t = {checkpoints.time:g} s, from {place}")
+
+
+def _shown(folder: Path) -> Path:
+    """A folder, relative to the current one if it is in it."""
+    with suppress(OSError, ValueError):
+        return folder.relative_to(Path.cwd())
+    return folder

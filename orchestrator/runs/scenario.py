@@ -1,13 +1,19 @@
-"""Scenarios: parameters and more over the closed loop in a TOML file, and the tables they name."""
+"""Scenarios: changes to the closed loop in a TOML file, its tables of inputs and waypoints, events.
+
+:mod:`.scenario_file` declares the entries of the file; it is imported only where a file is read,
+since pydantic takes a tenth of a second.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import re
 import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -18,43 +24,60 @@ from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim.experiment import Order
+from orchestrator.cosim.hooks.events import (
+    COMPARISONS,
+    Action,
+    Alter,
+    Condition,
+    Event,
+    Freeze,
+    Release,
+    Reset,
+    Set,
+    Stop,
+)
 from orchestrator.cosim.hooks.timing import InputTable
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value
+from orchestrator.cosim.system.units import Linear, Mapped, Transformation
+from orchestrator.cosim.system.values import (
+    TYPES,
+    Standing,
+    StringTable,
+    Value,
+)
 from orchestrator.cosim.system.variables import Variable
-from orchestrator.machine.errors import InputError
+from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.schema import flatten
-from orchestrator.machine.texts import finite
+from orchestrator.machine.texts import finite, is_finite, literal
 from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
 from orchestrator.runs import SCENARIOS_FOLDER
 from orchestrator.runs.tables import read_columns, read_rows, records
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
-#: What a message calls a file that cannot be read.
-_NOT_A_SCENARIO = "not a scenario"
+#: Messages about a file that cannot be read.
+_NOT_A_SCENARIO, _NO_INPUTS = "not a scenario", "not a table of inputs"
 
 #: The name of a scenario that has no file.
 _NAMELESS = "scenario"
 
-#: What a message calls a table that cannot be read.
-_NO_INPUTS = "not a table of inputs"
-
-#: What is run besides the scenarios that come with the bundle.
+#: Systems that are run besides the scenarios of the bundle.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
 
-#: So many seconds are farther apart than two numbers can be, apart from rounding [s].
+#: The largest difference of times, so that it can be computed [s].
 _FARTHEST = 1e308
 
 #: The model of the planners that run through waypoints.
 _PATH_PLANNER = "PathPlanner"
 
-#: Stands for the name of each vehicle, `auv1`, `auv2`, ...; in a wire, for the same one.
+#: Stands for the name of each vehicle, `auv1`, `auv2`, ...; in a wire, for the same vehicle.
 EACH_VEHICLE = "auv*"
 
 #: The columns of a table of waypoints, without times and with them.
 _PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
+
+_CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
 
 def vehicle_names(n: int | None) -> list[str]:
@@ -70,8 +93,8 @@ class Inputs:
 
     Attributes:
         file: with the table.
-        between: what continuous Real inputs do between two rows, `linear` or `hold`.
-        wins: over the parameters of the scenario, as a table of the command line does.
+        between: interpolation of continuous Real inputs between two rows, `linear` or `hold`.
+        wins: over the parameters of the scenario, like a table of the command line.
 
     """
 
@@ -96,7 +119,7 @@ class Inputs:
         Systems whose variables are alike share what was read.
 
         Raises:
-            InputError: the table cannot be read, or holds what is not of such a type.
+            InputError: the table cannot be read, or holds a value of another type.
 
         """
         kinds = tuple((v.type, v.min, v.max, *v.items.items()) for v in variables)
@@ -108,8 +131,8 @@ class Inputs:
         strings = StringTable()
         numbers: dict[str, Callable[[object], float]] = {}
         for name, variable in zip(self.names, variables, strict=True):
-            of = TYPES[variable.type]
-            if of.stands or of.family in ("Boolean", "Enumeration"):
+            kind = TYPES[variable.type]
+            if kind.stands or kind.family in ("Boolean", "Enumeration"):
                 numbers[name] = partial(_stand_in, name, variable, strings)
         blocks = read_rows(self.file, numbers, _NO_INPUTS)
         rows = np.vstack([np.empty((0, 1 + len(variables))), *blocks])
@@ -123,7 +146,7 @@ class Inputs:
 
 
 def _stand_in(name: str, variable: Variable, strings: StringTable, value: object) -> float:
-    """The number for a cell of a table.
+    """The number that stands for a cell of a table.
 
     Raises:
         ValueError: the variable cannot have this value.
@@ -137,7 +160,7 @@ def _stand_in(name: str, variable: Variable, strings: StringTable, value: object
 
 @dataclass(frozen=True)
 class Scenario:
-    """What to run and how to show it; :mod:`.scenario_file` says what each entry means.
+    """A system to run and how to show it; :mod:`.scenario_file` explains each entry.
 
     Attributes:
         name: of the file, without its ending.
@@ -197,7 +220,7 @@ def read_scenario(name: str) -> Scenario:
 
 
 def scenario_of(content: Mapping[str, Any]) -> Scenario:
-    """A scenario from what its file would hold; paths in it are relative to the current folder.
+    """A scenario from the content of a file; paths in it are relative to the current folder.
 
     Raises:
         InputError: there is a mistake in it.
@@ -207,10 +230,10 @@ def scenario_of(content: Mapping[str, Any]) -> Scenario:
 
 
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Check what can be checked of events without a system.
+    """Check events as far as is possible without a system.
 
     Raises:
-        Refused: an event is not written as one.
+        Refused: one of them is no event.
 
     """
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
@@ -234,15 +257,15 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
             listed = dict.fromkeys(content[key])
             content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
     if "path" in content:
-        said, others = content.pop("path"), content["parameters"]
-        component = said.get("component", STANDARD.planner)
-        found = path_parameters(path.parent / said["file"], component)
-        for name in found.keys() & others.keys():
-            raise InputError(f"{path}: {name} is already given by {said['file']}")
-        content["parameters"] |= found
+        table = content.pop("path")
+        component = table.get("component", STANDARD.planner)
+        waypoints = path_parameters(path.parent / table["file"], component)
+        for name in waypoints.keys() & content["parameters"].keys():
+            raise InputError(f"{path}: {name} is already given by {table['file']}")
+        content["parameters"] |= waypoints
     if "inputs" in content:
-        said = content["inputs"]
-        content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
+        table = content["inputs"]
+        content["inputs"] = Inputs(**table | {"file": path.parent / table["file"]})
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     content["components"] = {
         component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else fmu
@@ -256,12 +279,12 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
 def read_inputs(
     inputs: Inputs, system: System, given: Collection[PortName]
 ) -> tuple[System, InputTable]:
-    """A system that begins with the first values of a table, and what follows.
+    """A system that begins with the first values of a table, and the values that follow.
 
     Args:
-        inputs: that are wanted.
-        system: that has them.
-        given: ports that have values from where the table is named: it must not name them, too.
+        inputs: the table.
+        system: with the inputs.
+        given: ports with other values from the same file or command, which the table must not name.
 
     Raises:
         InputError: the table cannot be read, or a column is not an available input.
@@ -292,15 +315,15 @@ def with_input_table(
     given: Collection[PortName] = (),
     between: str = "linear",
 ) -> tuple[System, InputTable]:
-    """A system that begins with the first values of inputs over time, and what follows.
+    """A system that begins with the first values of inputs over time, and the values that follow.
 
     Args:
-        system: that has the inputs.
+        system: with the inputs.
         names: of the inputs.
         times: of their values [s].
         columns: their values, of each input in its type or as doubles.
         given: ports that have values already.
-        between: what continuous Real inputs do between two rows.
+        between: interpolation of continuous Real inputs between two rows.
 
     Raises:
         InputError: a column is not an available input, or cannot be followed.
@@ -353,7 +376,7 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
 
 
 def _typed(system: System, target: PortName, value: Value) -> Value:
-    """A value of a table in the type of an input, which takes whole doubles as integers, too."""
+    """Convert a value of a table to the type of an input; integers may be whole doubles."""
     variable = system.component(target.component).variable(target.port)
     return variable.typed(f"{value:.17g}" if isinstance(value, float) else value, str(target))
 
@@ -368,8 +391,8 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
     """Parameters with which a planner runs through the waypoints of a table.
 
     Args:
-        path: CSV with a line of names, x, y, z and maybe t, and a line a waypoint.
-        component: that is the planner.
+        path: CSV with a line of names, x, y, z and maybe t, and a line for each waypoint.
+        component: the planner.
 
     Raises:
         InputError: there is no such table, or it has a mistake.
@@ -395,7 +418,7 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
 
 
 def impossible_paths(system: System) -> Iterator[str]:
-    """What PathPlanners of a system will refuse of their paths, without a run of them."""
+    """Find paths that PathPlanners of a system will refuse, without running them."""
     for name, component in system.components.items():
         if component.description.modelName != _PATH_PLANNER:
             continue
@@ -431,6 +454,254 @@ def _plain(name: str) -> str:
 
 def _are_of_waypoints(names: Sequence[str]) -> bool:
     return sorted(map(_plain, names)) in (_PLACE, _TIMED)
+
+
+# Events
+
+
+def read_events(
+    where: object,
+    tables: Sequence[Mapping[str, Any]],
+    system: System,
+    followed: Collection[PortName] = (),
+) -> tuple[Event, ...]:
+    """The events of a run.
+
+    Args:
+        where: place of the tables, for messages.
+        tables: checked by :func:`check_events`.
+        system: to act on.
+        followed: its inputs that follow a table.
+
+    Raises:
+        InputError: an event cannot happen to this system.
+
+    """
+    findings, events = Findings(), []
+    for number, table in enumerate(tables, start=1):
+        try:
+            events.append(_event(table, system, followed))
+        except InputError as error:
+            findings.problem(f"{where}: event {number}: {error}")
+    findings.refuse()
+    return tuple(events)
+
+
+def shared_events(
+    tables: Sequence[Mapping[str, Any]], system: System, followed: Collection[PortName] = ()
+) -> tuple[Mapping[str, Any], ...]:
+    """The events that can happen to another system as well; arguments as of :func:`read_events`."""
+
+    def can_happen(table: Mapping[str, Any]) -> bool:
+        try:
+            _event(table, system, followed)
+        except InputError:
+            return False
+        return True
+
+    return tuple(filter(can_happen, tables))
+
+
+def _event(table: Mapping[str, Any], system: System, followed: Collection[PortName]) -> Event:
+    [key] = [key for key in table if key in ACTIONS]
+    start = system.start_time or 0.0
+    if table.get("at", start) < start:
+        raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
+    text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
+    action = ACTIONS[key](table[key], system)
+    for port, _ in action.inputs if isinstance(action, Set) else ():
+        if port in followed:
+            raise InputError(f"{port} follows a table of inputs: override it")
+    return Event(
+        text,
+        action,
+        table.get("label", text),
+        table.get("at"),
+        _condition(table["when"], system) if "when" in table else None,
+        table.get("repeat", False),
+        table.get("for"),
+    )
+
+
+def _things(value: Any) -> Iterator[str]:
+    """Name the targets of an event, with their values."""
+    if isinstance(value, Mapping):
+        yield from (f"{name} = {_shown(each)}" for name, each in flatten(value))
+    else:
+        yield from [value] if isinstance(value, str) else value
+
+
+def _shown(value: Any) -> str:
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f"{value:g}" if is_number else literal(value)
+
+
+def _condition(text: str, system: System) -> Condition:
+    match = _CONDITION.fullmatch(text.strip())
+    if match is None:
+        raise InputError(
+            f'when = {text!r}: write a signal, < or >, and a number: "plant.eta.z > 5"'
+        )
+    name, comparison, number = match.groups()
+    [signal] = _ports(system, name, ("input", "output"), single=True)
+    try:
+        return Condition(signal, comparison, finite(number, f"when = {text!r}:"))
+    except ValueError as error:
+        raise InputError(str(error)) from None
+
+
+# Signals of events
+
+
+def _ports(
+    system: System, text: str, causalities: Sequence[str], single: bool = False
+) -> list[PortName]:
+    """The port of a name, or the ports of a group; a star stands for several components.
+
+    Args:
+        system: with the ports.
+        text: `component.port` or `component.group`.
+        causalities: allowed ones.
+        single: whether the name must be that of one port.
+
+    Raises:
+        InputError: there is none.
+
+    """
+    several = system.meant(PortName.read(text))
+    if len(several) > 1:
+        if single:
+            raise InputError(f"{text} are {len(several)} signals; name one of them")
+        return [port for name in several for port in _ports(system, str(name), causalities)]
+    port = system.named(several[0])
+    if not system.has(port) and not single and (members := system.members(text, causalities)):
+        return members
+    variable = system.component(port.component).variable(port.port)
+    if variable.causality not in causalities:
+        raise InputError(
+            f"{port} has causality {variable.causality}, not {' or '.join(causalities)}"
+        )
+    if variable.family == "String" and "parameter" not in causalities:
+        raise InputError(f"{port} is a String: events act only on numbers and Booleans")
+    return [port]
+
+
+def _routes(system: System, port: PortName) -> list[tuple[PortName, Transformation | None]]:
+    """The inputs that a port feeds, with the transformation on the way; an input feeds itself."""
+    if system.component(port.component).variable(port.port).causality == "input":
+        return [(port, None)]
+    routes = [(c.target, c.transformation) for c in system.connections if c.source == port]
+    if not routes:
+        raise InputError(f"{port} feeds nothing here: an event would change nothing")
+    return routes
+
+
+def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
+    """The inputs that some signals reach."""
+    return tuple(
+        target
+        for name in _things(names)
+        for port in _ports(system, name, ("input", "output"))
+        for target, _ in _routes(system, port)
+    )
+
+
+def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple[PortName, Any]]:
+    """Ports of a group with their values: one for all, or a list with one for each."""
+    return System.paired(name, ports, value if isinstance(value, list) else [value] * len(ports))
+
+
+# Actions of events
+
+
+def _altered(
+    values: Mapping[str, Any],
+    system: System,
+    arriving: Callable[[System, PortName, Any, Transformation | None], Value],
+) -> tuple[tuple[PortName, Value], ...]:
+    """The inputs that some signals reach, with the values that arrive there."""
+    altered = []
+    for name, value in flatten(values):
+        for port, each in _members(name, value, _ports(system, name, ("input", "output"))):
+            for target, change in _routes(system, port):
+                arrived = arriving(system, port, each, change)
+                if isinstance(arrived, float) and not isfinite(arrived):
+                    raise InputError(
+                        f"{port}: {each!r} is {arrived:g} where it arrives, at {target}"
+                    )
+                altered.append((target, arrived))
+    return tuple(altered)
+
+
+def _value(system: System, port: PortName, value: Any, change: Transformation | None) -> Value:
+    """Convert the value of an overridden signal to that of an input."""
+    variable = system.component(port.component).variable(port.port)
+    taken = variable.typed(_text(value), str(port))
+    if change is None:
+        return taken
+    assert not isinstance(taken, str)
+    return change(taken)
+
+
+def _offset(system: System, port: PortName, value: Any, change: Transformation | None) -> float:
+    """Convert the bias of a signal to that of an input."""
+    variable = system.component(port.component).variable(port.port)
+    kind = TYPES[variable.type]
+    if kind.family not in ("Real", "Integer") or kind.is_wide:
+        raise InputError(f"{port} is of type {variable.type}: nothing can be added to it")
+    if not is_finite(value) or (
+        kind.family == "Integer" and (value != int(value) or abs(value) > kind.most - kind.least)
+    ):
+        raise InputError(f"{port}: {value!r} cannot be added to it")
+    if isinstance(change, Mapped):
+        raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
+    return change.factor * float(value) if isinstance(change, Linear) else float(value)
+
+
+def _text(value: Any) -> Any:
+    return literal(value) if isinstance(value, bool) else value
+
+
+def _set(values: Mapping[str, Any], system: System) -> Action:
+    fed = {connection.target: connection.source for connection in system.connections}
+    parameters, inputs = [], []
+    for name, value in flatten(values):
+        for port, each in _members(name, value, _ports(system, name, ("parameter", "input"))):
+            variable = system.component(port.component).variable(port.port)
+            if port in fed:
+                raise InputError(f"{port} is fed by {fed[port]}: override it")
+            if variable.causality == "input":
+                inputs.append((port, variable.typed(_text(each), str(port))))
+            elif variable.variability != "tunable":
+                raise InputError(
+                    f"{port} is a {variable.variability} parameter: it cannot change during a run"
+                )
+            else:
+                parameters.append((port, variable.typed(_text(each), str(port))))
+    return Set(tuple(parameters), tuple(inputs))
+
+
+def _reset(names: Any, system: System) -> Action:
+    for name in _things(names):
+        if system.steps.get(system.component(name).name, system.step) != system.step:
+            raise InputError(f"{name} takes longer steps: it cannot be reset within one")
+    return Reset(tuple(_things(names)))
+
+
+#: Actions of events, by the key of their table.
+ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
+    "set": _set,
+    "override": lambda values, system: Alter("override", _altered(values, system, _value)),
+    "bias": lambda values, system: Alter("bias", _altered(values, system, _offset)),
+    "freeze": lambda names, system: Freeze(_inputs(names, system)),
+    "drop": lambda names, system: Freeze(_inputs(names, system)),
+    "lose": lambda names, system: Alter(
+        "override", _altered(dict.fromkeys(_things(names), 0), system, _value)
+    ),
+    "release": lambda names, system: Release(_inputs(names, system)),
+    "reset": _reset,
+    "stop": lambda _, __: Stop("stop"),
+}
 
 
 def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a scenario file may hold; scenario-files.md and its JSON schema are made from this."""
+"""Entries of a scenario file; scenario-files.md and its JSON schema are made from them."""
 
 from __future__ import annotations
 
@@ -8,13 +8,12 @@ from pydantic import Field, model_validator
 
 from orchestrator.cosim.experiment import COUPLINGS
 from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, needed
-from orchestrator.runs.scenario_events import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
 
 #: More vehicles take longer to put together than anyone waits.
 MOST_VEHICLES = 10_000
 
-#: What an input does between two rows of its table; the first is the default.
+#: Interpolations of an input between two rows of its table; the first is the default.
 INTERPOLATIONS = ("linear", "hold")
 
 #: Actions of an event after which there is nothing left that could end.
@@ -49,6 +48,10 @@ class InputsTable(TomlTable):
         "variability `discrete`.",
         f"`{INTERPOLATIONS[0]}`",
     )
+
+
+#: Entries of an event that are not what it does.
+_TIMES_AND_LABEL = ("at", "when", "repeat", "duration", "label")
 
 
 class EventTable(TomlTable):
@@ -87,10 +90,11 @@ class EventTable(TomlTable):
     def _happens_once_and_does_one_thing(self) -> Self:
         if (self.at is None) == (self.when is None):
             raise ValueError("write when it happens: either at or when")
-        actions = [action for action in ACTIONS if getattr(self, action) is not None]
+        known = [name for name in type(self).model_fields if name not in _TIMES_AND_LABEL]
+        actions = [action for action in known if getattr(self, action) is not None]
         if len(actions) != 1:
-            said = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(ACTIONS)}"
-            raise ValueError(f"write one thing that it does, {said}")
+            hint = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(known)}"
+            raise ValueError(f"write one thing that it does, {hint}")
         if self.duration is not None and actions[0] in AT_ONCE:
             raise ValueError(f"{actions[0]} has no duration: leave `for` out")
         if self.repeat is not None and self.when is None:

@@ -1,4 +1,4 @@
-"""The wiring of the closed loop: which FMUs there are, and which ports feed which."""
+"""The wiring of the closed loop: its FMUs, and the connections of their ports."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WIRING = Path(__file__).with_name("closed_loop.toml")
 
 
 def read_wiring(vehicles: int | None = None) -> dict[str, Any]:
-    """What `closed_loop.toml` holds, for each of several vehicles; None: for a single one."""
+    """The content of `closed_loop.toml`, for each of several vehicles; None: for a single one."""
     wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
     if vehicles is None:
         return wiring
@@ -118,12 +118,12 @@ def check_built(fmu: Path) -> None:
 
 def _left_open(chosen: Mapping[str, str], wiring: Mapping[str, Any]) -> Iterator[str]:
     """The groups of inputs that the closed loop leaves open, of all components of the same FMU."""
-    found = set()
+    groups = set()
     for target, source in wiring["wires"].items():
         if source is False:
             component = component_of(target, wiring["components"])
-            found.add((wiring["components"][component], target.removeprefix(component)))
-    for standard, group in found:
+            groups.add((wiring["components"][component], target.removeprefix(component)))
+    for standard, group in groups:
         yield from (f"{name}{group}" for name, fmu in chosen.items() if fmu == standard)
 
 

@@ -12,7 +12,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.cosim.loop import LOOPS, LoopName
@@ -25,7 +25,7 @@ from orchestrator.machine.progress import progress_bar
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.request import CliOption, Force, KindOption, LoopOption
+from orchestrator.runs.request import FORCE, KIND, LOOP, option
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.blocks import Making, local_threads, local_workers
@@ -65,33 +65,23 @@ class Means:
 
     """
 
-    engine: Annotated[
-        EngineName | None,
-        CliOption(
-            "engine that makes the runs: fmu (the FMUs) or batch (the system as one program); both "
-            "give the same numbers; default: from the study",
-            choices=ENGINES,
-        ),
-    ] = None
-    kind: KindOption = AUTO
-    loop: LoopOption = LOOPS[0]
-    scheduler: Annotated[
-        str | None,
-        CliOption(
-            "address of a Dask scheduler whose workers make the runs, for example "
-            "tcp://10.0.0.1:8786; default: this machine makes them",
-            metavar="ADDRESS",
-        ),
-    ] = None
-    workers: Annotated[
-        int | None,
-        CliOption(
-            "how many runs this machine makes at a time; default: one per core",
-            type=int,
-            metavar="N",
-        ),
-    ] = None
-    force: Force = False
+    engine: EngineName | None = option(
+        None,
+        "engine that makes the runs: fmu (the FMUs) or batch (the system as one program); both "
+        "give the same numbers; default: from the study",
+    )
+    kind: KindName = option(AUTO, KIND)
+    loop: LoopName = option(LOOPS[0], LOOP)
+    scheduler: str | None = option(
+        None,
+        "address of a Dask scheduler whose workers make the runs, for example "
+        "tcp://10.0.0.1:8786; default: this machine makes them",
+        metavar="ADDRESS",
+    )
+    workers: int | None = option(
+        None, "how many runs this machine makes at a time; default: one per core"
+    )
+    force: bool = option(False, FORCE)
 
     def __post_init__(self) -> None:
         if self.workers is not None and self.workers < 1:

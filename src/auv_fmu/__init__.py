@@ -1,4 +1,11 @@
-"""The equations of one paper, one module per thing in it, and what stands beside them.
+"""Simulate an autonomous underwater vehicle: equations of one paper, and runs of them.
+
+    from auv_fmu import simulate
+    result = simulate("fig4", {"plant.noise.std": 0.0})
+    result.plot("plant.eta.*")
+
+`simulate`, `load`, `read`, `sweep` and `Result` are those of :mod:`orchestrator`, imported on first
+use. The rooms below hold the equations, one module per subject.
 
 The paper is "Three-dimensional tracking control of autonomous underwater vehicles with
 limited torque and without velocity sensors". Equation numbers in this package are its own.
@@ -31,11 +38,21 @@ Conventions: SI units; north-east-down earth frame E (reading 16); body frame B 
 starboard, z down; tuples are in the order of the paper's vectors.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING
+
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.linear_algebra import interpolate, solve
 from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 
+if TYPE_CHECKING:
+    from orchestrator import Result, load, read, simulate, sweep
+
 __all__ = ["POSITIVE", "Matrix", "Refusal", "Variable", "Vector", "interpolate", "solve"]
+
+# The copy of this package within an FMU has another name, and nothing but the equations.
+if __name__ == "auv_fmu":
+    __all__ += ["Result", "load", "read", "simulate", "sweep"]
 
 __version__ = "0.1.0"
 
@@ -46,3 +63,15 @@ __citation__ = (
     'Equation numbers are from the paper "Three-dimensional tracking control of autonomous '
     'underwater vehicles with limited torque and without velocity sensors"'
 )
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def __getattr__(name: str) -> object:
+    """Import a name of the product on first use; equations need neither numpy nor a master."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    # For a reader of import statements, such as the build of an FMU, there is nothing to import.
+    return getattr(import_module("orchestrator"), name)

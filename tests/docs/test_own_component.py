@@ -24,7 +24,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.platforms import TARGETS
 from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.record import read_result
+from orchestrator.runs.result import read_result
 from support.markdown import DOCS, blocks
 from support.patches import patch
 from support.replay import compile_replay, replay

@@ -91,7 +91,7 @@ NAMES = [
     "fig3b/result.csv", "fig3b", "fig3b/thesis/a", "study.json", "runs.parquet",
     "unfinished.sqlite", "unfinished.sqlite-wal", "unfinished.sqlite-journal", ".figures-mine/a",
     "report.html", "report.md", "figures", "figures/fig3a/fig3a.png", "runs/0123.npz", "runs",
-    "auv.ssp", "AuvPlant.fmu", "build.json", "SHA256SUMS", "bom.cdx.json", "fig3a.ssp",
+    "auv.ssp", "AuvPlant.fmu", "build.json", "SHA256SUMS", "fig3a.ssp",
     "OspSystemStructure.xml", "own.py", "test_own.py", "Own.fmu", "OwnController.fmu", "own.toml",
     "README.md", ".git/HEAD", "thesis/chapter.tex", "notes.md", "a b", "Größe", "-rf", "a\nb",
 ]  # fmt: skip

@@ -9,7 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator import Result, StudyResult, load, read, simulate, sweep
+from auv_fmu import Result, load, read, simulate, sweep
+from orchestrator import StudyResult
 
 
 def accepted(folder: Path) -> None:

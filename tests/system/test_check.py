@@ -23,8 +23,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
+from orchestrator.runs.run import simulate
 from orchestrator.runs.scenario import names
-from orchestrator.runs.simulate import simulate
 from support.others import build
 from support.own import write
 from support.texts import mentions

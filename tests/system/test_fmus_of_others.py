@@ -22,7 +22,7 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.runs.record import read_result
+from orchestrator.runs.result import read_result
 from orchestrator.runs.scenario import Inputs, read_inputs
 from support.others import WAYS, build, run, system_of
 from support.texts import mentions, tells

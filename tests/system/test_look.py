@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.runs.record import read_result
+from orchestrator.runs.result import read_result
 from support.browser import BROWSER, browser
 from support.machine import contents
 

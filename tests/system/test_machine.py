@@ -24,9 +24,9 @@ from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
 from orchestrator.machine.disk import hold_lock
-from orchestrator.runs import record
+from orchestrator.runs import result
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.record import read_result
+from orchestrator.runs.result import read_result
 from orchestrator.runs.tables import read_rows
 from support.machine import (
     LOOPS,
@@ -379,7 +379,7 @@ def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, 
             return datetime.now(tz) + timedelta(hours=next(jump))
 
     monkeypatch.setattr(time, "time", lambda now=time.time: now() + 3600 * next(jump))
-    monkeypatch.setattr(record, "datetime", Jumping)
+    monkeypatch.setattr(result, "datetime", Jumping)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
     begun = time.monotonic()
     assert main([*RUN, "20"]) == 0

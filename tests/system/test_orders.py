@@ -23,8 +23,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
+from orchestrator.runs.run import simulate as simulated
 from orchestrator.runs.scenario import Scenario
-from orchestrator.runs.simulate import simulate as simulated
 from support.relay import relay, system_of
 from support.runs import whole as run
 from support.texts import mentions

@@ -159,7 +159,7 @@ def machines(library: bytes) -> set[str]:
 @each_version
 def test_release_is_what_its_papers_say(release: dict[str, Path], fmi: str):
     folder = release[fmi]
-    files = {path for path in contents(folder) if path not in ("SHA256SUMS", "bom.cdx.json")}
+    files = {path for path in contents(folder) if path != "SHA256SUMS"}
     assert files == {
         *(f"{name}.fmu" for name in NAMES), "auv.ssp", "README.md",
         *(f"licenses/{name}.txt" for name in ("auv-fmu", "zig", "mingw-w64")),
@@ -172,8 +172,6 @@ def test_release_is_what_its_papers_say(release: dict[str, Path], fmi: str):
     }
     if command := shutil.which("sha256sum"):
         subprocess.run([command, "--check", "--quiet", "SHA256SUMS"], cwd=folder, check=True)
-    bill = json.loads((folder / "bom.cdx.json").read_text())
-    assert {c["name"] for c in bill["components"]} == {"ziglang", *files}
     page = (folder / "README.md").read_text()
     assert all(f"`{name}.fmu`" in page for name in NAMES)
     assert "$" not in page

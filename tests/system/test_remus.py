@@ -12,7 +12,7 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.observers.table import Table
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.record import loops_in
+from orchestrator.runs.result import loops_in
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.cautions import velocities_reaching

@@ -22,7 +22,7 @@ from orchestrator.cosim.plan import make_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.record import read_result
+from orchestrator.runs.result import read_result
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.studies.engine import FmuEngine, Point

@@ -30,7 +30,7 @@ from orchestrator.cosim.system.values import Value
 from orchestrator.figures.drawing import compose
 from orchestrator.figures.plot import plot
 from orchestrator.figures.run_figures import FIGURES
-from orchestrator.runs.record import read_result
+from orchestrator.runs.result import read_result
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.study_result import StudyResult
 from support import linear, relay, typed

@@ -22,7 +22,7 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.scenario_events import read_events
+from orchestrator.runs.scenario import read_events
 from support import others, typed
 from support.others import WAYS
 from support.runs import run_table

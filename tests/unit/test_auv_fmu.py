@@ -1,6 +1,12 @@
-"""Every default of every set of parameters: the values of section 4.1, or our own (reading 7)."""
+"""The face of the product, and every default of every set of parameters.
 
+Defaults are the values of section 4.1, or our own (reading 7).
+"""
+
+import subprocess
+import sys
 from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
 from math import pi, radians
 from pkgutil import walk_packages
 
@@ -8,6 +14,7 @@ import numpy as np
 import pytest
 
 import auv_fmu
+import orchestrator
 from auv_fmu.guidance import formation
 from auv_fmu.paper import control_point, euler, plant
 from auv_fmu.paper.observer import EULER
@@ -235,3 +242,28 @@ def test_sets_within_the_setting_of_the_loop_are_those_with_all_defaults():
 
 def test_constants_are_those_of_section_4_1():
     assert (control_point.ELL, euler.STEP) == (0.35, 0.02)
+
+
+FACE = {"Result", "load", "read", "simulate", "sweep"}
+
+
+def test_the_face_is_the_orchestrators():
+    assert set(dir(auv_fmu)) >= set(auv_fmu.__all__) >= FACE
+    for name in FACE:
+        assert getattr(auv_fmu, name) is getattr(orchestrator, name)
+    assert not hasattr(auv_fmu, "nothing")
+
+
+def test_nothing_of_the_face_is_imported_before_it_is_used():
+    code = "import sys, auv_fmu; assert auv_fmu.__version__; sys.exit(bool({}))"
+    heavy = "{'numpy', 'orchestrator', 'fmus', 'fmpy'} & sys.modules.keys()"
+    subprocess.run([sys.executable, "-c", code.format(heavy)], check=True)
+
+
+def test_a_copy_within_an_fmu_has_no_face():
+    [folder] = auv_fmu.__path__
+    spec = spec_from_file_location("auv_fmu_0123456789ab", f"{folder}/__init__.py")
+    copy = module_from_spec(spec)
+    spec.loader.exec_module(copy)
+    assert FACE.isdisjoint(dir(copy)) and "Vector" in copy.__all__
+    assert not hasattr(copy, "simulate")

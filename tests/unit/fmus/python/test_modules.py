@@ -40,6 +40,8 @@ NEEDED = {
     "if True: import plain": ["plain.py"],
     "def f():\n    from plain import x": ["plain.py"],
     "try:\n    import plain\nexcept ImportError: pass": ["plain.py"],
+    "if TYPE_CHECKING: import package": [],
+    "if typing.TYPE_CHECKING: import package\nelse: import plain": ["plain.py"],
     "import package": ["package/__init__.py", "package/near.py"],
     "from package import near": ["package/__init__.py", "package/near.py"],
     "from package import far": [

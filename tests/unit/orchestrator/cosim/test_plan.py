@@ -292,7 +292,6 @@ def made_in_another_way(run: Prepared, choice: Choice) -> Prepared:
         scenario=replace(run.scenario, name="another", title="Another", digest="1234"),
         isolation=choice.random.choice([None, Isolation(20.0)]),
         stepping=choose_loop(choice.random.choice(["python", "auto"]), run.experiment),
-        real_time=choice.random.choice([None, 1.0]),
     )
 
 

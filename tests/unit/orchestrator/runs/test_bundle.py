@@ -44,13 +44,8 @@ def test_a_file_that_was_changed_since_is_the_users(folder: Path):
     assert "mine" in {path.read_bytes().decode("latin-1") for path in folder.iterdir()}
 
 
-def test_papers_are_about_the_files_beside_them(dist: Path):
+def test_checksums_are_of_the_files_beside_them(dist: Path):
     sums = dict(line.split()[::-1] for line in (dist / "SHA256SUMS").read_text().splitlines())
-    bill = json.loads((dist / "bom.cdx.json").read_text())
-    assert (bill["bomFormat"], bill["specVersion"]) == ("CycloneDX", "1.5")
-    assert {c["name"] for c in bill["components"]} == {"pythonfmu", *sums}
-    files = {c["name"]: c["hashes"][0]["content"] for c in bill["components"] if "hashes" in c}
-    assert sums == files
     assert sums.keys() == {path.name for path in (*dist.glob("*.fmu"), dist / "auv.ssp")}
     for name, digest in sums.items():
         assert hashlib.sha256((dist / name).read_bytes()).hexdigest() == digest

@@ -74,7 +74,6 @@ def test_orders_steps_and_parameters_are_the_user_s(system):
         (Request(steps={"a": 0.15}), "a"),
         (Request(order=("a",)), "b"),
         (Request(loop="fast"), "'fast'"),
-        (Request(real_time=0.0), "0"),
     ],
 )
 def test_what_cannot_be_done_is_refused_by_name(system, request_, word):

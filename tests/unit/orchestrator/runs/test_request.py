@@ -1,71 +1,72 @@
-"""Keywords of Python, fields of requests and options of the command line are the same."""
+"""Options of the command line and keywords of Python are the fields of the same dataclasses."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Mapping
-from dataclasses import MISSING, fields
-from inspect import signature
+from dataclasses import fields
+from inspect import Parameter, signature
 from pathlib import Path
-from types import NoneType
-from typing import Any, Literal, get_args, get_origin, get_type_hints
+from typing import Any, get_type_hints
 
 import pytest
 
 from orchestrator import simulate, sweep
 from orchestrator.commands.many_runs import add_sweep
+from orchestrator.commands.options import from_options
 from orchestrator.commands.run_command import add_run
-from orchestrator.cosim.experiment import ORDERS
-from orchestrator.runs.request import Files, Request, option_fields
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.request import Files, Options, Request
 from orchestrator.studies.sweep import Means
 
-Declared = dict[str, tuple[Any, Any]]
-
-#: What only Python has a keyword for, or only a request.
-OF_SIMULATE = {"system", "progress", "variant", "checkpoint"}
-OF_REQUESTS = {"scenario", "real_time"}
+#: What is only an argument of Python.
+OF_SIMULATE = {
+    "system", "parameters", "progress", "variant", "checkpoint", "checkpoint_every", "resume",
+}  # fmt: skip
 OF_SWEEP = {"study", "out", "progress"}
 
-#: Of the fields of :class:`Files`, what `simulate` takes: a result in memory has no files.
-CHECKPOINTS = {"checkpoint_every", "resume"}
+#: Options of the command line, and the values that they give.
+GIVEN: Mapping[type[Any], Mapping[str, Any]] = {
+    Request: {
+        "--stop-time 2.5": 2.5,
+        "--step 0.01": 0.01,
+        "--order a,b": ("a", "b"),
+        "--coupling linear": "linear",
+        "--kind native": "native",
+        "--events mine.toml": "mine.toml",
+        "--inputs table.csv": Path("table.csv"),
+        "--loop compiled": "compiled",
+        "--isolate": True,
+        "--step-timeout 3": 3.0,
+        "--strict": True,
+    },
+    Files: {
+        "--interval 0.1": 0.1,
+        "--columns a.*,b": "a.*,b",
+        "--format parquet": "parquet",
+        "--no-figures": True,
+        "--real-time 2": 2.0,
+        "--checkpoint-every 4": 4.0,
+        "--resume": True,
+        "--force": True,
+    },
+    Means: {
+        "--engine batch": "batch",
+        "--kind python": "python",
+        "--loop python": "python",
+        "--scheduler tcp://here": "tcp://here",
+        "--workers 3": 3,
+        "--force": True,
+    },
+}
 
 
-def keywords(function: Callable[..., Any]) -> Declared:
+def hints(function: Callable[..., Any]) -> dict[str, Any]:
     """The types and defaults of arguments."""
-    hints = get_type_hints(function)
+    types = get_type_hints(function)
     return {
-        name: (hints[name], one.default) for name, one in signature(function).parameters.items()
+        name: (types[name], one.default) for name, one in signature(function).parameters.items()
     }
-
-
-def fields_of(declared: type[Any]) -> Declared:
-    """The types and defaults of fields; what is empty by default is None in Python."""
-    hints = get_type_hints(declared)
-    return {
-        one.name: (hints[one.name], None if one.default is MISSING else one.default)
-        for one in fields(declared)
-    }
-
-
-def less(declared: Declared, names: set[str]) -> Declared:
-    assert names <= declared.keys()
-    return {name: one for name, one in declared.items() if name not in names}
-
-
-def test_keywords_of_simulate_are_the_fields_of_a_request():
-    taken = less(keywords(simulate), OF_SIMULATE)
-    files = {name: one for name, one in fields_of(Files).items() if name in CHECKPOINTS}
-    wanted = less(fields_of(Request), OF_REQUESTS) | files
-    # In Python a mapping may be missing, and events are no name of a scenario that has them.
-    wanted["parameters"] = (Mapping[str, object] | None, None)
-    wanted["steps"] = (wanted["steps"][0] | None, None)
-    [_, *tables] = get_args(wanted["events"][0])
-    wanted["events"] = (tables[0] | None, None)
-    assert taken == wanted
-
-
-def test_keywords_of_sweep_are_the_means():
-    assert less(keywords(sweep), OF_SWEEP) == fields_of(Means)
 
 
 @pytest.mark.parametrize(
@@ -75,33 +76,59 @@ def test_keywords_of_sweep_are_the_means():
         (add_sweep, [Means], {"study", "out"}),
     ],
 )
-def test_options_are_the_fields(add, declared, others):
-    """By name, default and type; only a run's parameters and steps have no option of their name."""
+def test_every_option_gives_its_value_and_its_default(add, declared, others):
     parser = argparse.ArgumentParser(add_help=False)
     add(parser)
-    options = {one.dest: one for one in parser._actions}
-    named = {}
+    names = {option[2:].split()[0].replace("-", "_") for one in declared for option in GIVEN[one]}
+    assert {action.dest for action in parser._actions} == names | others
     for one in declared:
-        named |= {name: fields_of(one)[name] for name in option_fields(one)}
-    without = {name for one in declared for name in fields_of(one)} - named.keys()
-    assert without == ({"scenario", "parameters", "steps"} if Request in declared else set())
-    assert options.keys() == named.keys() | others
-    for name, (hint, default) in named.items():
-        option = options[name]
-        assert option.option_strings == ["--" + name.replace("_", "-")]
-        assert option.default == default
-        of = [hint] if get_origin(hint) is Literal else get_args(hint) or [hint]
-        kinds = set(of) - {NoneType}
-        words = [word for kind in kinds if get_origin(kind) is Literal for word in get_args(kind)]
-        if option.nargs == 0:
-            assert (kinds, default) == ({bool}, False)
-        elif isinstance(option.type, type):
-            assert option.type in kinds
-        elif option.choices is not None:
-            # What the command line takes is what a type checker takes.
-            assert (kinds, words) == ({Literal[tuple(option.choices)]}, list(option.choices))
-        else:
-            assert str in kinds or words == list(ORDERS)
+        assert from_options(one, parser.parse_args(["fig4"])) == one()
+        for option, value in GIVEN[one].items():
+            name, *_ = words = option.split()
+            found = from_options(one, parser.parse_args(["fig4", *words]))
+            attribute = name[2:].replace("-", "_")
+            assert getattr(found, attribute) == value != getattr(one(), attribute)
+
+
+@pytest.mark.parametrize("wrong", ["--kind nativ", "--loop fast", "--step often", "--format xls"])
+def test_an_option_takes_no_other_value(wrong, capsys):
+    parser = argparse.ArgumentParser()
+    add_run(parser)
+    with pytest.raises(SystemExit):
+        parser.parse_args(["fig4", *wrong.split()])
+    assert wrong.split()[0] in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["interval", "real_time", "checkpoint_every"])
+@pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
+def test_what_is_no_length_of_time_is_refused(name, value):
+    with pytest.raises(InputError, match=f"{value:g}"):
+        Files(**{name: value})
+
+
+def test_simulate_has_the_options_as_keywords_with_their_types():
+    taken = hints(simulate)
+    assert [*taken][:2] == ["system", "parameters"]
+    assert taken.keys() - OF_SIMULATE == {one.name for one in fields(Options)}
+    assert taken["stop_time"] == (float | None, None)
+    assert taken["steps"] == (Mapping[str, float], {})
+    kinds = {one.kind for one in [*signature(simulate).parameters.values()][2:]}
+    assert kinds == {Parameter.KEYWORD_ONLY}
+
+
+def test_wrong_arguments_are_type_errors_of_the_function():
+    with pytest.raises(TypeError, match=r"^simulate\(\) .*'stop_tim'"):
+        simulate("fig4", stop_tim=1.0)
+    with pytest.raises(TypeError, match=r"^simulate\(\) .*'system'"):
+        simulate()
+    with pytest.raises(TypeError, match=r"^simulate\(\) too many"):
+        simulate("fig4", {}, 1.0)
+
+
+def test_keywords_of_sweep_are_the_means():
+    types = get_type_hints(Means)
+    taken = {name: one for name, one in hints(sweep).items() if name not in OF_SWEEP}
+    assert taken == {one.name: (types[one.name], one.default) for one in fields(Means)}
 
 
 def test_every_keyword_arrives(monkeypatch):
@@ -112,19 +139,17 @@ def test_every_keyword_arrives(monkeypatch):
         asked[:] = arguments
         raise StopIteration
 
-    monkeypatch.setattr(
-        "orchestrator.runs.simulate.load_scenario", lambda *_, **options: (None, None)
-    )
-    monkeypatch.setattr("orchestrator.runs.simulate.prepare", note)
+    monkeypatch.setattr("orchestrator.runs.run.load_scenario", lambda *_, **options: (None, None))
+    monkeypatch.setattr("orchestrator.runs.run.prepare", note)
     monkeypatch.setattr("orchestrator.studies.sweep.complete_study", note)
-    names = keywords(simulate).keys() - OF_SIMULATE - CHECKPOINTS
+    names = hints(simulate).keys() - OF_SIMULATE | {"parameters"}
     given = {name: {name: name} for name in names}
     with pytest.raises(StopIteration):
         simulate("fig4", **given)
     assert {name: getattr(asked[-1], name) for name in names} == given
     # Its check wants good values.
     monkeypatch.setattr(Means, "__post_init__", lambda _: None)
-    given = {name: name for name in keywords(sweep).keys() - OF_SWEEP}
+    given = {name: name for name in hints(sweep).keys() - OF_SWEEP}
     with pytest.raises(StopIteration):
         sweep({"scenario": "fig4", "vary": {"step": [0.01, 0.02]}}, out="place", **given)
     assert asked[1:3] == [Means(**given), Path("place")]

@@ -1,12 +1,15 @@
-"""`Result`, as it was made and as it was read, as a picky user tries it."""
+"""`Result`, its record and its files, as they were made and as they are read again."""
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import pickle
 from concurrent.futures import ProcessPoolExecutor
 from copy import deepcopy
+from datetime import datetime
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,9 +19,24 @@ from hypothesis import strategies as st
 import orchestrator
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
 from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import save
+from orchestrator.machine.errors import InputError
 from orchestrator.machine.libraries import find_compiler
+from orchestrator.runs.result import (
+    Stopwatch,
+    content_of,
+    ending_in,
+    header_in,
+    in_json,
+    loops_in,
+    read_record,
+    read_result,
+    write_content,
+)
+from orchestrator.vehicle.signals import STANDARD, Loop
 from support.tiers import slow
 
 
@@ -234,3 +252,116 @@ def test_dataframe_has_the_time_as_its_index(result):
     assert np.array_equal(frame["plant.y.x"], result["plant.y.x"])
     frame.iloc[:] = 0.0
     assert result["plant.eta.x"][0] == 2.0
+
+
+# The record
+
+
+NUMBERS = st.floats(allow_nan=False)
+WORDS = st.text(max_size=20)
+NAMES = st.text("abc_", min_size=1, max_size=5)
+TIMES = st.floats(0.0, 1e6)
+
+EXPERIMENTS = st.builds(
+    Experiment,
+    st.floats(1.0, 100.0),
+    st.floats(0.01, 1.0),
+    st.sampled_from(["jacobi", ("b", "a")]),
+    st.floats(0.0, 0.5),
+    st.sampled_from([None, "delay"]),
+)
+HEADERS = st.builds(
+    Header,
+    st.just(("a.x", "b.y")),
+    EXPERIMENTS,
+    st.dictionaries(
+        st.builds(PortName, NAMES, WORDS.filter(bool)),
+        NUMBERS | st.booleans() | WORDS | st.just("-inf"),
+    ),
+    st.sampled_from(["python", "compiled"]),
+    units=st.dictionaries(st.just("a.x"), NAMES),
+)
+ENDINGS = st.builds(
+    Ending,
+    st.none() | WORDS,
+    st.none() | WORDS,
+    st.lists(WORDS).map(tuple),
+    events=st.lists(st.builds(Occurrence, TIMES, WORDS, WORDS, st.integers(0, 9))).map(tuple),
+)
+LOOPS = st.lists(st.builds(Loop, NAMES, NAMES, NAMES, NAMES), min_size=1, max_size=3).map(tuple)
+
+
+@given(HEADERS, ENDINGS, LOOPS)
+def test_all_that_is_written_of_a_table_is_read_again(header, ending, loops):
+    content = json.loads(in_json(content_of(header, ending, loops)), parse_constant=pytest.fail)
+    found = header_in(content, header.columns)
+    assert found == header
+    # Equality does not look at these, nor tell 1, 1.0 and True apart.
+    assert (found.loop, found.units) == (header.loop, header.units)
+    assert repr(found.parameters) == repr(dict(header.parameters))
+    assert ending_in(content) == ending
+    assert loops_in(content) == loops
+
+
+def test_a_record_of_a_run_without_vehicles_is_of_the_standard_loop():
+    assert loops_in({}) == loops_in({"vehicles": []}) == (STANDARD,)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A result of two rows, and below it another file."""
+    (tmp_path / "result.csv").write_text("time,a.x\n0,1\n0.25,2\n")
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "metrics.json").write_text("{}")
+    parameters = {PortName("a", "k"): 3.0}
+    header = Header(("a.x",), Experiment(1.0, 0.5), parameters, units={"a.x": "m"})
+    write_content(tmp_path, content_of(header, Ending("stopped"), [STANDARD]), ["numpy"])
+    return tmp_path
+
+
+def test_a_record_names_files_and_versions(folder):
+    content = read_record(folder / "result.csv")
+    assert content["files"] == ["below/metrics.json", "result.csv", "run.json"]
+    assert content["versions"].keys() == {"python", "numpy"}
+    assert content["versions"]["numpy"] == np.__version__
+
+
+def test_a_table_is_read_with_its_record_or_without(folder):
+    drawn = read_result(folder)
+    assert np.array_equal(drawn.result.rows, [[0.0, 1.0], [0.25, 2.0]])
+    assert (drawn.result.header.experiment.step, drawn.result.failure) == (0.5, "stopped")
+    assert drawn.result.header.parameters == {PortName("a", "k"): 3.0}
+    (folder / "run.json").unlink()
+    drawn = read_result(folder / "result.csv")
+    assert (drawn.result.header.experiment.step, drawn.result.header.parameters) == (0.25, {})
+    assert (drawn.label, drawn.z_up) == ("result", False)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"files": None}, {"experiment": None}, {"experiment": {"step": 0.5}}, {"events": [{}]},
+        {"types": {"a.x": "Real"}}, {"types": ["a.x"]}, {"parameters": {"a.k": [1]}},
+        {"parameters": {"a": 1.0}}, {"vehicles": [{"ship": "a"}]}, {"texts": 3},
+        {"experiment": {"step": -0.5, "stop_time": 1.0}},
+    ],
+)  # fmt: skip
+def test_a_record_that_no_run_has_written_is_refused_by_name(folder, change):
+    file = folder / "run.json"
+    file.write_text(json.dumps({**json.loads(file.read_text()), **change}))
+    with pytest.raises(InputError, match=r"run\.json"):
+        read_record(folder / "result.csv")
+
+
+@pytest.mark.parametrize("text", ["time,a.x\n", "time,a.x\n0,1\n0,2\n", "time,a.x\n1,1\n0,2\n"])
+def test_rows_without_a_step_are_refused(tmp_path, text):
+    (tmp_path / "t.csv").write_text(text)
+    with pytest.raises(InputError, match=r"t\.csv"):
+        read_result(tmp_path / "t.csv")
+
+
+def test_a_run_lasts_as_long_as_it_does_whatever_the_clock_says(monkeypatch):
+    monkeypatch.setattr("orchestrator.runs.result.monotonic", iter([5.0, 7.25]).__next__)
+    times = Stopwatch().times()
+    assert times["seconds"] == 2.25
+    assert datetime.fromisoformat(str(times["started"])).utcoffset() is not None
