@@ -10,8 +10,8 @@ against it. Pages are written by hand except what stands between `<!-- filled: N
 `network_numbers.py` those of docs/tutorials/your-own-component.md on neural networks,
 `noise_numbers.py` those of README and docs/explanation/reproduction.md that depend on noise, and
 `remus_numbers.py` those of docs/explanation/remus.md. `pictures.py` draws the figures of studies
-and scenarios, `benchmarks_page.py` fills in docs/reference/benchmarks.md, and `reference.py` writes
-`reference`.
+and scenarios, `benchmarks_page.py` measures again what docs/reference/benchmarks.md quotes, and
+`reference.py` writes `reference`.
 """
 
 from __future__ import annotations
