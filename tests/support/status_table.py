@@ -23,6 +23,12 @@ CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 #: The header of a column about all states, and what stands for a name with fmi3 in it.
 EVERY_STATE, SAME_NAME = "every state", "the same"
 
+#: Names of several functions.
+_TYPES = ("Real", "Integer", "Boolean", "String")
+_FUNCTIONS = {
+    f"every {do}": [f"fmi2{do.title()}{type_}" for type_ in _TYPES] for do in ("set", "get")
+}
+
 _NOT_POSSIBLE = "\u2013"
 
 _UNSOUND = ("NULL", "n = ", "not UTF-8", "freed", "pointer", "too few", "too many")
@@ -96,7 +102,7 @@ def _states(header: str) -> Sequence[str]:
 
 def _keys(functions: str, cases: str) -> Iterator[tuple[str, str]]:
     """Each function and each case of a line."""
-    return product(functions.split(", "), cases.split("; "))
+    return product(_FUNCTIONS.get(functions) or functions.split(", "), cases.split("; "))
 
 
 @cache
@@ -148,12 +154,6 @@ def without_an_instance() -> dict[str, str]:
     """The status of any call, by what stands in the place of an instance."""
     rows = _sections()["No instance"].rows
     return {what: answer for places, answer in rows for what in places.split("; ")}
-
-
-def without_the_loader() -> dict[tuple[str, str], str]:
-    """What becomes of calls on FMUs without the native loader, by function and case."""
-    rows = _sections()["Without the native loader"].rows
-    return {key: answer for functions, cases, answer in rows for key in _keys(functions, cases)}
 
 
 def _tables_of_fmi3() -> list[Section]:
