@@ -72,9 +72,6 @@ _LINES = {
         median saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
         max saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical
-        share saturated by noise_std | proposed and h_max == 0.002 and speed < 1
-        share saturated by noise_std | proposed and h_max == 0.002 and 6 < speed < 12
-        share saturated by noise_std | proposed and h_max == 0.002 and speed > 12
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical and 25 < way < 35
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical and way > 70
         median time_to_reach by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
@@ -103,7 +100,6 @@ _LINES = {
         median peak_command_u by step noise_std | PD and 30 / 1.1 < way < 30 * 1.1
         median peak_command_u by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
         median peak_command_u by step noise_std | PD and 1e3 / 1.1 < way < 1e3 * 1.1
-        median saturated_fraction_u by step noise_std | PD and 50 / 1.1 < way < 50 * 1.1
         min saturated_fraction_u by step noise_std | PD and way > 300
         median time_to_reach by scenario step noise_std | 100 / 1.1 < way < 100 * 1.1
         min effort_ratio by step noise_std | PD and way > 100
@@ -143,9 +139,6 @@ _LINES = {
         median late_error by tenth_K2_1 | proposed
         median late_error by tenth_K2_2 | proposed
         median late_error by tenth_K2_3 | proposed
-        min late_error by scenario | peak <= 10
-        min late_error by scenario | peak <= 20
-        min late_error by scenario | peak <= 80
     """,
     "noise": """
         median gain | proposed and noise_std < 0.003

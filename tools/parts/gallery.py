@@ -68,7 +68,7 @@ def seen(study: Study, figure: str) -> str:
         "influence": f"how much {words(x)} move {words(show)}",
     }[declared.kind]
     only = "".join(f", {words(key)} {value}" for key, value in flatten(declared.where or {}))
-    return f"{text}{only}"
+    return f"{study.title}: {text}{only}"
 
 
 def _scenario(scenario: Scenario) -> str:
@@ -94,7 +94,7 @@ def _study(study: Study) -> str:
     preset = "" if any("*" in one for one in stated) else "&".join(stated)
     return _entry(
         study.title,
-        (f"{study.title}: {seen(study, first)}", f"{PICTURES}/{picture(study, first)}"),
+        (seen(study, first), f"{PICTURES}/{picture(study, first)}"),
         _sentence(study.remark),
         f"sweep {study.name}",
         preset,
