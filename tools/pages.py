@@ -105,14 +105,14 @@ def filled_in(page: Path, values: Mapping[str, str]) -> str:
 def scenarios() -> dict[str, str]:
     """Tables of docs/reference/scenario-files.md."""
     wiring = read_wiring()
-    drawn: dict[str, list[str]] = {kind: [] for kind in FIGURES}
-    for name in names():
-        drawn[read_scenario(name).figure].append(f"`{name}`")
+    drawn = {read_scenario(name).figure: name for name in sorted(names(), reverse=True)}
+    figures = (
+        f"`{kind}`" + (f" (as `{drawn[kind]}`)" if kind in drawn else "") for kind in FIGURES
+    )
     fmus = (
         (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
     )
     wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
-    figures = ((f"`{key}`", ", ".join(used)) for key, used in drawn.items())
     return {
         "entries": _entries(ScenarioFile),
         "path": _entries(PathTable),
@@ -120,7 +120,7 @@ def scenarios() -> dict[str, str]:
         "inputs": _entries(InputsTable),
         "components": _table("component", "FMU", rows=fmus),
         "wires": _table("inputs", "are fed by", rows=wires),
-        "figures": _table("`figure`", "as drawn for", rows=figures),
+        "figures": ", ".join(figures),
     }
 
 
