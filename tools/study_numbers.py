@@ -70,18 +70,13 @@ _LINES = {
         min turn by noise_std | failed
         share saturated by scenario noise_std | h_max == 0.002 and physical
         median saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
-        max saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical
-        median peak_command_u by scenario noise_std | h_max == 0.002 and physical and 25 < way < 35
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical and way > 70
         median time_to_reach by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
         median late_error by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
     """,
     "distance": """
         n by scenario step noise_std
-        median peak_command_u by step noise_std | proposed
-        median peak_command_q by step noise_std | proposed
-        median peak_command_r by step noise_std | proposed
         max peak_command_u by step noise_std | proposed
         max peak_command_q by step noise_std | proposed
         max peak_command_r by step noise_std | proposed
@@ -92,10 +87,6 @@ _LINES = {
         median peak_command_u by step noise_std | proposed and 30 / 1.1 < way < 30 * 1.1
         median peak_command_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
         median peak_command_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
-        median peak_command_u by step noise_std | proposed and way > 9e3
-        median saturated_fraction_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
-        median saturated_fraction_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
-        median saturated_fraction_u by step noise_std | proposed and way > 9e3
         min peak_command_u by step noise_std | PD
         median peak_command_u by step noise_std | PD and 30 / 1.1 < way < 30 * 1.1
         median peak_command_u by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
@@ -118,7 +109,6 @@ _LINES = {
         rank smallest_distance latency
         rank smallest_distance loss
         rank smallest_distance A_d
-        rank auv1_late_error loss
     """,
     "gains": """
         n by scenario
@@ -176,17 +166,11 @@ _LINES = {
         median peak_command_u by observer | proposed and product < 1.9
         min product | proposed and observer == "euler" and peak_command_u > 45
         max product | proposed and observer == "euler" and peak_command_u < 45
-        median estimate_error | proposed and observer == "euler" and product > 2
-        median late_error | proposed and observer == "euler" and product > 2
-        median peak_command_u | proposed and observer == "euler" and product > 2
         median estimate_error | proposed and observer == "exact" and product > 10
         median l2_effort_q by scenario | observer == "exact" and step < 0.0022
         median l2_effort_q by scenario | observer == "exact" and 0.019 < step < 0.021
         median l2_effort_q by scenario | observer == "exact" and step > 0.09
-        median l2_effort_u | PD and step < 0.03
-        median l2_effort_u | PD and step > 0.045
         min step | PD and total_variation_u > 1e5
-        max step | PD and total_variation_u < 1e5
     """,
 }
 
