@@ -30,14 +30,14 @@ from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
 from fmus.python.component import Component
 from fmus.python.state import STEPPING
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.instance import Instance
-from orchestrator.master.fmi.slaves import FMU2OfOthers
-from orchestrator.master.loop import Stepping, choose_loop
-from orchestrator.master.schedule import Member
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.fmi.instance import Instance
+from orchestrator.cosim.fmi.slaves import FMU2OfOthers
+from orchestrator.cosim.loop import Stepping, choose_loop
+from orchestrator.cosim.schedule import Member
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
-from orchestrator.system.structure import System
 
 #: So many times the steps, so that what they cost is not lost in the set-up that is subtracted.
 _TIMES = 30
@@ -83,7 +83,7 @@ def master_alone(system: System, steps: int) -> float:
             [nothing] * len(set_inputs), do_step and nothing, [nothing] * len(get_outputs), instance
         )
 
-    with patch("orchestrator.master.schedule.Member", idle):
+    with patch("orchestrator.cosim.schedule.Member", idle):
         return steps_time(system, steps)
 
 

@@ -31,8 +31,8 @@ from fmpy.simulation import instantiate_fmu
 from measuring import options, python
 from pythonfmu import FmuBuilder
 
-from fmus.compilers import machines_compiler
 from fmus.discovery import name_of
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.own_components import build_own
 
 EXAMPLES = Path(__file__).parents[1] / "examples"

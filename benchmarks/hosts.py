@@ -25,19 +25,19 @@ import fmpy
 import measuring
 
 from fmus.kinds import NATIVE
-from orchestrator.formats.osp import write_osp
-from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.cosim.formats.osp import write_osp
+from orchestrator.cosim.formats.ssp.reader import read_ssp
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
-from orchestrator.master.loop import choose_loop
-from orchestrator.master.observers.table import Table
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.bundle import build_bundle
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.component import read_component
-from orchestrator.system.structure import System
 
 #: Rounds, steps of a run, and the longest that the steps of one run shall take [s].
 ROUNDS, STEPS, LONGEST = 9, 10_000, 0.3

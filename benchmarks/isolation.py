@@ -14,14 +14,14 @@ from measuring import options, python, steps_time, timed
 
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
-from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI, Experiment
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
+from orchestrator.cosim.experiment import GAUSS_SEIDEL, JACOBI, Experiment
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.structure import System
 
 
 def start_time(system: System, order: str) -> float:

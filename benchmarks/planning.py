@@ -26,18 +26,18 @@ from zipfile import ZipFile
 
 import measuring
 
-from orchestrator.formats.osp import write_osp
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.formats.osp import write_osp
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 
 STEP, STEPS = 0.01, 10
 

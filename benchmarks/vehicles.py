@@ -25,9 +25,9 @@ import numpy as np
 
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
+from orchestrator.cosim.loop import LoopName
+from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.exchange.hosts.comparison import compare
-from orchestrator.master.loop import LoopName
-from orchestrator.master.observers.observer import Ending, Header
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request

@@ -4,10 +4,9 @@
 module                 what it states
 ====================== ======================================================================
 :mod:`.ports`          what a port is, the groups that ports come in, a component's hooks
-:mod:`.kinds`          kinds of FMU, versions of FMI, platforms that there can be libraries for
+:mod:`.kinds`          kinds of FMU, versions of FMI
 :mod:`.discovery`      which components there are, what FMUs are made from, their archives
 :mod:`.documentation`  the page of each component
-:mod:`.compilers`      what makes libraries
 :mod:`.python`         the Python kind of FMU, on PythonFMU
 :mod:`.native`         the C kind of FMU, translated from the same text
 :mod:`.build`          the command that brings a folder of FMUs up to date

@@ -14,7 +14,6 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from fmus.compilers import compiler_for
 from fmus.discovery import (
     ORIGIN,
     Origin,
@@ -24,7 +23,7 @@ from fmus.discovery import (
     fingerprint,
     source_of,
 )
-from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON, platforms
+from fmus.kinds import FMI_VERSIONS, KINDS, PYTHON
 from fmus.native.packaging import NativeKind
 from fmus.python.modules import modules_of
 from fmus.python.packaging import LOADERS, PythonKind, best_loader, build_script
@@ -36,6 +35,8 @@ from fmus.script import (
     source_of_script,
     told,
 )
+from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.platforms import platforms
 
 #: Exit status if the user's script cannot be built; 2 is for what else is wrong.
 FAILED = 1

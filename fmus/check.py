@@ -17,7 +17,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FunctionType
 
-from fmus.compilers import Compiler, check_sources
 from fmus.discovery import Source, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from fmus.language.build import Program, Untranslatable, position
@@ -27,6 +26,7 @@ from fmus.ports import reducer
 from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
 from fmus.script import is_component, no_component, script_in, source_of_script, told
+from orchestrator.machine.compilers import Compiler, check_sources
 
 
 def mistakes(path: Path, folder: Path, is_index: bool = False) -> list[str]:

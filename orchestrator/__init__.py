@@ -7,10 +7,8 @@
 ==================  ==========================================================
 room                what it is for
 ==================  ==========================================================
-:mod:`.machine`     the operating system: errors, files, processes
-:mod:`.system`      what is simulated
-:mod:`.formats`     how it is written down: SSP, OSP, tables, TOML
-:mod:`.master`      how it is stepped
+:mod:`.machine`     the operating system: errors, files, processes, compilers
+:mod:`.cosim`       a co-simulation master for any system of FMUs
 :mod:`.vehicle`     this vehicle's signals, indices and certificates
 :mod:`.figures`     figures of runs and of studies
 :mod:`.runs`        scenarios, wiring, bundle, one run and its files

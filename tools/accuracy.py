@@ -22,15 +22,14 @@ from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import ControllerState
 from fmus.ports.port import H_MAX
 from orchestrator import load, simulate
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
 from orchestrator.program.components import definitions_of
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import typed
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD, true_control_point
 
 Values = Mapping[str, Any]
@@ -257,7 +256,7 @@ def _values(system: System, component: str) -> Mapping[str, Any]:
     found: dict[str, Any] = {}
     for variable in system.components[component].having("parameter"):
         name = PortName(component, variable.name)
-        found[variable.name] = typed(str(name), variable, system.value(name))
+        found[variable.name] = variable.typed(system.value(name), str(name))
     return found
 
 

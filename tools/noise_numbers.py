@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator import load, simulate
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
 from orchestrator.paper.measures import errors, total_variation_until
 from orchestrator.paper.page import numbers, table
 from orchestrator.runs.scenario import read_scenario

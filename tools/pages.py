@@ -39,7 +39,7 @@ from fmus.documentation import component_page
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
-from orchestrator.formats.schema import TomlTable, entries
+from orchestrator.machine.schema import TomlTable, entries
 from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile

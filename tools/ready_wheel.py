@@ -18,12 +18,13 @@ from tempfile import TemporaryDirectory
 
 from hatchling.builders.wheel import WheelBuilder
 
-from fmus.compilers import COMPILERS, compiler_for, library
-from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON, TARGETS, platforms
+from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
+from orchestrator.cosim import stepper
 from orchestrator.live import assembly, module
 from orchestrator.live.presets import bundled
+from orchestrator.machine.compilers import COMPILERS, compiler_for, library
 from orchestrator.machine.errors import InputError
-from orchestrator.master import stepper
+from orchestrator.machine.platforms import TARGETS, platforms
 from orchestrator.runs import bundle
 
 ROOT = Path(__file__).parents[1]

@@ -30,17 +30,17 @@ from fmpy.util import write_csv
 from fmus.discovery import REFERENCE, RELATED_MANIFEST, components
 from fmus.kinds import PYTHON
 from fmus.ports.port import FAULT
-from orchestrator.formats.ssp.writer import parameter_set_xml
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.files import CsvFile
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_to_end
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.formats.ssp.writer import parameter_set_xml
+from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_to_end
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.values import Value
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.own_components import build_own
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.values import Value
 
 #: The components that are examples.
 EXAMPLES = Path(__file__).parents[1] / "examples"

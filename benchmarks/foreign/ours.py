@@ -13,15 +13,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from orchestrator import Result, load, simulate
+from orchestrator.cosim.experiment import DELAY, JACOBI
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import DELAY, JACOBI
 from orchestrator.runs.preparation import DEFAULT_STEP
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, type_of
 
 #: Name of the component that an FMU is alone.
 ALONE = "fmu"
@@ -49,12 +49,12 @@ def changed(component: Component) -> dict[str, float]:
     values = {
         variable.name: _other(variable, component.start(variable.name))
         for variable in component.having("parameter")
-        if type_of(variable) == "Real"
+        if variable.family == "Real"
     }
     return {name: value for name, value in values.items() if value is not None}
 
 
-def _other(variable: ModelVariable, start: Value | None) -> float | None:
+def _other(variable: Variable, start: Value | None) -> float | None:
     if not isinstance(start, float):
         return None
     by = _CHANGE * abs(start) or _CHANGE
@@ -82,10 +82,10 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             coupling=DELAY if options.order == JACOBI else None,
         )
     outputs = [
-        (name, variable.name, variable.valueReference)
+        (name, variable.name, variable.reference)
         for name, component in system.components.items()
         for variable in component.having("output")
-        if type_of(variable) == "Real"
+        if variable.family == "Real"
     ]
     _keep(result, [f"{name}.{port}" for name, port, _ in outputs], options.out)
     return {

@@ -77,8 +77,5 @@ FUNCTIONS: Mapping[str, Function] = {
 #: Its constants.
 CONSTANTS = frozenset(("e", "inf", "nan", "pi", "tau"))
 
-#: Those that a compiler must not compute, nor put something else in their place.
-ROUNDED = tuple(name for name, one in FUNCTIONS.items() if one.is_rounded and not one.factor)
-
 #: The functions, by themselves.
 BY_FUNCTION = {getattr(math, name): name for name in FUNCTIONS}

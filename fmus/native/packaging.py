@@ -10,15 +10,16 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fmus import documentation
-from fmus.compilers import Compiler, library
 from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
-from fmus.kinds import FMI_VERSIONS, NATIVE, Platform
+from fmus.kinds import FMI_VERSIONS, NATIVE
 from fmus.native.emit import quoted
 from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
 from fmus.ports import description, description_fmi3
 from fmus.ports.definition import Definition, Model
+from orchestrator.machine.compilers import Compiler, library
+from orchestrator.machine.platforms import Platform
 
 _FOLDER = Path(__file__).parent
 

@@ -15,7 +15,6 @@ import pythonfmu
 from pythonfmu.builder import get_model_class
 
 from fmus import documentation
-from fmus.compilers import machines_compiler, run_compiler
 from fmus.discovery import (
     Source,
     digest_of,
@@ -27,6 +26,7 @@ from fmus.discovery import (
 from fmus.kinds import PYTHON
 from fmus.python.modules import modules_of, with_other_imports
 from fmus.script import data_files, import_from, no_component
+from orchestrator.machine.compilers import machines_compiler, run_compiler
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 

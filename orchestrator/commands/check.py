@@ -12,19 +12,17 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
-from orchestrator.formats.osp import OSP_STRUCTURE
+from orchestrator.cosim.fmi.binary import binary_of, check_binary
+from orchestrator.cosim.formats.osp import OSP_STRUCTURE
+from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
-from orchestrator.master.fmi.binary import binary_of, check_binary
 from orchestrator.runs.loading import load_scenario, outdated
 from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.graph import rings
-from orchestrator.system.variables import array_of
 
 #: What surprises the user of an FMU, by a flag of its description and the value that means it.
 _SURPRISES = {
@@ -155,7 +153,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         to_know += [
             f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved if the FMUs "
             "compute their outputs between steps, else delayed by a step"
-            for ring in rings(prepared.system)
+            for ring in prepared.system.rings()
         ]
         to_know += prepared.doubts()
     return to_know
@@ -184,8 +182,8 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
                 findings.note(f"start value of {error}")
         seen: dict[tuple[str, int], str] = {}
         for variable in (*component.having("input"), *component.having("parameter")):
-            name = array_of(variable)
-            other = seen.setdefault((variable.type, variable.valueReference), name)
+            name = variable.array
+            other = seen.setdefault((variable.type, variable.reference), name)
             if other != name:
                 findings.note(f"{other} and {name} share a value reference: setting one sets both")
         return component
@@ -194,7 +192,7 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 
 def surprises(component: Component) -> Iterator[str]:
     """What an FMU cannot do, or does differently from most."""
-    if component.left_alone:
+    if component.unsupported:
         yield component.remainder
     if any(variable.type == "Clock" for variable in component.description.modelVariables):
         yield "has Clocks: if it cannot do without them, it ends a run before the first step"

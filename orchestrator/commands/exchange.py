@@ -21,15 +21,15 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
+from orchestrator.cosim.experiment import INITIAL, ORDERS, read_order
+from orchestrator.cosim.formats.osp import write_osp
+from orchestrator.cosim.formats.ssp.writer import write_ssp
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
-from orchestrator.formats.osp import write_osp
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import INITIAL, ORDERS, read_order
+from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.components import definitions_of
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
@@ -39,7 +39,6 @@ from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prep
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.scenario_events import read_events
-from orchestrator.system.names import listed
 
 #: What a scenario can be exported as.
 EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"

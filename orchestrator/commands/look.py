@@ -17,6 +17,7 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import OK, describe, say, show
+from orchestrator.cosim.observers.observer import Observer, Progress
 from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
@@ -24,7 +25,6 @@ from orchestrator.figures.style import Drawn
 from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.observer import Observer, Progress
 from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.record import changed_files, read_record, read_result, table_in

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 
 from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import FAILED, OK, say
+from orchestrator.cosim.observers.observer import Ending
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.observers.observer import Ending
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.request import Request, flag, option_fields
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.structure import System
 
 T = TypeVar("T")
 

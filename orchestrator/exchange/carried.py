@@ -17,23 +17,23 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from fmus.discovery import RELATED, RELATED_MANIFEST
+from orchestrator.cosim.experiment import GAUSS_SEIDEL, Experiment
+from orchestrator.cosim.formats.ssp.archive import read_document
+from orchestrator.cosim.formats.ssp.reader import bind_parameter_set
+from orchestrator.cosim.hooks.hook import Hook
+from orchestrator.cosim.hooks.timing import Playback
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_to_end
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.series import Series, comparison, read_series
 from orchestrator.exchange.verify import TOLERANCE, check_tolerance, enumerated
-from orchestrator.formats.ssp.archive import read_document
-from orchestrator.formats.ssp.reader import bind_parameter_set
-from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.errors import Findings, InputError, listed
+from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors
-from orchestrator.master.experiment import GAUSS_SEIDEL, Experiment
-from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.hooks.timing import Playback
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_to_end
 from orchestrator.runs.loading import first_given, read_fmu
 from orchestrator.runs.scenario import with_input_table
-from orchestrator.system.names import PortName, listed
-from orchestrator.system.structure import System
-from orchestrator.system.values import finite
 
 #: The name of the standard, in a manifest.
 _STANDARD = "org.fmi-standard.fmi-ls-ref"

@@ -12,8 +12,9 @@ from tempfile import TemporaryDirectory
 
 from auv_fmu import __version__
 from fmus.discovery import REFERENCE, components, licences, package_folder, source_of, write_archive
-from fmus.kinds import FMI_VERSIONS, NATIVE, platforms
+from fmus.kinds import FMI_VERSIONS, NATIVE
 from orchestrator.machine.disk import process_folder
+from orchestrator.machine.platforms import platforms
 from orchestrator.runs.bundle import ARCHIVE, ZIG, build_bundle, settings_of, write_papers
 from orchestrator.runs.folder import replace_files
 

@@ -7,15 +7,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
-from orchestrator.formats.tables import places_of_time, port_of, records, time_of
+from orchestrator.cosim.experiment import ROUNDING
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.system.values import Value
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ROUNDING
-from orchestrator.master.observers.table import Table
-from orchestrator.system.component import Component
-from orchestrator.system.values import Value, cell, type_of
-from orchestrator.system.variables import array_of
+from orchestrator.runs.tables import places_of_time, port_of, records, time_of
 
 
 class Series(NamedTuple):
@@ -33,18 +32,18 @@ class Series(NamedTuple):
     others: Sequence[str]
 
 
-def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
+def read_series(path: Path, variables: Sequence[Variable]) -> Series:
     """Read a table of variables over time; a column of an array holds all of it in each row.
 
     Raises:
         InputError: it has a mistake.
 
     """
-    known: dict[str, list[ModelVariable]] = {}
+    known: dict[str, list[Variable]] = {}
     for variable in variables:
         known.setdefault(variable.name, []).append(variable)
-        if variable.shape and type_of(variable) != "String":
-            known.setdefault(array_of(variable), []).append(variable)
+        if variable.shape and variable.family != "String":
+            known.setdefault(variable.array, []).append(variable)
     with records(path, "not a table of values over time", places_of_time) as (names, rows):
         clocks = places_of_time(names)
         if not clocks:
@@ -73,7 +72,7 @@ def read_series(path: Path, variables: Sequence[ModelVariable]) -> Series:
                     )
                 for variable, text in zip(group, cells, strict=True):
                     where = f"line {line}, {variable.name}:"
-                    columns[variable.name].append(cell(variable, text, where))
+                    columns[variable.name].append(variable.cell(text, where))
     others = [text for place, text in enumerate(names) if place not in (*clocks, *ports)]
     arrays = {name: np.array(values) for name, values in columns.items()}
     return Series(np.array(times), arrays, others)
@@ -112,7 +111,7 @@ def comparison(
     worst, first = 0.0, None
     for name, column in expected.columns.items():
         wanted, found = column[chosen], table[f"{component.name}.{name}"]
-        if type_of(component.variables[name]) == "Real":
+        if component.variables[name].family == "Real":
             found = np.interp(exact, ours, found)
             deviations = np.abs(found - wanted) / max(1.0, float(np.abs(wanted).max()))
             wrong, worst = deviations > tolerance, max(worst, float(deviations.max()))

@@ -12,16 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.formats.tables import (
-    SEPARATORS,
-    Record,
-    places_of_time,
-    port_of,
-    records,
-    time_of,
-)
-from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import (
+from orchestrator.cosim.experiment import (
     DELAY,
     FEEDTHROUGH,
     FULL,
@@ -34,16 +25,17 @@ from orchestrator.master.experiment import (
     Order,
     format_order,
 )
-from orchestrator.master.hooks.events import Event, Events
-from orchestrator.master.hooks.hook import Hook, Run
-from orchestrator.master.observers.observer import Ending, Header, Observer
-from orchestrator.master.plan import check_order, make_plan
-from orchestrator.master.simulation import simulate_to_end
+from orchestrator.cosim.hooks.events import Event, Events
+from orchestrator.cosim.hooks.hook import Hook, Run
+from orchestrator.cosim.observers.observer import Ending, Header, Observer
+from orchestrator.cosim.plan import check_order, make_plan
+from orchestrator.cosim.simulation import simulate_to_end
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.machine.errors import InputError
+from orchestrator.machine.texts import BOOLEANS, finite
 from orchestrator.runs.preparation import DEFAULT_STEP
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.values import BOOLEANS, finite, type_of
+from orchestrator.runs.tables import SEPARATORS, Record, places_of_time, port_of, records, time_of
 
 #: How far values may differ where nothing else is said.
 TOLERANCE = 1e-6
@@ -167,10 +159,10 @@ def verify(
     check_tolerance(tolerance)
     algorithms = list(ways(system, order, initial))
     outputs = {
-        str(PortName(component.name, variable.name)): type_of(variable)
+        str(PortName(component.name, variable.name)): variable.family
         for component in system.components.values()
         for variable in component.having("output")
-        if type_of(variable) != "String"
+        if variable.family != "String"
     }
     if not outputs:
         raise InputError(f"{system.name}: has no numeric output to compare")
@@ -254,7 +246,7 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
         if names != tuple(order):
             return
     # Other tools solve rings, or delay them.
-    for coupling in (None, DELAY) if rings(system) else (None,):
+    for coupling in (None, DELAY) if system.rings() else (None,):
         delayed = ", rings delayed" * (coupling == DELAY)
         for one in ORDERS if order is None else (order,):
             named = format_order(one)

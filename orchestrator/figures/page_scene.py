@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.paper.attitude import rotation_from_euler
+from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.body import PAINT, Z_UP, body, paint_of
 from orchestrator.figures.page_series import numbers, times
 from orchestrator.figures.style import (
@@ -18,7 +19,6 @@ from orchestrator.figures.style import (
     reference_colours,
     vehicle_colours,
 )
-from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import Loop, real_parameter, true_control_point, waypoints
 
 #: Instants at which a vehicle is shown: at most, at least, and of all vehicles together.

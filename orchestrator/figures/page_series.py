@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auv_fmu.language.quantities import TAU, THETA
+from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.style import (
     COLOURS,
     REFERENCE,
@@ -16,7 +17,6 @@ from orchestrator.figures.style import (
     printed_unit,
     vehicle_colours,
 )
-from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE_LABEL, size, smallest_distances
 from orchestrator.vehicle.signals import AXES, Loop, limits, tracking_error
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from auv_fmu.language.quantities import TAU
+from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.event_marks import mark_events
 from orchestrator.figures.style import (
     COLOURS,
@@ -23,7 +24,6 @@ from orchestrator.figures.style import (
     runs_with,
 )
 from orchestrator.figures.visible import draw_signal, mean_window
-from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,

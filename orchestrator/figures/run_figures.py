@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 
 from auv_fmu.language.quantities import NU, THETA
+from orchestrator.cosim.observers.table import Table
 from orchestrator.figures import fleet_panels
 from orchestrator.figures.panels import (
     COMMANDS,
@@ -35,7 +36,6 @@ from orchestrator.figures.style import (
 )
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.master.observers.table import Table
 from orchestrator.vehicle.signals import AXES, STANDARD, Loop, Needs, suffixes, true_control_point
 
 

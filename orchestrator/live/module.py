@@ -14,10 +14,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from fmus.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
 from fmus.discovery import package_folder
 from orchestrator.live.programs import Source
 from orchestrator.machine.cache import made_once
+from orchestrator.machine.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 

@@ -16,11 +16,8 @@ from typing import Any, NamedTuple
 
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
-from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
-from orchestrator.live.programs import REDUCERS, Programs
-from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import LINEAR
-from orchestrator.master.hooks.events import (
+from orchestrator.cosim.experiment import LINEAR
+from orchestrator.cosim.hooks.events import (
     Action,
     Alter,
     Event,
@@ -30,6 +27,13 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
+from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
+from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
+from orchestrator.live.programs import REDUCERS, Programs
+from orchestrator.machine.errors import InputError
 from orchestrator.program.reducing import looking_at
 from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
@@ -38,11 +42,6 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
-from orchestrator.system.component import Component
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
@@ -255,7 +254,7 @@ def _check(prepared: Prepared) -> None:
     system, experiment, loops = plan.system, plan.experiment, prepared.loops
     most_steps = _MOST_STEPS // len(loops)
     lacking = {
-        "rings of direct feedthroughs": rings(system),
+        "rings of direct feedthroughs": system.rings(),
         "linear inputs": experiment.coupling == LINEAR,
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,
@@ -337,15 +336,15 @@ def _parameters(text: Text) -> Iterator[Plain]:
             "name": str(name),
             "type": variable.type,
             "description": variable.description or "",
-            "default": named(variable, start),
-            "value": named(variable, value),
+            "default": variable.shown(start),
+            "value": variable.shown(value),
         }
         if variable.unit and variable.unit != "1":
             found["unit"] = printed_unit(variable.unit)
         for end in ("min", "max"):
             if (limit := getattr(variable, end)) is not None:
                 found[end] = float(limit)
-        if choices := items_of(variable):
+        if choices := variable.items:
             found["choices"] = {choice: int(number) for choice, number in choices.items()}
         yield found
 

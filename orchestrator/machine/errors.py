@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import errno
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 
 #: How many lines of a long text, such as the problems of a description, are shown, and how many
 #: letters of each.
 _MOST_LINES, _LONGEST_LINE = 10, 300
+
+
+#: Of many names, this many are shown.
+_MOST_NAMES = 5
 
 
 class InputError(ValueError):
@@ -49,6 +53,12 @@ def unforeseen(error: Exception) -> str:
 def shortened(text: str, most: int = 80) -> str:
     """A text for a message, cut where it gets long."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def listed(names: Sequence[str], between: str = ", ") -> str:
+    """Names, of many the first, with something between them."""
+    more = len(names) - _MOST_NAMES
+    return between.join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def escape_unprintable(text: str, allowed: str = "") -> str:

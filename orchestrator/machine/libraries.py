@@ -13,9 +13,9 @@ from tempfile import TemporaryDirectory
 
 from fmpy import platform_tuple, sharedLibraryExtension
 
-from fmus.compilers import LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.cache import category_folder, read_cached, write_cached
 from orchestrator.machine.children import run_module
+from orchestrator.machine.compilers import LIMIT_OF_ZIG, machines_compiler, run_compiler
 from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.errors import last_line
 

@@ -19,7 +19,7 @@ from auv_fmu.paper.disturbance import Disturbance
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.motion_planner import TAU_D
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.master.experiment import JACOBI, OrderName
+from orchestrator.cosim.experiment import JACOBI, OrderName
 from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,

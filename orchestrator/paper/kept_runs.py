@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
+from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import code_of, digest_of
 from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import code_of, digest_of
 from orchestrator.runs.folder import open_ledger
 from orchestrator.runs.preparation import Prepared, prepare_request
 from orchestrator.runs.record import content_of, ending_in, header_in, loops_in

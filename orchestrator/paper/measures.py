@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
 from orchestrator.vehicle.index.final_error import LAST as LAST_SECONDS
 from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import STANDARD, applied, real_parameter

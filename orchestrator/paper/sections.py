@@ -14,10 +14,12 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
+from orchestrator.cosim.system.names import port_name
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.file_names import file_name
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns
 from orchestrator.paper.page import (
     escape_markdown,
@@ -33,7 +35,6 @@ from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.studies.sweep import Means, complete_study
-from orchestrator.system.names import file_name, port_name
 from orchestrator.vehicle.indices import metrics, of_vehicles
 
 #: The parameter that decides whether a run has a twin without noise.

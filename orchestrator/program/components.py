@@ -18,11 +18,11 @@ from fmus.native.translator import translated
 from fmus.ports.definition import Definition, define
 from fmus.ports.port import Misdeclared
 from fmus.script import is_component
+from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError, reason, shortened
 from orchestrator.machine.ledger import sha256_of
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.system.component import Component
-from orchestrator.system.structure import System
 
 #: Where a native FMU has its equations.
 _EQUATIONS = Path("sources", "equations.c")

@@ -1,6 +1,6 @@
 """Events of a program: the part of its text that they need.
 
-Between two steps, `events.c` does what :mod:`orchestrator.master.hooks.events` does. It knows
+Between two steps, `events.c` does what :mod:`orchestrator.cosim.hooks.events` does. It knows
 numbers only: what happened is put into words by the page.
 """
 
@@ -13,11 +13,11 @@ from typing import Protocol
 from fmus.language.types import FLOAT
 from fmus.native.emit import number_in_c
 from fmus.native.pieces import Place
-from orchestrator.master.plan import Plan
-from orchestrator.master.row import FACTOR, OFFSET
+from orchestrator.cosim.plan import Plan
+from orchestrator.cosim.row import FACTOR, OFFSET
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.units import Linear
 from orchestrator.program.kind import Kind
-from orchestrator.system.names import PortName
-from orchestrator.system.units import Linear
 
 _SOURCE = Path(__file__).with_name("events.c")
 

@@ -20,10 +20,10 @@ from fmus.native.emit import closed, number_in_c, quoted
 from fmus.native.pieces import array, function
 from fmus.native.translator import deepest
 from fmus.ports.definition import Definition
+from orchestrator.cosim.plan import Plan
+from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.errors import InputError
-from orchestrator.master.plan import Plan
 from orchestrator.program.writer import CALLS, Text, Unsupported, head_of
-from orchestrator.system.names import PortName
 
 #: What the calls that a component can refuse are, in words.
 _REFUSED = ("its parameters", "its inputs", "its outputs", "its step", "a value")

@@ -23,10 +23,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from auv_fmu.paper import euler
-from fmus.compilers import compiler_for
 from fmus.discovery import write_archive
 from fmus.documentation import html_of, page_of
-from fmus.kinds import platforms as platforms_of
 from fmus.language.types import FLOAT, INT, Scalar, Type, count
 from fmus.native.emit import closed, number_in_c, quoted
 from fmus.native.numbers import has_only_doubles, moves
@@ -38,11 +36,14 @@ from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, 
 from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
+from orchestrator.cosim.plan import Plan
+from orchestrator.cosim.stages import Visit
+from orchestrator.cosim.system.names import PortName
+from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.plan import Plan
-from orchestrator.master.stages import Visit
+from orchestrator.machine.file_names import file_name
+from orchestrator.machine.platforms import platforms as platforms_of
 from orchestrator.program.writer import Text, Unsupported
-from orchestrator.system.names import PortName, file_name
 
 _NOISE = """\
 /* A generator as numbers. */

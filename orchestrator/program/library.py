@@ -11,8 +11,9 @@ from threading import local
 import numpy as np
 from fmpy import platform_tuple
 
-from fmus.compilers import EXPORTED, MATHEMATICS, SAME_NUMBERS
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.machine.cache import read_cached
+from orchestrator.machine.compilers import EXPORTED, MATHEMATICS, SAME_NUMBERS
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.libraries import (
     compile_text,
@@ -20,7 +21,6 @@ from orchestrator.machine.libraries import (
     library_key,
     load_library,
 )
-from orchestrator.master.experiment import Experiment
 from orchestrator.program.writer import Text
 
 #: Category in the cache.

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from fmus.ports.reducer import Reducer
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
 from orchestrator.vehicle.reduction import sources_of
 from orchestrator.vehicle.signals import Loop
 

@@ -27,18 +27,16 @@ from fmus.native.reducer import ReducerText
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
-from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
-from orchestrator.master.plan import Plan, stages
-from orchestrator.master.stages import Stage, Stages, Visit, stages_of, types_read
+from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, LINEAR, Order
+from orchestrator.cosim.plan import Plan, stages
+from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind
 from orchestrator.program.reducing import Looking
-from orchestrator.system.connection import Connection
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName, listed
-from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import items_of
 
 #: What a component has refused, where `failure` names one.
 CALLS = START, INPUT, OUTPUTS, STEP, SET = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP", "AT_SET"
@@ -380,7 +378,7 @@ class Text:
 
         """
         system = self.plan.system
-        if closed_rings := rings(system):
+        if closed_rings := system.rings():
             names = listed(closed_rings[0])
             raise Unsupported(
                 f"direct feedthroughs of {names} form a ring, which no program can have"
@@ -448,7 +446,7 @@ class Text:
         value, port = self.plan.system.value(name), self.port(name)
         if isinstance(value, str):
             variable = self.plan.system.components[name.component].variable(name.port)
-            value = int(items_of(variable)[value])
+            value = int(variable.items[value])
         if value is None:
             value = port.start or 0
         types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}

@@ -12,20 +12,18 @@ from typing import Any, TypeVar
 
 from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
+from orchestrator.cosim.formats.osp import OSP_STRUCTURE, read_osp
+from orchestrator.cosim.formats.ssp import STRUCTURE
+from orchestrator.cosim.formats.ssp.reader import read_ssp
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.figures.run_figures import check_figure
-from orchestrator.formats.osp import OSP_STRUCTURE, read_osp
-from orchestrator.formats.ssp import STRUCTURE
-from orchestrator.formats.ssp.reader import read_ssp
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import is_folder
-from orchestrator.master.experiment import step_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import Scenario, names, read_scenario, scenario_of
 from orchestrator.runs.wiring import check_built, closed_loop
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.graph import unfed_inputs
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import differing_vehicle
 
 T = TypeVar("T")
@@ -180,7 +178,7 @@ def read_fmu(path: Path, findings: Findings | None = None) -> System:
         connections=(),
         start_time=component.experiment("startTime"),
         stop_time=component.experiment("stopTime"),
-        step=step_of(component),
+        step=component.step,
     )
 
 
@@ -238,7 +236,7 @@ def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
     if len(system.components) == 1:
         # No other one could feed it.
         return []
-    found = unfed_inputs(system, given), differing_vehicle(system)
+    found = system.unfed_inputs(given), differing_vehicle(system)
     return [text for text in found if text is not None]
 
 

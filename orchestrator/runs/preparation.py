@@ -8,30 +8,30 @@ from functools import cached_property
 from pathlib import Path
 
 from auv_fmu.paper.euler import STEP
-from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import (
+from orchestrator.cosim.experiment import (
     FEEDTHROUGH,
     GAUSS_SEIDEL,
     SOLVE,
     Experiment,
-    with_common_step,
 )
-from orchestrator.master.fmi.isolated import Isolation, isolation_of
-from orchestrator.master.hooks.events import Alter, Event, Events, Set
-from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.hooks.timing import InputTable, Playback, check_factor
-from orchestrator.master.loop import PYTHON_LOOP, Stepping, choose_loop
-from orchestrator.master.observers.observer import Ending, Observer
-from orchestrator.master.plan import Identity, Plan, identity, make_plan
-from orchestrator.master.simulation import simulate_plan
+from orchestrator.cosim.fmi.isolated import Isolation, isolation_of
+from orchestrator.cosim.hooks.events import Alter, Event, Events, Set
+from orchestrator.cosim.hooks.hook import Hook
+from orchestrator.cosim.hooks.timing import InputTable, Playback, check_factor
+from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
+from orchestrator.cosim.observers.observer import Ending, Observer
+from orchestrator.cosim.plan import Plan, identity, make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.names import port_name, role_of
+from orchestrator.cosim.system.structure import System
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.identity import Identity
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
-from orchestrator.system.names import port_name, role_of
-from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 
 #: The components that a comparison exchanges, and keeps.
@@ -158,7 +158,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     system = replace(system, steps={**system.steps, **request.steps})
     step = first_given(request.step, scenario.step, system.step)
     if step is None:
-        system = with_common_step(system)
+        system = system.with_common_step()
         step = DEFAULT_STEP if system.step is None else system.step
     order = request.order or scenario.order or None
     coupling = first_given(request.coupling, scenario.coupling)

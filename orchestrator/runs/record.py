@@ -18,22 +18,22 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import NATIVE, PYTHON
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.fmi.binary import runs_python
+from orchestrator.cosim.hooks.checkpoint import Checkpoints, interval_in
+from orchestrator.cosim.observers.files import TABLE_FORMATS
+from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import TYPES, Standing, StringTable
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
-from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import PACKAGES, digest_of
 from orchestrator.machine.ledger import RECORD, is_changed, locate
 from orchestrator.machine.user_files import explain_errors, read_text
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.binary import runs_python
-from orchestrator.master.hooks.checkpoint import Checkpoints, interval_in
-from orchestrator.master.observers.files import TABLE_FORMATS
-from orchestrator.master.observers.observer import Ending, Header, Occurrence
-from orchestrator.master.plan import PACKAGES, digest_of
 from orchestrator.runs.preparation import Prepared
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import TYPES, Standing, StringTable
+from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
 
 #: The indices of a run.

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
 from fmus.kinds import AUTO, KINDS, KindName
-from orchestrator.master.experiment import (
+from orchestrator.cosim.experiment import (
     COUPLINGS,
     FEEDTHROUGH,
     GAUSS_SEIDEL,
@@ -23,12 +23,12 @@ from orchestrator.master.experiment import (
     format_order,
     read_order,
 )
-from orchestrator.master.fmi.isolated import STEP_TIMEOUT
-from orchestrator.master.hooks.checkpoint import check_every
-from orchestrator.master.loop import LOOPS, LoopName
-from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
-from orchestrator.master.observers.observer import check_interval
-from orchestrator.system.values import literal
+from orchestrator.cosim.fmi.isolated import STEP_TIMEOUT
+from orchestrator.cosim.hooks.checkpoint import check_every
+from orchestrator.cosim.loop import LOOPS, LoopName
+from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
+from orchestrator.cosim.observers.observer import check_interval
+from orchestrator.machine.texts import literal
 
 
 class CliOption:

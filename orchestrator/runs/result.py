@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from orchestrator.cosim.experiment import format_order
+from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
+from orchestrator.cosim.observers.observer import Occurrence
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.ledger import locate
-from orchestrator.master.experiment import format_order
-from orchestrator.master.observers.files import TABLE_FORMATS, TableFormat
-from orchestrator.master.observers.observer import Occurrence
-from orchestrator.master.observers.table import Table
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.record import (
     FILES,
@@ -35,8 +37,6 @@ from orchestrator.runs.record import (
     write_metrics,
 )
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics, of_vehicles
 from orchestrator.vehicle.signals import Loop

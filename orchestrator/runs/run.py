@@ -13,18 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.figures.run_figures import figure_files
-from orchestrator.figures.style import Drawn
-from orchestrator.figures.visible import VisibleRows
-from orchestrator.machine.disk import process_folder
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.interrupts import Interrupts, held_interrupts
-from orchestrator.machine.ledger import LEDGER, Ledger
-from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.hooks.timing import RealTime
-from orchestrator.master.observers.files import TABLE_FORMATS
-from orchestrator.master.observers.observer import (
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim.hooks.hook import Hook
+from orchestrator.cosim.hooks.timing import RealTime
+from orchestrator.cosim.observers.files import TABLE_FORMATS
+from orchestrator.cosim.observers.observer import (
     Ending,
     Observer,
     Progress,
@@ -32,6 +25,15 @@ from orchestrator.master.observers.observer import (
     matches,
     matching,
 )
+from orchestrator.cosim.system.structure import System
+from orchestrator.figures.run_figures import figure_files
+from orchestrator.figures.style import Drawn
+from orchestrator.figures.visible import VisibleRows
+from orchestrator.machine.disk import process_folder
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.file_names import file_name
+from orchestrator.machine.interrupts import Interrupts, held_interrupts
+from orchestrator.machine.ledger import LEDGER, Ledger
 from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import (
@@ -44,8 +46,6 @@ from orchestrator.runs.record import (
     write_record,
 )
 from orchestrator.runs.request import Files
-from orchestrator.system.names import file_name
-from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import Watch, cautions, cautions_beside, values_of
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
@@ -397,7 +397,7 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
     for name, component in system.components.items():
-        for variable, why in component.left_alone.items():
+        for variable, why in component.unsupported.items():
             if f"{name}.{variable}" in patterns:
                 raise InputError(f"--columns: {name}.{variable} {why}")
     if is_companion:

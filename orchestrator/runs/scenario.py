@@ -12,31 +12,24 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
 from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.formats.tables import read_columns, read_rows, records
+from orchestrator.cosim.experiment import Order
+from orchestrator.cosim.hooks.timing import InputTable
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System, is_spread
+from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.file_names import file_name
+from orchestrator.machine.schema import flatten
+from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
-from orchestrator.master.experiment import Order
-from orchestrator.master.hooks.timing import InputTable
 from orchestrator.runs import SCENARIOS_FOLDER
-from orchestrator.system.names import PortName, file_name, flatten, for_each, port_name
-from orchestrator.system.structure import System, is_spread
-from orchestrator.system.values import (
-    TYPES,
-    Standing,
-    StringTable,
-    Value,
-    cell,
-    finite,
-    items_of,
-    type_of,
-    typed,
-)
+from orchestrator.runs.tables import read_columns, read_rows, records
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
@@ -97,7 +90,7 @@ class Inputs:
         """
         return read_columns(self.file, _NO_INPUTS)
 
-    def columns(self, variables: Sequence[ModelVariable]) -> list[np.ndarray]:
+    def columns(self, variables: Sequence[Variable]) -> list[np.ndarray]:
         """The times, and the columns in the types of their variables.
 
         Systems whose variables are alike share what was read.
@@ -106,12 +99,12 @@ class Inputs:
             InputError: the table cannot be read, or holds what is not of such a type.
 
         """
-        kinds = tuple((v.type, v.min, v.max, *items_of(v).items()) for v in variables)
+        kinds = tuple((v.type, v.min, v.max, *v.items.items()) for v in variables)
         if kinds not in self._read:
             self._read[kinds] = self._columns(variables)
         return self._read[kinds]
 
-    def _columns(self, variables: Sequence[ModelVariable]) -> list[np.ndarray]:
+    def _columns(self, variables: Sequence[Variable]) -> list[np.ndarray]:
         strings = StringTable()
         numbers: dict[str, Callable[[object], float]] = {}
         for name, variable in zip(self.names, variables, strict=True):
@@ -129,7 +122,7 @@ class Inputs:
         ]
 
 
-def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: object) -> float:
+def _stand_in(name: str, variable: Variable, strings: StringTable, value: object) -> float:
     """The number for a cell of a table.
 
     Raises:
@@ -137,7 +130,7 @@ def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: o
 
     """
     try:
-        return strings.stand_in(typed(name, variable, cell(variable, value, f"{name}:")))
+        return strings.stand_in(variable.typed(variable.cell(value, f"{name}:"), name))
     except InputError as error:
         raise ValueError(str(error)) from None
 
@@ -352,7 +345,7 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
     for connection in system.connections:
         if connection.target == target:
             raise InputError(f"{target} is fed by {connection.source} and cannot be set")
-    is_real = type_of(variable) == "Real"
+    is_real = variable.family == "Real"
     values = np.array([column.min(), column.max()]) if is_real else np.unique(column)
     for value in values.tolist():
         _typed(system, target, value)
@@ -361,13 +354,13 @@ def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
 def _typed(system: System, target: PortName, value: Value) -> Value:
     """A value of a table in the type of an input, which takes whole doubles as integers, too."""
     variable = system.component(target.component).variable(target.port)
-    return typed(str(target), variable, f"{value:.17g}" if isinstance(value, float) else value)
+    return variable.typed(f"{value:.17g}" if isinstance(value, float) else value, str(target))
 
 
 def _is_linear(system: System, target: PortName, between: str) -> bool:
     variable = system.component(target.component).variable(target.port)
     # In FMI, discrete variables change only at events.
-    return (type_of(variable), variable.variability, between) == ("Real", "continuous", "linear")
+    return (variable.family, variable.variability, between) == ("Real", "continuous", "linear")
 
 
 def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
@@ -437,3 +430,21 @@ def _plain(name: str) -> str:
 
 def _are_of_waypoints(names: Sequence[str]) -> bool:
     return sorted(map(_plain, names)) in (_PLACE, _TIMED)
+
+
+def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
+    """A table with an entry for each name in the place of one with a star; others win.
+
+    Args:
+        star: that stands for a name, in keys, and in texts that are their values.
+        names: that it stands for.
+        table: by texts that may have it.
+
+    """
+    found = {
+        key.replace(star, name): value.replace(star, name) if isinstance(value, str) else value
+        for name in names
+        for key, value in table.items()
+        if star in key
+    }
+    return found | {key: value for key, value in table.items() if star not in key or not names}

@@ -7,8 +7,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
-from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.hooks.events import (
+from orchestrator.cosim.hooks.events import (
     COMPARISONS,
     Action,
     Alter,
@@ -20,11 +19,14 @@ from orchestrator.master.hooks.events import (
     Set,
     Stop,
 )
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, flatten, paired, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import TYPES, Value, finite, is_finite, literal, type_of, typed
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName, paired, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system.values import TYPES, Value
+from orchestrator.machine.errors import Findings, InputError
+from orchestrator.machine.schema import flatten
+from orchestrator.machine.texts import finite, is_finite, literal
 
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
 
@@ -151,7 +153,7 @@ def _ports(
         raise InputError(
             f"{port} has causality {variable.causality}, not {' or '.join(causalities)}"
         )
-    if type_of(variable) == "String" and "parameter" not in causalities:
+    if variable.family == "String" and "parameter" not in causalities:
         raise InputError(f"{port} is a String: events act only on numbers and Booleans")
     return [port]
 
@@ -201,7 +203,7 @@ def _altered(
 def _value(system: System, port: PortName, route: Connection | None, value: Any) -> Value:
     """What an input takes where a signal is overridden."""
     variable = system.component(port.component).variable(port.port)
-    found = typed(str(port), variable, _text(value))
+    found = variable.typed(_text(value), str(port))
     match route:
         case Connection(transformation=Linear() as change):
             return _arrived(port, route, value, change(float(found)))
@@ -249,13 +251,13 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":
-                inputs.append((port, typed(str(port), variable, _text(one))))
+                inputs.append((port, variable.typed(_text(one), str(port))))
             elif variable.variability != "tunable":
                 raise InputError(
                     f"{port} is a {variable.variability} parameter: it cannot change during a run"
                 )
             else:
-                parameters.append((port, typed(str(port), variable, _text(one))))
+                parameters.append((port, variable.typed(_text(one), str(port))))
     return Set(tuple(parameters), tuple(inputs))
 
 

@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
-from orchestrator.master.experiment import COUPLINGS
+from orchestrator.cosim.experiment import COUPLINGS
+from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.runs.scenario_events import ACTIONS
 from orchestrator.vehicle.signals import STANDARD
 

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from fmus.kinds import AUTO, KindName
+from orchestrator.cosim.experiment import CouplingName, Order
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, LoopName
+from orchestrator.cosim.observers.observer import Observer, Progress
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.master.experiment import CouplingName, Order
-from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.loop import LOOPS, PYTHON_LOOP, LoopName
-from orchestrator.master.observers.observer import Observer, Progress
 from orchestrator.runs.folder import lock_folder, make_folder
 from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
 from orchestrator.runs.preparation import Prepared, prepare
@@ -29,7 +30,6 @@ from orchestrator.runs.record import (
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import Loop
 

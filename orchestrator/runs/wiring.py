@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from fmus.discovery import name_of
-from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName, port_name, splits
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.variables import BUS, COMPLETE, Terminal
+from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed
 from orchestrator.machine.user_files import is_folder
-from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, vehicle_names
-from orchestrator.system.component import Component, read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, for_each, listed, port_name, splits
-from orchestrator.system.structure import System
-from orchestrator.system.variables import BUS, COMPLETE, Terminal
+from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each, vehicle_names
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")
 

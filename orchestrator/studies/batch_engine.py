@@ -14,20 +14,21 @@ import numpy as np
 from auv_fmu.language.variable import Refusal
 from fmus.ports.definition import Definition
 from fmus.ports.port import Port
+from orchestrator.cosim.experiment import Experiment, Order
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment, Order, decimations
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import code_of, make_plan
+from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
 from orchestrator.program.reducing import looking_at
 from orchestrator.program.writer import Text
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.studies.own_indices import OwnIndex
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, items_of, named
 from orchestrator.vehicle.cautions import (
     WATCHED,
     cautions,
@@ -126,7 +127,7 @@ class _Known:
 
         """
         if (order, step) not in self._found:
-            key = order, tuple(decimations(self.system, step).values())
+            key = order, tuple(self.system.decimations(step).values())
             if key not in self._ready:
                 self._ready[key] = self._written(order, step)
             self._found[order, step] = self._ready[key]
@@ -193,7 +194,7 @@ class _Known:
         name = self.system.named(port_name(text))
         variable = self.system.components[name.component].variables[name.port]
         port = self._ports[name]
-        return _Parameter(place, port, {key: int(v) for key, v in items_of(variable).items()})
+        return _Parameter(place, port, {key: int(v) for key, v in variable.items.items()})
 
     @cached_property
     def _ports(self) -> Mapping[PortName, Port]:
@@ -347,7 +348,7 @@ class BatchEngine:
             raise InputError(f"{point.scenario}: a component has refused")
         system = known.system.with_parameters(point.parameters)
         parameters = {
-            name: named(variable, system.value(name))
+            name: variable.shown(system.value(name))
             for component in system.components.values()
             for variable in component.having("parameter")
             for name in (PortName(component.name, variable.name),)

@@ -13,15 +13,16 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
+from orchestrator.cosim.experiment import Order
+from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, choose_loop
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.system.names import port_name
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.identity import code_of
 from orchestrator.machine.user_files import read_archive
-from orchestrator.master.experiment import Order
-from orchestrator.master.loop import LOOPS, PYTHON_LOOP, choose_loop
-from orchestrator.master.plan import code_of, make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.own_indices import OwnIndex
-from orchestrator.system.names import port_name
 from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
 from orchestrator.vehicle.signals import loops_of
@@ -117,7 +118,7 @@ class FmuEngine:
 
         Args:
             prepared: by the names that runs have for their scenarios.
-            loop: that makes the steps, one of :data:`orchestrator.master.loop.LOOPS`.
+            loop: that makes the steps, one of :data:`orchestrator.cosim.loop.LOOPS`.
             own: indices of the user's own.
 
         """

@@ -14,17 +14,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from fmpy.model_description import ModelVariable
-
 from fmus.ports.reducer import Reducer, read_reducer
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.figures.study_values import is_known, names_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, last_line, reason
 from orchestrator.studies.study import Study
 from orchestrator.studies.study_file import LABELS, listed
-from orchestrator.system.structure import System
-from orchestrator.system.values import type_of
 from orchestrator.vehicle.indices import INDICES, Index, index_columns
 from orchestrator.vehicle.reduction import sources_of
 from orchestrator.vehicle.signals import Loop, loops_of
@@ -188,8 +186,8 @@ def _check_inputs(
             sources = sources_of(own.reducer, loop, places, {})
             for port in own.reducer.ports:
                 variable = variables.get(loop.port(port.name))
-                if variable is not None and type_of(variable) != port.type:
-                    why = f"{port.name} is of the type {type_of(variable)}, not {port.type}"
+                if variable is not None and variable.family != port.type:
+                    why = f"{port.name} is of the type {variable.family}, not {port.type}"
                     raise InputError(f"{path}: {why}")
             if not sources.missing:
                 return
@@ -198,7 +196,7 @@ def _check_inputs(
     raise InputError(f"{path}: {without}")
 
 
-def _variables(system: System) -> Iterator[tuple[str, ModelVariable]]:
+def _variables(system: System) -> Iterator[tuple[str, Variable]]:
     """What rows and parameters of a run are of, by their names."""
     for component in system.components.values():
         for causality in ("output", "input", "parameter"):

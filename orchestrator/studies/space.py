@@ -10,9 +10,13 @@ from math import ceil, cos, floor, log2, pi, prod, sin, sqrt
 from typing import Any
 
 import numpy as np
-from fmpy.model_description import ModelVariable
 
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import Findings, InputError, reason, shortened
+from orchestrator.machine.texts import is_finite, literal
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
@@ -27,17 +31,6 @@ from orchestrator.studies.study import (
     Sample,
     Study,
     norm_members,
-)
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import (
-    Value,
-    is_finite,
-    literal,
-    named,
-    type_of,
-    typed,
-    unit_of,
 )
 from orchestrator.vehicle.indices import Index, index_columns, index_units
 from orchestrator.vehicle.signals import loops_of
@@ -217,7 +210,7 @@ class _Known:
 
     def value_type(self, name: str) -> type[Value]:
         """The type of a value."""
-        return float if name == STEP else _TYPES[type_of(self._variable(name))]
+        return float if name == STEP else _TYPES[self._variable(name).family]
 
     def unit(self, name: str) -> str:
         """The unit of a value; empty: it has none, or not the same in all systems."""
@@ -225,14 +218,14 @@ class _Known:
             return "s"
         target = port_name(name)
         having = [(one, one.named(target)) for one in self._systems if one.has(target)]
-        units = {unit_of(one.component(of.component).variable(of.port)) or "" for one, of in having}
+        units = {one.component(of.component).variable(of.port).unit or "" for one, of in having}
         return units.pop() if len(units) == 1 else ""
 
     def typed(self, name: str, value: Any) -> Value:
         """A value in its type; that of an Enumeration by its name."""
         if name != STEP:
             variable = self._variable(name)
-            found: Value = named(variable, typed(name, variable, value))
+            found: Value = variable.shown(variable.typed(value, name))
             return found
         if not is_finite(value):
             raise InputError(f"{STEP} = {shortened(repr(value))}: not a number of seconds")
@@ -250,7 +243,7 @@ class _Known:
             unknown = {name: None for name in unknown if name in absent}
         return {**{name: values[name] for name in unknown}, **found}
 
-    def _variable(self, name: str) -> ModelVariable:
+    def _variable(self, name: str) -> Variable:
         target = port_name(name)
         system = next((one for one in self._systems if one.has(target)), self._systems[-1])
         target = system.named(target)

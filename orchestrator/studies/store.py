@@ -23,8 +23,8 @@ import numpy as np
 
 from orchestrator.figures.study_values import CAUTION, FAILURE, SCENARIO
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.identity import differences
 from orchestrator.machine.ledger import Ledger, move_aside
-from orchestrator.master.plan import differences
 from orchestrator.runs.folder import open_ledger
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
+from orchestrator.cosim.experiment import OrderName
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.file_names import file_name
 from orchestrator.machine.user_files import names_in, read_text
-from orchestrator.master.experiment import OrderName
-from orchestrator.system.names import file_name
 
 #: What makes the runs; the first is the default.
 EngineName: TypeAlias = Literal["fmu", "batch"]

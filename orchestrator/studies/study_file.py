@@ -14,6 +14,9 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
+from orchestrator.cosim.experiment import ORDERS
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import is_spread
 from orchestrator.figures.study_values import (
     CHARTS,
     INFLUENCE,
@@ -21,10 +24,10 @@ from orchestrator.figures.study_values import (
     FigureEntry,
     is_known,
 )
-from orchestrator.formats.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
+from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, flatten, needed
+from orchestrator.machine.texts import is_finite
 from orchestrator.machine.user_files import explain_errors, find_toml, read_text
-from orchestrator.master.experiment import ORDERS
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (
     ENGINES,
@@ -42,9 +45,6 @@ from orchestrator.studies.study import (
     Study,
     norm_members,
 )
-from orchestrator.system.names import flatten, port_name
-from orchestrator.system.structure import is_spread
-from orchestrator.system.values import is_finite
 from orchestrator.vehicle.indices import index_columns
 
 #: What a figure may be called: its files are.

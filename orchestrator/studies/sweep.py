@@ -14,14 +14,15 @@ from itertools import chain
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
+from orchestrator.cosim.experiment import LINEAR
+from orchestrator.cosim.loop import LOOPS, LoopName
+from orchestrator.cosim.system.structure import System
 from orchestrator.figures.study_values import FigureEntry
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.experiment import LINEAR
-from orchestrator.master.loop import LOOPS, LoopName
-from orchestrator.master.observers.observer import progress_bar
-from orchestrator.master.plan import PACKAGES
+from orchestrator.machine.identity import PACKAGES
+from orchestrator.machine.progress import progress_bar
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared
@@ -36,7 +37,6 @@ from orchestrator.studies.store import Store, open_store
 from orchestrator.studies.study import BATCH, ENGINES, FMU, EngineName, Study
 from orchestrator.studies.study_file import read_figures, read_study, study_of
 from orchestrator.studies.study_result import StudyResult, read_study_record
-from orchestrator.system.structure import System
 
 #: Packages whose versions the runs and their table depend on.
 _PACKAGES = (*PACKAGES, "pyarrow", "scipy")

@@ -16,12 +16,13 @@ from auv_fmu.paper.observer import Form, exact_gain
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from fmus.ports.reducer import read_reducer
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.system.graph import reaching
-from orchestrator.system.names import PortName, listed, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value, literal, type_of, unit_of
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
+from orchestrator.machine.errors import listed
+from orchestrator.machine.texts import literal
 from orchestrator.vehicle.index import largest_bound, vertical_passed
 from orchestrator.vehicle.reduction import Reduction, reductions_of
 from orchestrator.vehicle.signals import (
@@ -139,7 +140,7 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     if not system.has(name):
         return None
     variable = system.component(name.component).variables[name.port]
-    is_one = (variable.causality, type_of(variable)) == ("parameter", "Real")
+    is_one = (variable.causality, variable.family) == ("parameter", "Real")
     value = system.value(name) if is_one else None
     return None if value is None else float(value)
 
@@ -284,14 +285,12 @@ def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
     vehicles = {connection.target.component for connection in system.fed.get(loop.controller, ())}
     if isinstance(loop, AllocatedLoop):
         vehicles = vehicles - {loop.allocation} | {loop.vehicle}
-    sources = (
-        connection.source for connection in reaching(system, loop.controller, until=vehicles)
-    )
+    sources = (connection.source for connection in system.reaching(loop.controller, until=vehicles))
     return sorted(
         {
             str(source)
             for source in sources
             if source.component in vehicles
-            and unit_of(system.component(source.component).variable(source.port)) in _VELOCITY_UNITS
+            and system.component(source.component).variable(source.port).unit in _VELOCITY_UNITS
         }
     )

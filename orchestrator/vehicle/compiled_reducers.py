@@ -9,18 +9,18 @@ from itertools import chain
 
 import numpy as np
 
-from fmus.compilers import EXPORTED, FLAGS, MATHEMATICS
 from fmus.native.names import RUNTIME
 from fmus.ports.reducer import Reducer
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.system.values import Value
+from orchestrator.machine.compilers import EXPORTED, FLAGS, MATHEMATICS
+from orchestrator.machine.identity import code_of
 from orchestrator.machine.libraries import (
     compile_text,
     find_fast_compiler,
     library_key,
     load_library,
 )
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.plan import code_of
-from orchestrator.system.values import Value
 
 #: Category in the cache.
 CATEGORY = "indices"

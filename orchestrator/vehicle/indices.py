@@ -16,11 +16,10 @@ import numpy as np
 from auv_fmu.language.quantities import member_of
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer, read_reducer
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.values import named
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.distances import (
     SMALLEST_DISTANCE,
@@ -312,6 +311,6 @@ def _differing(system: System, held: Mapping[PortName, Any]) -> Iterator[tuple[s
     for name, value in {**held, **system.parameters}.items():
         component = system.component(name.component)
         variable = component.variable(name.port)
-        shown, own = (named(variable, one) for one in (value, component.start(name.port)))
+        shown, own = (variable.shown(one) for one in (value, component.start(name.port)))
         if shown != own:
             yield str(name), shown

@@ -20,12 +20,12 @@ from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.gain_conditions import observer_rate
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
+from orchestrator.cosim.observers.files import CsvLines
+from orchestrator.cosim.observers.observer import Ending, Header, every
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.files import CsvLines
-from orchestrator.master.observers.observer import Ending, Header, every
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
 from orchestrator.vehicle.cautions import gain_of_a_step, values_of
 from orchestrator.vehicle.signals import (
     ACTUATORS,

@@ -17,12 +17,12 @@ from auv_fmu.language.quantities import member_name
 from auv_fmu.paper.attitude import rotation_from_euler
 from auv_fmu.paper.control_point import control_point
 from auv_fmu.paper.vehicle import Vehicle
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName, splits
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.table import Table
-from orchestrator.system.graph import reaching
-from orchestrator.system.names import PortName, file_name, splits
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value
+from orchestrator.machine.file_names import file_name
 
 #: Members of groups of ports, in the paper's order.
 ACTUATORS, AXES = tuple(map(str, quantities.TAU)), tuple(map(str, quantities.POSITION))
@@ -210,7 +210,7 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
     def feeding(component: str, group: str, role: str, causality: str, port: str) -> str:
         """The nearest component with a port upstream of another, or else what feeds a group."""
         if component in system.components:
-            wires = list(reaching(system, component, set(vehicles)))
+            wires = list(system.reaching(component, set(vehicles)))
             group = f"{component}.{group}."
             found = [wire for wire in wires if _has(system, wire.source.component, causality, port)]
             found += [wire for wire in wires if str(wire.target).startswith(group)]

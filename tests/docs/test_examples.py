@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.compilers import machines_compiler
 from orchestrator import simulate, sweep
 from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.space import Space

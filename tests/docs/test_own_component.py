@@ -18,11 +18,11 @@ import pytest
 
 from auv_fmu import Variable
 from fmus import check
-from fmus.compilers import machines_compiler
-from fmus.kinds import TARGETS
 from fmus.ports.behaviour import HOOKS
 from orchestrator.commands.main import main
-from orchestrator.master.experiment import Experiment
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.machine.compilers import machines_compiler
+from orchestrator.machine.platforms import TARGETS
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.record import read_result
 from support.markdown import DOCS, blocks

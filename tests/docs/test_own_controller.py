@@ -12,9 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fmus.compilers import machines_compiler
 from orchestrator import simulate
 from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.own_components import new_controller
 from support.markdown import DOCS, blocks
 from support.patches import patch

@@ -12,12 +12,12 @@ import pytest
 from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
-from fmus.compilers import machines_compiler
 from fmus.discovery import REFERENCE
 from fmus.kinds import KINDS, NATIVE, PYTHON
 from fmus.ports.port import FAULT
 from fmus.trial import run
 from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs.own_components import build_own
 from reference import example_span, write_component_reference

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
 from support.examples import EXAMPLES
 
 

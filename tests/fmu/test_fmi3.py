@@ -19,11 +19,11 @@ from fmpy.build import build_platform_binary
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-from orchestrator.master.experiment import Experiment
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.own_components import build_own
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.structure import System
 from support.fmi3 import Fmi3Library, Logger
 from support.kinds import outcome
 from support.raw import Host, Status, initialised, instance

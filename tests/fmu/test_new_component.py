@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.compilers import machines_compiler
 from fmus.discovery import components
+from orchestrator.machine.compilers import machines_compiler
 from reference import STEP, STOP_TIME, write_component_reference
 
 ROOT = Path(__file__).parents[2]

@@ -7,8 +7,8 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.compilers import machines_compiler
 from fmus.kinds import KINDS
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.own_components import build_own
 from support.raw import Host, Library, Status, initialised
 

@@ -19,11 +19,11 @@ from fmpy.simulation import instantiate_fmu
 
 from fmus.kinds import NATIVE, PYTHON
 from orchestrator import simulate
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.exchange.hosts import comparison
 from orchestrator.exchange.hosts.comparison import HOSTS
 from orchestrator.exchange.hosts.here import real_outputs
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 

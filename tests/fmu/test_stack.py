@@ -11,12 +11,12 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.compilers import machines_compiler
 from fmus.discovery import components
 from fmus.kinds import FMI_VERSIONS
 from fmus.language.build import Untranslatable
 from fmus.native.translator import translated
 from fmus.script import source_of_script
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.own_components import build_own
 from support.tiers import slow
 

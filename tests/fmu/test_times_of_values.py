@@ -10,8 +10,8 @@ import pytest
 
 from auv_fmu.water.ocean_current import begin
 from auv_fmu.water.sea import Sea, regular_waves, water
-from fmus.compilers import machines_compiler
 from fmus.kinds import KINDS
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.own_components import build_own
 from support.raw import Host, Library, Status, initialised, instance
 

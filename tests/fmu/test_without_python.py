@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from fmpy.build import build_platform_binary
 
-from fmus.compilers import machines_compiler
-from fmus.kinds import TARGETS
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.table import Table
-from orchestrator.system.structure import System
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.structure import System
+from orchestrator.machine.compilers import machines_compiler
+from orchestrator.machine.platforms import TARGETS
 from support.hosts import bare_root, libraries_of
 from support.replay import compile_replay, replay
 from support.runs import run, system_of

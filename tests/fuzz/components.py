@@ -23,11 +23,11 @@ import fmpy
 from fmpy.validation import validate_fmu
 
 from fmus import check
-from fmus.compilers import compiler_for
-from fmus.kinds import platforms
 from fmus.native.packaging import NativeKind
 from fmus.python.packaging import PythonKind, best_loader
 from fmus.script import source_of_script
+from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.platforms import platforms
 from support.raw import Host, Library, Variable, instance
 
 FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (

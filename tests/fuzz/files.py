@@ -38,21 +38,21 @@ import numpy as np
 
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
+from orchestrator.cosim.experiment import ORDERS
+from orchestrator.cosim.formats.ssp.writer import ssp_bytes
+from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.observers.observer import Observer
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import Plan
+from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.exchange import verify
-from orchestrator.formats.ssp.writer import ssp_bytes
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import _process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS
-from orchestrator.master.observers.files import CsvFile
-from orchestrator.master.observers.observer import Observer
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import Plan
 from orchestrator.runs import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.units import Linear, Mapped
 from support import typed
 
 from . import files_mutators as mutators

@@ -27,8 +27,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.compilers import compiler_for
-from fmus.kinds import NATIVE, PYTHON, platforms
+from fmus.kinds import NATIVE, PYTHON
 from fmus.native.packaging import NativeKind
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX
@@ -53,23 +52,23 @@ from fuzz.components import (
     function,
     names_of,
 )
+from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import Plan, make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.component import Component as Fmu
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection, can_feed
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped, Transformation
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source
+from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import Plan, make_plan
-from orchestrator.master.simulation import simulate_plan
+from orchestrator.machine.platforms import platforms
 from orchestrator.program.writer import Equations, Text
-from orchestrator.system.component import Component as Fmu
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection, can_feed
-from orchestrator.system.graph import rings
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped, Transformation
-from orchestrator.system.values import items_of, type_of
 from support.programs import compiled, play, values_of
 
 #: Components of a pool, and systems that are made of them.
@@ -377,18 +376,18 @@ def _wired(system: System, draw: Random) -> System:
             continue
         for source, output in draw.sample(fitting, min(3, len(fitting))):
             change = _change(output, variable, draw)
-            if change is None and type_of(variable) == "Enumeration" != type_of(output):
+            if change is None and variable.family == "Enumeration" != output.family:
                 continue
             wire = Connection(source, target, change)
             more = replace(system, connections=(*system.connections, wire))
-            if not rings(more) and not any(more.problems()):
+            if not more.rings() and not any(more.problems()):
                 system = more
                 break
     return system
 
 
 def _change(source: Any, target: Any, draw: Random) -> Transformation | None:
-    kinds = type_of(source), type_of(target)
+    kinds = source.family, target.family
     if draw.random() < 0.5:
         return None
     if kinds == ("Real", "Real"):
@@ -396,7 +395,7 @@ def _change(source: Any, target: Any, draw: Random) -> Transformation | None:
     if kinds == ("Boolean", "Boolean"):
         return Mapped(((0, 1), (1, draw.choice((0, 1)))))
     if kinds[1] == "Enumeration":
-        values = [*map(int, items_of(target).values())]
+        values = [*map(int, target.items.values())]
         keys = values if kinds[0] == "Enumeration" else range(-3, 1000)
         return Mapped(tuple((key, draw.choice(values)) for key in keys))
     if kinds[0] != "Real":
@@ -424,14 +423,14 @@ def _parameters(system: System, draw: Random) -> Iterator[tuple[PortName, Any]]:
 
 
 def _value(variable: Any, draw: Random) -> Any:
-    match type_of(variable):
+    match variable.family:
         case "Real":
             return draw.choice((0.0, -0.0, draw.uniform(-3.0, 3.0)))
         case "Boolean":
             return draw.random() < 0.5
         case "Integer":
             return draw.randint(-10, 10)
-    return int(draw.choice([*items_of(variable).values()]))
+    return int(draw.choice([*variable.items.values()]))
 
 
 # Runs

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from fuzz.components import finding, text_of
+from orchestrator.machine.compilers import machines_compiler
 from support.tiers import slow
 
 

@@ -32,11 +32,11 @@ from hypothesis import strategies as st
 
 from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.exchange import release
 from orchestrator.figures import drawing
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.machine.ledger import LEDGER
-from orchestrator.master.hooks.checkpoint import Checkpoints
 from orchestrator.paper import report
 from orchestrator.paper.sections import Section
 from orchestrator.runs import bundle

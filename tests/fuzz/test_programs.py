@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from fuzz.programs import Program, same, tried
+from orchestrator.machine.compilers import machines_compiler
 from support.hosts import GCC
 from support.language import TOO_LARGE, Answer
 

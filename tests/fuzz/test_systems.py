@@ -6,10 +6,10 @@ from shutil import which
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from fuzz import systems
 from fuzz.systems import SAME_FUNCTIONS, SYSTEMS, WHOLE, findings_in_node, outcomes
 from orchestrator.live import module
+from orchestrator.machine.compilers import machines_compiler
 from support.live import needs_zig
 from support.tiers import slow
 

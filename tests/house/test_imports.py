@@ -23,19 +23,19 @@ ROOT = Path(__file__).parents[2]
 FLOORS = {
     "auv_fmu": ("language", "paper", "proof", "remus", "water", "guidance", "loop"),
     "orchestrator": (
-        "machine", "system", "formats", "master", "vehicle", "figures", "runs", "program", "live",
+        "machine", "cosim", "vehicle", "figures", "runs", "program", "live",
         "exchange", "studies", "paper", "commands",
     ),
     "fmus": (
         "ports", "language", "components", "kinds", "discovery", "documentation", "script",
-        "compilers", "python", "trial", "native", "check", "build",
+        "python", "trial", "native", "check", "build",
     ),
 }  # fmt: skip
 
 #: What a package may import besides itself and the standard library.
 ALLOWED = {
     "auv_fmu": set(),
-    "fmus": {"auv_fmu", "markdown_it", "pythonfmu"},
+    "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
     "orchestrator": {
         "auv_fmu", "dask", "distributed", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
         "matplotlib", "numpy", "onnx", "pandas", "PIL", "platformdirs", "pyarrow",
@@ -47,19 +47,14 @@ ALLOWED = {
 FOREIGN = ("exchange", "hosts", "drivers")
 
 #: What else may be imported of `fmus`: how FMUs run, and PythonFMU, stays out of the process.
-DECLARED = re.compile(
-    r"fmus\.(compilers|kinds|discovery|ports|language\.build\.Untranslatable)(\.|$)"
-)
+DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|language\.build\.Untranslatable)(\.|$)")
 
 #: What those import besides that translate components or indices.
 TRANSLATED = re.compile(r"fmus\.(documentation|language|native|script)(\.|$)")
 TRANSLATING = (("program",), ("vehicle", "compiled_reducers"))
 
-#: What of it knows no component: C is compiled in the same way here and there.
-COMPILERS = ("fmus", "compilers")
-
-#: Rooms that run any system.
-GENERAL = ("machine", "system", "formats", "master")
+#: Rooms that run any system. Components are built with the lower one.
+GENERAL = ("machine", "cosim")
 
 
 def folder_of(package: str) -> Path:
@@ -151,8 +146,13 @@ def named_in(package: str) -> list[str]:
 def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
     for path, name in modules("orchestrator"):
         if name and name[0] in GENERAL:
-            others = {imported[0] for imported in imports(path) if imported[:2] != COMPILERS}
-            assert others.isdisjoint(("auv_fmu", "fmus")), path
+            assert {one[0] for one in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
+
+
+def test_components_are_built_with_the_lowest_room_of_the_orchestrator_only():
+    for path, _ in modules("fmus"):
+        rooms = {one[1] for one in imports(path) if one[0] == "orchestrator"}
+        assert rooms <= {"machine"}, path
 
 
 def is_translating(name: tuple[str, ...]) -> bool:
@@ -175,7 +175,7 @@ def test_what_components_declare_brings_no_pythonfmu_into_the_process():
         if is_translating(name)
     ]
     declared = ", ".join([*components().values(), *rooms])
-    code = f"import sys, fmus.compilers, fmus.kinds, fmus.discovery, {declared}; "
+    code = f"import sys, fmus.kinds, fmus.discovery, {declared}; "
     code += "from fmus.discovery import fingerprint; fingerprint('python'); "
     code += "sys.exit('pythonfmu' in sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
@@ -219,13 +219,12 @@ def test_no_modules_import_each_other():
         list(TopologicalSorter(needs).static_order())
 
 
-#: What tells one operating system from another, and the module of the orchestrator that may ask.
+#: What tells one operating system from another, and the modules of the orchestrator that may ask.
 ASKS = {("os", "name"), ("sys", "platform"), ("platform", "system"), ("sys", "getwindowsversion")}
-OPERATING_SYSTEM = ("machine", "operating_system")
+ASKING = {("machine", name) for name in ("compilers", "operating_system", "platforms")}
 
 
-def test_one_module_asks_which_operating_system_there_is():
-    """What is below the orchestrator asks for itself: fmus.kinds, fmus.compilers, the loader."""
+def test_the_lowest_room_asks_which_operating_system_there_is():
     asking = {
         name
         for path, name in modules("orchestrator")
@@ -233,9 +232,9 @@ def test_one_module_asks_which_operating_system_there_is():
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name)
         and (node.value.id, node.attr) in ASKS
     }  # fmt: skip
-    assert asking == {OPERATING_SYSTEM}
+    assert asking == ASKING
     for path, name in modules("orchestrator"):
-        assert not imports(path) & ASKS, f"{path} imports what only one module may ask"
-        if name != OPERATING_SYSTEM:
+        assert not imports(path) & ASKS, f"{path} imports what the lowest room may ask"
+        if name != ("machine", "operating_system"):
             alone = {("fcntl",), ("msvcrt",), ("_winapi",), ("termios",)}
             assert not imports(path) & alone, f"{path} imports what one system has"

@@ -17,10 +17,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from fmus import check
-from fmus.compilers import machines_compiler
 from fmus.script import source_of_script
 from fmus.trial import run
 from fuzz.components import difference
+from orchestrator.machine.compilers import machines_compiler
 from support.language import module_of
 from support.tiers import slow
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orchestrator.system.structure import System, renamed
+from orchestrator.cosim.system.structure import System, renamed
 
 
 def fleet_of(one: System, n: int, between: str = ".") -> System:

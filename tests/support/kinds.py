@@ -9,15 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from fmus.kinds import NATIVE, PYTHON
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.observer import Ending
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.names import port_name
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.names import port_name
 
 #: The fixtures with the FMUs of each kind.
 FIXTURES = {PYTHON: "dist", NATIVE: "native"}

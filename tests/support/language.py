@@ -15,7 +15,6 @@ from types import FunctionType, ModuleType
 from typing import Any
 
 from auv_fmu.language.arrays import Matrix, Vector
-from fmus.compilers import SAME_NUMBERS
 from fmus.language.build import Program
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from fmus.language.tree import Function
@@ -24,6 +23,7 @@ from fmus.native.emit import Emitter, members
 from fmus.native.names import RUNTIME, in_c
 from fmus.ports.groups import hints_of
 from fmus.ports.port import Refusal
+from orchestrator.machine.compilers import SAME_NUMBERS
 
 #: As FMUs are compiled.
 FLAGS = ("-std=c99", *SAME_NUMBERS, "-fPIC", "-shared")

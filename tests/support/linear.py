@@ -8,14 +8,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
 from support.small_fmus import description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("linear.c")

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 from hypothesis import strategies as st
 
-from orchestrator.master.hooks.events import Alter, Event
-from orchestrator.system.connection import Connection
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped
+from orchestrator.cosim.hooks.events import Alter, Event
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped
 from support.small_fmus import (
     connected,
     constants,

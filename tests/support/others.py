@@ -5,10 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.observers.table import Table
-from orchestrator.system.structure import System
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.structure import System
 from support.runs import run_table
 from support.small_fmus import connected, description, enumeration, unknown, variable, write
 

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.compilers import EXPORTED, FLAGS, machines_compiler
+from orchestrator.machine.compilers import EXPORTED, FLAGS, machines_compiler
 from orchestrator.program.writer import Text
-from orchestrator.system.values import items_of
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
 
@@ -53,7 +52,7 @@ def values_of(text: Text) -> list[float]:
     system, found = text.plan.system, []
     for name in text.parameters:
         value = system.value(name)
-        items = items_of(system.components[name.component].variables[name.port])
+        items = system.components[name.component].variables[name.port].items
         found.append(0.0 if value is None else float(items.get(value, value)))
     return found
 

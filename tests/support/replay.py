@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fmus.compilers import machines_compiler
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.table import Table
-from orchestrator.system.structure import System
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.structure import System
+from orchestrator.machine.compilers import machines_compiler
 
 #: How the host calls the types of FMI.
 _LETTERS = {"Real": "R", "Integer": "I", "Enumeration": "I", "Boolean": "B"}

@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.master.experiment import Experiment, Order
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.hooks.hook import Hook
-from orchestrator.master.loop import choose_loop
-from orchestrator.master.observers.files import CsvFile
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
+from orchestrator.cosim.experiment import Experiment, Order
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.hooks.hook import Hook
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
 
 

@@ -14,11 +14,11 @@ from zipfile import ZipFile
 
 import pytest
 
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
 
 _HERE = Path(__file__).parent
 

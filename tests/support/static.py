@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.master.fmi.instance import Part
-from orchestrator.system.structure import System
-from orchestrator.system.values import StringTable
+from orchestrator.cosim.fmi.instance import Part
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import StringTable
 from support.archives import fmu, variable
 from support.small_fmus import connected
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.language.quantities import ETA, NU, TAU
-from orchestrator.master.experiment import FEEDTHROUGH, Experiment, Order
-from orchestrator.master.observers.observer import Header
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName, port_name
+from orchestrator.cosim.experiment import FEEDTHROUGH, Experiment, Order
+from orchestrator.cosim.observers.observer import Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 COLUMNS = (

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import fmpy
 
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
 from support.small_fmus import connected, description_of_fmi3, write
 
 _SOURCE = Path(__file__).with_name("typed.c")

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.formats.ssp.reader import read_ssp
+from orchestrator.cosim.formats.ssp.reader import read_ssp
+from orchestrator.cosim.system.component import read_component
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
-from orchestrator.system.component import read_component
 from support.archives import component, described, system
 from support.texts import mentions
 

@@ -16,13 +16,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmus.compilers import machines_compiler
 from fmus.kinds import AUTO
 from orchestrator import sweep
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.cosim.experiment import FEEDTHROUGH, JACOBI, Order
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, JACOBI, Order
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import Prepared
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
@@ -31,8 +33,6 @@ from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
 from support import largest_depth, others
 from support.runs import prepared, whole
 from support.texts import mentions

@@ -13,8 +13,8 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.tables import read_columns, read_rows
 from orchestrator.runs.result import Result
+from orchestrator.runs.tables import read_columns, read_rows
 from support.texts import mentions
 
 #: Communication step of the scenarios [s].

@@ -13,19 +13,18 @@ import pytest
 
 from orchestrator.commands import check
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp import STRUCTURE
-from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.cosim.formats.ssp import STRUCTURE
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names
 from orchestrator.runs.simulate import simulate
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.graph import unfed_inputs
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from support.others import build
 from support.own import write
 from support.texts import mentions
@@ -223,13 +222,13 @@ def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
     )
     system = System("open", {"a": a, "b": b}, ())
     ours = "nothing feeds or sets a.y.*, a.mode, a.on, a.said, b.u and 3 more"
-    assert unfed_inputs(system) == f'{ours}; wire "a.y" = "b.y"'
+    assert system.unfed_inputs() == f'{ours}; wire "a.y" = "b.y"'
     twice = replace(system, components={"a": a, "b": b, "c": replace(b, name="c")})
-    assert "wire" not in str(unfed_inputs(twice))
+    assert "wire" not in str(twice.unfed_inputs())
     fed = Connection(PortName("b", "y.y"), PortName("d", "y.y"))
     other = replace(system, components={"a": a, "b": b, "d": replace(a, name="d")})
-    assert '"a.y" = "b.y"' in str(unfed_inputs(other))
-    assert "wire" not in str(unfed_inputs(replace(other, connections=(fed,))))
+    assert '"a.y" = "b.y"' in str(other.unfed_inputs())
+    assert "wire" not in str(replace(other, connections=(fed,)).unfed_inputs())
 
 
 @pytest.mark.parametrize(

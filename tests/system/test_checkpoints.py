@@ -13,12 +13,12 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.hooks.hook import Run
-from orchestrator.master.observers.observer import Ending
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim.hooks.hook import Run
+from orchestrator.cosim.observers.observer import Ending
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.system.structure import System
 from support import others, typed
 from support.fleets import fleet_of
 from support.machine import contents, ended, eventually, forked, killed_at, start

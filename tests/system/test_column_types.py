@@ -19,14 +19,14 @@ from hypothesis import strategies as st
 
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.formats.ssp.reader import read_ssp
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system.values import Value
 from orchestrator.exchange.verify import verify
-from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.formats.ssp.writer import write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import port_name
-from orchestrator.system.units import Linear, Mapped
-from orchestrator.system.values import Value
 from support import typed
 from support.texts import mentions
 

@@ -10,11 +10,11 @@ import pytest
 from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Slave, fmi2Discard, fmi2LastSuccessfulTime
 
-from orchestrator.master.experiment import ORDERS
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
+from orchestrator.cosim.experiment import ORDERS
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from support.others import WAYS, build, run, system_of
 from support.texts import mentions, tells
 from support.tiers import slow

@@ -19,9 +19,9 @@ from auv_fmu.paper import output_feedback, plant
 from auv_fmu.paper.disturbance import disturbance
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import FEEDTHROUGH, JACOBI
+from orchestrator.cosim.observers.table import Table
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, JACOBI
-from orchestrator.master.observers.table import Table
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request

@@ -12,14 +12,14 @@ import pytest
 
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.hooks.hook import Run
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import identity, make_plan
-from orchestrator.master.simulation import simulate_plan
-from orchestrator.system.structure import System
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim.hooks.hook import Run
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import identity, make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.structure import System
 from support.linear import Part, linear, system_of
 from support.texts import mentions
 

@@ -10,8 +10,8 @@ import pytest
 
 from orchestrator import load, read, simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.system.structure import System
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.system.structure import System
 from support.fleets import fleet_of
 
 STOP = 1.0

@@ -14,16 +14,16 @@ import pytest
 
 from orchestrator import read
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp.writer import write_ssp
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.hooks.timing import Playback
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.master.hooks.timing import Playback
 from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Inputs, read_inputs
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear
 from support.others import WAYS, build, run, system_of
 from support.texts import mentions, tells
 

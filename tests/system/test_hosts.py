@@ -17,16 +17,16 @@ import pytest
 from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import JACOBI, Experiment
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.hosts import comparison, here
 from orchestrator.exchange.hosts.comparison import HOSTS, Host, compare
 from orchestrator.exchange.hosts.environments import folder_of, is_whole
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import JACOBI, Experiment
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from support import small_fmus
 from support.fleets import fleet_of
 from support.small_fmus import connected, description, unknown, variable, write

@@ -17,19 +17,19 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.formats.tables import read_rows
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.observers.observer import Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError, StartError
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.loop import choose_loop
-from orchestrator.master.observers.observer import Header
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
+from orchestrator.runs.tables import read_rows
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import read_component
-from orchestrator.system.structure import System
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
 from support.machine import LOOPS, contents, start
 from support.runs import run_table, whole

@@ -14,16 +14,16 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from fmus.compilers import FLAGS, machines_compiler
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
+from orchestrator.cosim.observers.observer import Ending
+from orchestrator.cosim.observers.table import Table
 from orchestrator.live import assembly, module, presets
 from orchestrator.live.assembly import ENGINE, live_page
 from orchestrator.live.module import live_module
 from orchestrator.live.presets import page_data, preset, runs_of
+from orchestrator.machine.compilers import FLAGS, machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.observer import Ending
-from orchestrator.master.observers.table import Table
 from orchestrator.runs import bundle
 from orchestrator.runs.own_components import new_controller
 from orchestrator.runs.preparation import Prepared

@@ -16,21 +16,21 @@ from hypothesis import strategies as st
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, JACOBI, ORDERS, Experiment
+from orchestrator.cosim.fmi.instance import Ended
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.hooks.events import Alter, Event, Events
+from orchestrator.cosim.hooks.hook import NEVER, Run
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import StartError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, JACOBI, ORDERS, Experiment
-from orchestrator.master.fmi.instance import Ended
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.hooks.events import Alter, Event, Events
-from orchestrator.master.hooks.hook import NEVER, Run
-from orchestrator.master.loop import choose_loop
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 from support.runs import run_table
@@ -87,7 +87,7 @@ def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -
 def test_random_systems_give_the_same_rows_and_the_same_failures(
     folder, arguments, step, n, rest, order, rows
 ):
-    with patch("orchestrator.master.observers.observer._ROWS", rows):
+    with patch("orchestrator.cosim.observers.observer._ROWS", rows):
         same(system_of(folder, **arguments), Experiment((n + rest) * step, step, order))
 
 

@@ -23,11 +23,11 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
-from orchestrator.formats.tables import read_rows
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import record
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.record import read_result
+from orchestrator.runs.tables import read_rows
 from support.machine import (
     LOOPS,
     called,

@@ -16,21 +16,21 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from fmpy.util import read_csv
 
-from orchestrator.formats.ssp.reader import read_ssp
-from orchestrator.formats.ssp.writer import ssp_bytes
-from orchestrator.formats.tables import read_columns, read_rows
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.fmi.binary import check_place
+from orchestrator.cosim.formats.ssp.reader import read_ssp
+from orchestrator.cosim.formats.ssp.writer import ssp_bytes
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan, stages
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.binary import check_place
-from orchestrator.master.loop import choose_loop
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan, stages
-from orchestrator.master.simulation import simulate_plan
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
+from orchestrator.runs.tables import read_columns, read_rows
 from support.machine import LOOPS
 from support.runs import run, write
 from support.texts import mentions

@@ -21,10 +21,10 @@ from fmpy.validation import validate_fmu
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.master.experiment import GAUSS_SEIDEL, JACOBI
+from orchestrator.cosim.experiment import GAUSS_SEIDEL, JACOBI
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.variables import Variable
 from orchestrator.runs.result import Result
-from orchestrator.system.names import PortName
-from orchestrator.system.values import typed
 from support.texts import mentions
 
 #: Communication step of the scenarios [s], and how many steps are compared.
@@ -262,7 +262,7 @@ def test_its_variables_are_those_of_the_components(workplace: Path):
 
 def start_of(variable: Any) -> Any:
     """A start value as a system has it."""
-    return typed(variable.name, variable, variable.start)
+    return Variable.of(variable).typed(variable.start, variable.name)
 
 
 def inputs(system: Any, name: str) -> list[str]:

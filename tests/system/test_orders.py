@@ -12,19 +12,18 @@ import pytest
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import delays, make_plan, stages
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment, decimations
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import delays, make_plan, stages
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.simulate import simulate as simulated
-from orchestrator.system.graph import delayed_connections
-from orchestrator.system.structure import System
 from support.relay import relay, system_of
 from support.runs import whole as run
 from support.texts import mentions
@@ -91,7 +90,7 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     else:
         order = ("disturbance", "planner", *order)
     table = run(system, replace(experiment, order=order))
-    same = delayed_connections(system, order) == []
+    same = system.delayed_connections(order) == []
     assert same == (order[-1] == "plant")
     assert (table.rows.tobytes() == derived.rows.tobytes()) == same
 
@@ -122,7 +121,7 @@ def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
     def decimations_of(system: System, **stated: object) -> tuple[float, dict[str, int]]:
         prepared = prepare(Scenario("s"), system, Request(**stated))
         step = prepared.experiment.step
-        return step, decimations(prepared.system, step)
+        return step, prepared.system.decimations(step)
 
     assert decimations_of(system) == (0.01, {"a": 2, "b": 5, "c": 1})
     assert decimations_of(system, steps={"b": 0.1}) == (0.02, {"a": 1, "b": 5, "c": 1})

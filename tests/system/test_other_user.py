@@ -14,10 +14,10 @@ from uuid import uuid4
 
 import pytest
 
+from orchestrator.cosim import stepper
 from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.machine.disk import process_folder, sealed
 from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, locate
-from orchestrator.master import stepper
 from orchestrator.studies.sweep import making_runs
 from support.machine import called
 from support.texts import mentions

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from fmus.discovery import origin_of
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
 from support.own import write
 from support.texts import mentions
 

@@ -11,12 +11,12 @@ import pytest
 from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import Waypoints
 from orchestrator.commands.main import main
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import impossible_paths, read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import tracking_error
 from support.archives import fmu, variable
 from support.runs import run

@@ -13,13 +13,13 @@ from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
 from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import INITIAL, ORDERS, OrderName
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import INITIAL, ORDERS, OrderName
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import read_component
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from reference import reference_outputs
 from support.runs import run, write
 from support.texts import mentions, numbers_in, tells

@@ -21,10 +21,11 @@ from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
 from auv_fmu import __version__
-from fmus.kinds import FMI_VERSIONS, platforms
+from fmus.kinds import FMI_VERSIONS
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.live import assembly, module
+from orchestrator.machine.platforms import platforms
 from orchestrator.runs import bundle
 from ready_wheel import write_wheel
 from support.live import needs_npm, needs_zig

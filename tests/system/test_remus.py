@@ -10,8 +10,8 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.observers.table import Table
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.table import Table
 from orchestrator.runs.record import loops_in
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop

@@ -17,14 +17,14 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.tables import read_columns, read_rows
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.plan import make_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.plan import make_plan
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import read_result
 from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.studies.engine import FmuEngine, Point
 from support.others import build, system_of
 from support.texts import mentions

@@ -11,18 +11,18 @@ import fmpy
 import numpy as np
 import pytest
 
+from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.fmi.instance import ComponentFailed
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim.hooks.hook import Run
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.stepper import compile_stepper
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import ORDERS, Experiment
-from orchestrator.master.fmi.instance import ComponentFailed
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.hooks.checkpoint import Checkpoints
-from orchestrator.master.hooks.hook import Run
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
-from orchestrator.master.stepper import compile_stepper
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
 from support.runs import run_table
 from support.runs import whole as run

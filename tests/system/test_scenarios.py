@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
 from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,
@@ -19,7 +20,6 @@ from orchestrator.paper.measures import (
 )
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.names import PortName
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates

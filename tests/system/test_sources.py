@@ -8,12 +8,12 @@ from zipfile import ZipFile
 
 import pytest
 
-from fmus.compilers import machines_compiler
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.fmi import binary
 from orchestrator.machine import user_files
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.master.fmi import binary
 from support.relay import relay
 
 SUPPORT = Path(__file__).parents[1] / "support"

@@ -10,9 +10,9 @@ from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.ssp.writer import structure_xml, write_ssp
+from orchestrator.cosim.formats.ssp.writer import structure_xml, write_ssp
+from orchestrator.cosim.system.structure import renamed
 from orchestrator.machine.errors import InputError
-from orchestrator.system.structure import renamed
 from support.archives import (
     archive,
     binding,

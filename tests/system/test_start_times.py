@@ -20,19 +20,19 @@ from hypothesis import strategies as st
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.observers.observer import Ending, Header, Selection
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import Value
 from orchestrator.figures.drawing import compose
 from orchestrator.figures.plot import plot
 from orchestrator.figures.run_figures import FIGURES
-from orchestrator.formats.ssp.writer import write_ssp
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.fmi.isolated import Isolation
-from orchestrator.master.observers.observer import Ending, Header, Selection
-from orchestrator.master.observers.table import Table
 from orchestrator.runs.record import read_result
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.study_result import StudyResult
-from orchestrator.system.structure import System
-from orchestrator.system.values import Value
 from support import linear, relay, typed
 from support.runs import run_table
 from support.texts import mentions

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.formats.tables import read_rows
+from orchestrator.runs.tables import read_rows
 from support.machine import contents
 from support.texts import mentions
 

@@ -10,9 +10,9 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System, renamed
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System, renamed
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.proof import certificates, gain_check

@@ -12,17 +12,17 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from orchestrator.commands.main import main
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.hooks.events import Events
+from orchestrator.cosim.observers.files import CsvFile, ParquetFile
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks.events import Events
-from orchestrator.master.observers.files import CsvFile, ParquetFile
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.scenario_events import read_events
-from orchestrator.system.names import port_name
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear
 from support import others, typed
 from support.others import WAYS
 from support.runs import run_table

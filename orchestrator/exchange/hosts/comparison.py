@@ -18,15 +18,15 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.cosim.experiment import FULL, JACOBI, NONE, ZERO, Experiment, read_order
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.hosts import drivers, here
 from orchestrator.exchange.hosts.environments import python_with
 from orchestrator.exchange.verify import ways
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line
-from orchestrator.master.experiment import FULL, JACOBI, NONE, ZERO, Experiment, read_order
-from orchestrator.master.observers.table import Table
-from orchestrator.system.structure import System
 
 #: Largest deviation that is rounding: many tools add up their time.
 BOUND = 1e-9

@@ -19,12 +19,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.formats.osp import write_osp
+from orchestrator.cosim.formats.ssp.writer import PARAMETER_SET, write_ssp
+from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.hosts.drivers import write_rows
-from orchestrator.formats.osp import write_osp
-from orchestrator.formats.ssp.writer import PARAMETER_SET, write_ssp
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
-from orchestrator.system.structure import System, flattened
 
 #: In the folder: what is run, and where files for the tool go.
 GIVEN, _EXPORT = "given", "export"
@@ -54,7 +54,7 @@ class Ran(NamedTuple):
 def real_outputs(system: System) -> list[tuple[str, str, int]]:
     """Component, port and value reference of every Real output."""
     return [
-        (component.name, variable.name, variable.valueReference)
+        (component.name, variable.name, variable.reference)
         for component in system.components.values()
         for variable in component.having("output")
         if variable.type in _NUMBERS
@@ -134,7 +134,7 @@ def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) 
 def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
     check_choices(system, "libcosim")
     # Of an SSP it reads the components of the outermost system only, as does ecos.
-    system = flattened(system)
+    system = system.flattened()
     [path] = write_ssp(system, folder, flat=True)
     return _libcosim(system, experiment, "from_ssp_file", ssp_path=str(path))
 
@@ -153,7 +153,7 @@ def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     ecospy = importlib.import_module("ecospy")
-    system = flattened(system)
+    system = system.flattened()
     names = _names(system, "::")
     parameter_set = {"parameter_set": PARAMETER_SET} if system.parameters else {}
     with _ecos_simulation(ecospy, system, experiment, folder) as simulation:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from fmus import check
-from fmus.compilers import machines_compiler
 from fmus.native import packaging
+from orchestrator.machine.compilers import machines_compiler
 from support.own import write
 
 

@@ -9,9 +9,9 @@ import fmpy
 import pytest
 
 from fmus.build import FAILED, main
-from fmus.compilers import machines_compiler
 from fmus.discovery import source_of
 from fmus.script import is_component, script_in, source_of_script
+from orchestrator.machine.compilers import machines_compiler
 from support.own import write
 
 SLAVE = "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    pass\n"

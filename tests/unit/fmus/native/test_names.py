@@ -15,13 +15,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fmus.compilers import SAME_NUMBERS, machines_compiler
 from fmus.discovery import source_of
 from fmus.language.tree import Constant, Do, Function
 from fmus.language.types import FLOAT, INT, Array, Record, type_of
 from fmus.native.emit import Emitter
 from fmus.native.names import in_c
 from fmus.native.packaging import sources
+from orchestrator.machine.compilers import SAME_NUMBERS, machines_compiler
 
 ZIG = (sys.executable, "-m", "ziglang", "cc", "-target")
 COMMANDS = {

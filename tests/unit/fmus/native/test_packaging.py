@@ -6,11 +6,11 @@ from xml.etree import ElementTree
 
 import pytest
 
-from fmus.compilers import Compiler
 from fmus.discovery import source_of
-from fmus.kinds import platforms
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
+from orchestrator.machine.compilers import Compiler
+from orchestrator.machine.platforms import platforms
 from support.settings import NAMES
 
 PLANT = source_of("AuvPlant").definition

@@ -7,7 +7,6 @@ from typing import Any
 from xml.etree import ElementTree
 
 from auv_fmu import __version__
-from fmus.kinds import TARGETS
 from fmus.ports.definition import DefaultExperiment, Definition, Origin
 from fmus.ports.description_fmi3 import (
     fmi3_build_description,
@@ -16,6 +15,7 @@ from fmus.ports.description_fmi3 import (
     variables_of,
 )
 from fmus.ports.port import FAULT, TIME, Array, Port
+from orchestrator.machine.platforms import TARGETS
 
 REAL = ("continuous", "Real")
 PORTS = (

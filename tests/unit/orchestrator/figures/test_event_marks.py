@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from orchestrator.cosim.observers.observer import Ending, Occurrence
+from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.drawing import compose, save
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn
-from orchestrator.master.observers.observer import Ending, Occurrence
-from orchestrator.master.observers.table import Table
 from support.tables import loop_table
 
 

@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from orchestrator.cosim.observers.observer import Ending, Occurrence
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.observer import Ending, Occurrence
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import Loop
 from support.tables import loop_table, table_of
 

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.cosim.experiment import GAUSS_SEIDEL
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import port_name
 from orchestrator.figures.drawing import compose, draw, overlay
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import GAUSS_SEIDEL
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD
 from support.machine import contents
 from support.tables import at_its_time, loop_table

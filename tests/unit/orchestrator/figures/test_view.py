@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from orchestrator.cosim.observers.observer import Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import port_name
 from orchestrator.figures.page_series import extremes
 from orchestrator.figures.style import REFERENCE, Drawn, vehicle_colours
 from orchestrator.figures.view import view_page
 from orchestrator.machine.errors import InputError
-from orchestrator.master.observers.observer import Header
-from orchestrator.master.observers.table import Table
-from orchestrator.system.names import port_name
 from orchestrator.vehicle.signals import STANDARD
 from support.tables import fleet, fleet_table, loop_table
 

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.figures.visible import VisibleRows, chatters, draw_signal, moving_mean
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending, Header
 
 #: Rows of runs that are kept whole, and how many divisions they are first divided into.
 WHOLE, DIVISIONS = 20_000, 200

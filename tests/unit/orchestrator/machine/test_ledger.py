@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.machine.disk import sealed, unsealed
+from orchestrator.machine.file_names import file_name
 from orchestrator.machine.ledger import LEDGER, RECORD, Ledger, Taken, is_changed, move_aside
-from orchestrator.system.names import file_name
 from support.machine import contents
 
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from auv_fmu.paper.vehicle import Vehicle, accelerations
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
 from orchestrator.paper import claims
 from orchestrator.paper.claims import CLAIMS, Claim
 from orchestrator.paper.kept_runs import KeptRun
@@ -20,7 +21,6 @@ from orchestrator.paper.measures import (
     total_variation_until,
     turning_radius,
 )
-from orchestrator.system.names import PortName
 from orchestrator.vehicle.signals import STANDARD
 from support.tables import table_of
 from support.texts import numbers_in, tells

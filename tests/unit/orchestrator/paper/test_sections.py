@@ -6,12 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import port_name
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.sections import draw_section, section_text, sections
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
-from orchestrator.system.names import port_name
 
 INDICES = {
     "stop_time": 3.0,

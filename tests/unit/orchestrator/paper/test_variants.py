@@ -7,6 +7,7 @@ import csv
 import numpy as np
 import pytest
 
+from orchestrator.cosim.system.names import port_name
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     END_TIMES,
@@ -29,8 +30,6 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.system.names import port_name
-from orchestrator.system.values import named
 from orchestrator.vehicle.signals import STANDARD, tracking_error
 from support.tables import table_of
 from support.variants import (
@@ -311,4 +310,4 @@ def test_every_option_changes_the_system(scenario, option):
         changed = system.with_parameters({port_name(name): value})
         variable = system.component(port_name(name).component).variable(port_name(name).port)
         assert changed.value(port_name(name)) != system.value(port_name(name))
-        assert named(variable, changed.value(port_name(name))) == value
+        assert variable.shown(changed.value(port_name(name))) == value

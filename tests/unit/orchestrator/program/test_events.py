@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fmus.compilers import machines_compiler
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.hooks.events import (
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.hooks.events import (
     MOST_LISTED,
     Action,
     Alter,
@@ -23,8 +22,9 @@ from orchestrator.master.hooks.events import (
     Stop,
     occurrence,
 )
-from orchestrator.master.observers.observer import Occurrence
-from orchestrator.master.observers.table import Table
+from orchestrator.cosim.observers.observer import Occurrence
+from orchestrator.cosim.observers.table import Table
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario

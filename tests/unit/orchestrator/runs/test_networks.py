@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 from fmus.build import source_of_script
-from fmus.compilers import machines_compiler
 from fmus.language import types
 from fmus.native.translator import translated
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import networks
 from orchestrator.runs.networks import ACTIVATIONS, Dense, Network, component_text, read_network

@@ -13,9 +13,9 @@ import fmpy
 import pytest
 from fmpy.validation import validate_fmu
 
-from fmus.compilers import machines_compiler
 from fmus.kinds import NATIVE, PYTHON
 from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import own_components
 from orchestrator.runs.own_components import (

@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
+from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import check_brings_its_own, is_path, left_behind, read_fmu
 from orchestrator.runs.preparation import DEFAULT_STEP, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
-from orchestrator.system.component import read_component
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
 from support.archives import fmu, variable
 
 K = PortName("a", "k")

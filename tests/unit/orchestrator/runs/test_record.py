@@ -12,9 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import Experiment
-from orchestrator.master.observers.observer import Ending, Header, Occurrence
 from orchestrator.runs import record
 from orchestrator.runs.record import (
     Stopwatch,
@@ -30,8 +32,6 @@ from orchestrator.runs.record import (
     read_result,
     write_content,
 )
-from orchestrator.system.names import PortName
-from orchestrator.system.structure import System
 from orchestrator.vehicle.signals import STANDARD, Loop
 from support.linear import SINE, linear, system_of
 from support.texts import mentions

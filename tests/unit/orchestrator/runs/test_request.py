@@ -15,7 +15,7 @@ import pytest
 from orchestrator import simulate, sweep
 from orchestrator.commands.many_runs import add_sweep
 from orchestrator.commands.run_command import add_run
-from orchestrator.master.experiment import ORDERS
+from orchestrator.cosim.experiment import ORDERS
 from orchestrator.runs.request import Files, Request, option_fields
 from orchestrator.studies.sweep import Means
 

@@ -16,9 +16,9 @@ from hypothesis import strategies as st
 import orchestrator
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import save
 from orchestrator.machine.libraries import find_compiler
-from orchestrator.system.names import PortName
 from support.tiers import slow
 
 

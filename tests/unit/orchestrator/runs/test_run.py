@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.run import selected_columns
-from orchestrator.system.structure import System
 from support.archives import fmu, variable
 from support.small_fmus import connected
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.cosim.system.names import port_name
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
@@ -21,7 +22,6 @@ from orchestrator.runs.scenario import (
     read_scenario,
 )
 from orchestrator.runs.scenario_file import ScenarioFile
-from orchestrator.system.names import port_name
 from support.texts import mentions
 
 TEXT = """

@@ -8,15 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.cosim.hooks.events import Alter, Freeze, Set
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.master.hooks.events import Alter, Freeze, Set
 from orchestrator.runs.loading import load
 from orchestrator.runs.scenario import check_events, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
-from orchestrator.system.connection import Connection
-from orchestrator.system.names import PortName, port_name
-from orchestrator.system.structure import System
-from orchestrator.system.units import Linear, Mapped
 from support.texts import mentions
 
 

@@ -8,10 +8,10 @@ from zipfile import ZipFile
 import pytest
 
 from orchestrator.commands.check import surprises
+from orchestrator.cosim.system.component import read_component
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.system.component import read_component
 from support.small_fmus import description_of_fmi3, write
 from support.texts import mentions
 

@@ -12,13 +12,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from orchestrator.cosim.system.structure import renamed
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS
 from orchestrator.studies.study_file import study_of
-from orchestrator.system.structure import renamed
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 

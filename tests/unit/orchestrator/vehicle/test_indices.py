@@ -13,20 +13,20 @@ import pytest
 from fmus.language.build import Program
 from fmus.ports.reducer import read_reducer
 from orchestrator import simulate as run
+from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.figures.study_values import Values
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
-from orchestrator.master.loop import choose_loop
-from orchestrator.master.observers.observer import Ending, Header
-from orchestrator.master.observers.table import Table
-from orchestrator.master.plan import make_plan
-from orchestrator.master.simulation import simulate_plan
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import open_store
 from orchestrator.studies.study_file import study_of
 from orchestrator.studies.study_result import StudyResult
-from orchestrator.system.names import PortName, port_name
 from orchestrator.vehicle import index
 from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of

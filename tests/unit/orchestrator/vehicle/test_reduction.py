@@ -12,10 +12,10 @@ import pytest
 
 from auv_fmu import Variable
 from fmus.ports.reducer import read_reducer
+from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment, Order
+from orchestrator.cosim.observers.observer import Header
+from orchestrator.cosim.system.names import port_name
 from orchestrator.machine.errors import InputError
-from orchestrator.master.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment, Order
-from orchestrator.master.observers.observer import Header
-from orchestrator.system.names import port_name
 from orchestrator.vehicle import compiled_reducers, reduction
 from orchestrator.vehicle.cautions import WATCHED
 from orchestrator.vehicle.compiled_reducers import library_of

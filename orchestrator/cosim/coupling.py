@@ -1,0 +1,336 @@
+"""How components are coupled: at the start, and in every step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from ctypes import c_double
+from dataclasses import replace
+
+from orchestrator.cosim.experiment import (
+    DELAY,
+    FEEDTHROUGH,
+    FULL,
+    GAUSS_SEIDEL,
+    LINEAR,
+    NONE,
+    OURS,
+    SOLVE,
+    Exchange,
+    Order,
+)
+from orchestrator.cosim.fmi.instance import ComponentFailed, Instance, Log
+from orchestrator.cosim.plan import Plan, delays, stages
+from orchestrator.cosim.ring import Ring, why_not_following
+from orchestrator.cosim.row import Gathering, Row
+from orchestrator.cosim.schedule import (
+    Schedule,
+    Stage,
+    StageCall,
+    member,
+    schedule,
+    step_members,
+)
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.machine.errors import InputError, StartError, shortened
+
+#: Values go along all connections so often, until they rest.
+_MOST_ROUNDS = 1000
+
+
+class _Single:
+    """A component of no ring: see :class:`.ring.Ring`."""
+
+    def __init__(self, system: System, instance: Instance, row: Row) -> None:
+        self.names = [instance.name]
+        self._instance, self._row = instance, row
+        self._gather = Gathering.along(row, system.feeding[instance.name])
+        self.gatherings = [self._gather]
+
+    def renew(self, always: bool = False) -> bool:
+        values, targets = self._row.values, self._gather.targets
+        before = values[targets]
+        self._gather(values)
+        if not always and before.tobytes() == values[targets].tobytes():
+            return False
+        self._instance.exchange()
+        self._row.show(self._instance.name)
+        return True
+
+
+class _Settling:
+    """Values handed along all connections at one time, until every input has what feeds it."""
+
+    def __init__(self, units: Sequence[Ring | _Single], row: Row) -> None:
+        """Take what feeds each other, in the order of direct feedthroughs."""
+        self._units, self._row = units, row
+
+    @property
+    def gatherings(self) -> list[Gathering]:
+        """All that it gathers."""
+        return [gather for unit in self._units for gather in unit.gatherings]
+
+    @property
+    def places(self) -> dict[str, int]:
+        """Where in that order each component is."""
+        return {name: i for i, unit in enumerate(self._units) for name in unit.names}
+
+    def settle(self) -> None:
+        """Hand values on until they rest.
+
+        Raises:
+            ComponentFailed: they do not come to rest, or a component fails.
+
+        """
+        for _ in range(_MOST_ROUNDS):
+            before = self._row.values.copy()
+            if not self.hand_on():
+                return
+        if restless := self._row.moving(before):
+            raise ComponentFailed(
+                "an algebraic loop does not converge: the values that still change are "
+                f"{shortened(', '.join(map(str, restless)))}"
+            )
+
+    def hand_on(self, everything: bool = False) -> bool:
+        """Hand values along all connections once; whether any input has changed.
+
+        Args:
+            everything: also to components whose inputs are what they were.
+
+        """
+        changed = [unit.renew(everything) for unit in self._units]
+        return any(changed)
+
+
+class _LinearSteps:
+    """Steps in which inputs change linearly from one communication point to the next.
+
+    Every step is made twice. The first time all inputs are held, which says what they come to at
+    its end; then the components go back to its beginning, and make it with inputs that change to
+    these values. The error of what is coupled falls with the square of the step, where held inputs
+    give its first power.
+    """
+
+    def __init__(
+        self, system: System, instances: Mapping[str, Instance], row: Row, settling: _Settling
+    ) -> None:
+        self._values, self._settling = row.values, settling
+        self._all = [member(instance) for instance in instances.values()]
+        self._fed = [instance for name, instance in instances.items() if system.feeding[name]]
+        self._again = [member(instance) for instance in self._fed]
+        self._inputs = [
+            row.columns[PortName(instance.name, variable.name)]
+            for instance in self._fed
+            for variable in system.components[instance.name].having("input")
+        ]
+        #: References and columns of the inputs of each that change.
+        self._changing: list[tuple[list[int], list[int]]] = []
+        for instance in self._fed:
+            component = system.components[instance.name]
+            targets = [
+                connection.target
+                for connection in system.feeding[instance.name]
+                if component.is_continuous(connection.target.port)
+            ]
+            references = [component.variables[target.port].reference for target in targets]
+            self._changing.append((references, [row.columns[target] for target in targets]))
+
+    def step(self, t: float, h: float) -> None:
+        values = self._values
+        self._settling.settle()
+        begin = values.copy()
+        for instance in self._fed:
+            instance.keep()
+        step_members(self._all, c_double(t), c_double(h), is_final=False)
+        self._settling.settle()
+        slopes = (values - begin) / h
+        values[self._inputs] = begin[self._inputs]
+        for instance, (references, columns) in zip(self._fed, self._changing, strict=True):
+            instance.go_back()
+            instance.let_change(references, slopes[columns].tolist())
+        step_members(self._again, c_double(t), c_double(h))
+        for instance, (references, _) in zip(self._fed, self._changing, strict=True):
+            instance.let_change(references, [0.0] * len(references))
+        self._settling.settle()
+
+
+class Coupling:
+    """The rings of direct feedthroughs of a system, and what follows from them.
+
+    Attributes:
+        plan: what is run; once components are initialised, with the order that is taken.
+        sequence: all components in stages, once they are initialised.
+
+    """
+
+    def __init__(
+        self,
+        plan: Plan,
+        instances: Mapping[str, Instance],
+        row: Row,
+        log: Log,
+        exchange: Exchange = OURS,
+    ) -> None:
+        """Find the rings.
+
+        Args:
+            plan: the system, and how rings are closed.
+            instances: of its components.
+            row: that they are tied to.
+            log: takes where a ring is delayed.
+            exchange: of values.
+
+        """
+        self.plan, self._exchange = plan, exchange
+        self._system, self._experiment = plan.system, plan.experiment
+        self._instances, self._row, self._log = instances, row, log
+        self._rings = [self._ring(names) for names in plan.system.rings()]
+        self._solved: list[Ring] = []
+        self.sequence: list[list[str]] = []
+
+    def initialise(self) -> None:
+        """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
+
+        Raises:
+            InputError: the values do not come to rest, an FMU refused a value, or a ring is to be
+                solved that cannot be, or the order cannot be taken.
+            StartError: a value is not finite.
+
+        """
+        system, instances, start = self._system, self._instances, self._experiment.start_time
+        for name, instance in instances.items():
+            instance.enter_initialization(system.parameters_of(name), start)
+            self._enter(name, system.open_inputs(name))
+        if self._exchange.initial == FULL:
+            settling = self._settling(self._rings)
+            self._read_ahead(settling.places)
+            settling.hand_on(everything=True)
+            settling.settle()
+            self._check_finite()
+        for instance in instances.values():
+            instance.exit_initialization()
+        order = self._order_taken()
+        self.plan = replace(self.plan, experiment=replace(self._experiment, order=order))
+        self._solved = self._solvable(order)
+        self.sequence = self._in_stages(order, self._solved)
+        if self._exchange.initial == FULL:
+            self._settling(self._solved).hand_on(everything=True)
+        elif self._exchange.initial == NONE:
+            for name in instances:
+                self._enter(name, [port.name for port in system.components[name].having("output")])
+        self._check_finite()
+        if self._log.refusals:
+            raise InputError("; ".join(self._log.refusals))
+
+    def schedule(self) -> tuple[Schedule, list[Gathering]]:
+        """The stages of every step, and all that is gathered in one."""
+        system, instances, row = self._system, self._instances, self._row
+        if self._experiment.coupling == LINEAR:
+            settling = self._settling(self._solved)
+            steps = _LinearSteps(system, instances, row, settling)
+            stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
+            return Schedule([stage]), settling.gatherings
+        latest = bool(self._exchange.groups)
+        found = schedule(self.plan, self.sequence, instances, row, self._solved, latest=latest)
+        own = [gather for ring in self._solved for gather in ring.gatherings]
+        return found, found.gatherings + own
+
+    def delayed_ports(self) -> list[PortName]:
+        """The inputs that a ring feeds itself, for rings that are not solved as a whole."""
+        solved = [set(ring.names) for ring in self._solved]
+        left = [ring.names for ring in self._rings if set(ring.names) not in solved]
+        ring_of = {name: i for i, names in enumerate(left) for name in names}
+        return [
+            connection.target
+            for connection in self._system.connections
+            if connection.source.component in ring_of
+            and ring_of[connection.source.component] == ring_of.get(connection.target.component)
+            and self._system.has_feedthrough(connection)
+        ]
+
+    def _order_taken(self) -> Order:
+        """The order that is asked for, or else the best one that the FMUs allow.
+
+        Raises:
+            InputError: values cannot pass through an FMU, and no other order will do.
+
+        """
+        order = self._experiment.order
+        if order not in (None, FEEDTHROUGH):
+            return order
+        if self._experiment.coupling == LINEAR:
+            return GAUSS_SEIDEL
+        tried: set[str] = set()
+        for connection in self._system.connections:
+            component = self._system.components[connection.source.component]
+            # Ours do what they declare, also where nothing happens to follow, as in a calm sea.
+            if component.is_ours or component.digest in tried:
+                continue
+            if not self._system.has_feedthrough(connection):
+                continue
+            tried.add(component.digest)
+            if why := why_not_following(component, self._instances[component.name], self._row):
+                if order is None:
+                    return GAUSS_SEIDEL
+                raise InputError(f"order {FEEDTHROUGH}: {why}; --order {GAUSS_SEIDEL} runs it")
+        return FEEDTHROUGH
+
+    def _solvable(self, order: Order) -> list[Ring]:
+        """The rings that are solved in every step."""
+        system, coupling = self._system, self._experiment.coupling
+        if coupling == LINEAR:
+            # Where outputs are computed in steps only, the second one has them right.
+            return self._rings
+        reasons: dict[str, str] = {}
+        if coupling == DELAY or self._exchange.groups:
+            reasons = dict.fromkeys(system.components, "")
+        else:
+            for ring in self._rings:
+                reasons |= ring.unsolved()
+            for name, n in self.plan.decimations.items():
+                if n > 1:
+                    reasons[name] = f"{name} takes longer steps"
+        solved = system.rings(system.components.keys() - reasons.keys())
+        if coupling == SOLVE:
+            for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
+                raise InputError(f"coupling solve: {delay}")
+        for delay in delays(system, order, solved, reasons):
+            self._log.remark(delay)
+        return [self._ring(names) for names in solved]
+
+    def _ring(self, names: Sequence[str]) -> Ring:
+        return Ring(names, self._system, self._instances, self._row)
+
+    def _in_stages(self, order: Order, solved: Sequence[Ring]) -> list[list[str]]:
+        if self._exchange.groups and not isinstance(order, str):
+            return [[*group] for group in self._exchange.groups]
+        return stages(self._system, order, [ring.names for ring in solved])
+
+    def _settling(self, solved: Sequence[Ring]) -> _Settling:
+        ring_of = {ring.names[0]: ring for ring in solved}
+        units: list[Ring | _Single] = []
+        for stage in self._in_stages(GAUSS_SEIDEL, solved):
+            units += [ring_of[name] for name in stage if name in ring_of] or [
+                _Single(self._system, self._instances[name], self._row) for name in stage
+            ]
+        return _Settling(units, self._row)
+
+    def _read_ahead(self, places: Mapping[str, int]) -> None:
+        """Read outputs that feed a component before it is their own component's turn."""
+        wanted: dict[str, dict[str, None]] = {}
+        for connection in self._system.connections:
+            source, target = connection.source, connection.target
+            if places[source.component] >= places[target.component]:
+                wanted.setdefault(source.component, {})[source.port] = None
+        for name, ports in wanted.items():
+            self._enter(name, list(ports))
+
+    def _enter(self, name: str, ports: Sequence[str]) -> None:
+        """Enter the values that an FMU holds into the row."""
+        held = self._instances[name].read(ports)
+        self._row.enter({PortName(name, port): value for port, value in held.items()})
+
+    def _check_finite(self) -> None:
+        if wrong := self._row.wrong(self._instances):
+            raise StartError(f"stopped at t = {self._experiment.start_time:g} s: {wrong}")

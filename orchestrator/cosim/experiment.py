@@ -1,0 +1,215 @@
+"""Start, stop and steps of a run, t_k = k h; orders, couplings, and longer steps of components."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from math import ceil, floor, isfinite, ulp
+from numbers import Real
+from typing import Literal, NamedTuple, TypeAlias, cast, get_args
+
+from orchestrator.machine.errors import InputError
+
+#: Orders in which values pass and components are stepped; the first is the default where the FMUs
+#: allow it, else the second.
+OrderName: TypeAlias = Literal["feedthrough", "gauss-seidel", "jacobi"]
+ORDERS: tuple[OrderName, ...] = get_args(OrderName)
+FEEDTHROUGH, GAUSS_SEIDEL, JACOBI = ORDERS
+
+#: One of these, or the names of all components, one stepped after the other.
+Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
+
+#: What components have at their inputs in the first step: outputs that were exchanged in
+#: initialisation mode, outputs that were exchanged after it, or start values and zeros. The first
+#: is what we do.
+INITIAL = FULL, NONE, ZERO = "full", "none", "zero"
+
+#: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
+#: inputs that change linearly from one communication point to the next.
+CouplingName: TypeAlias = Literal["solve", "delay", "linear"]
+COUPLINGS: tuple[CouplingName, ...] = get_args(CouplingName)
+SOLVE, DELAY, LINEAR = COUPLINGS
+
+#: A rest shorter than this share of the run, and of a step, is a rounding error.
+ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
+
+#: More steps than this are taken for a mistake.
+MOST_STEPS = 1_000_000_000
+
+
+def read_order(text: str) -> Order:
+    """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+    if "," in text:
+        return tuple(name.strip() for name in text.split(","))
+    # Any other name is refused by the experiment.
+    return cast(OrderName, text)
+
+
+def format_order(order: Order | None) -> str:
+    """Write an order as a command line has it; empty: none is stated."""
+    return order if isinstance(order, str) else ",".join(order or ())
+
+
+class Exchange(NamedTuple):
+    """How values are exchanged; not every tool does it as we do, which is the default.
+
+    Attributes:
+        initial: one of :data:`INITIAL`.
+        groups: all components, those of a group stepped side by side; each group takes all outputs
+            of the groups before it as they have just computed them, not only what follows directly
+            from their inputs, and rings are delayed. Empty: as the experiment has it.
+
+    """
+
+    initial: str = FULL
+    groups: Sequence[Sequence[str]] = ()
+
+
+#: As we do it.
+OURS = Exchange()
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What to run a system for.
+
+    Attributes:
+        stop_time: end [s]; the last step is shorter if the run is not a multiple of the step.
+        step: communication step [s].
+        order: one of :data:`ORDERS`, or the names of all components, one stepped after the other;
+            None: `feedthrough` where the outputs of the FMUs follow their inputs between steps,
+            else `gauss-seidel`.
+        start_time: begin [s].
+        coupling: one of :data:`COUPLINGS`; None: rings are solved where their FMUs allow it, and
+            else delayed.
+
+    """
+
+    stop_time: float
+    step: float
+    order: Order | None = None
+    start_time: float = 0.0
+    coupling: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse what cannot be run."""
+        for name in ("start_time", "stop_time", "step"):
+            value = getattr(self, name)
+            if not isinstance(value, Real) or isinstance(value, bool):
+                raise InputError(f"times and step must be numbers, not {value!r}")
+            # numpy's numbers do not go into JSON.
+            try:
+                object.__setattr__(self, name, float(value))
+            except OverflowError:
+                raise InputError("times and step must be smaller than 1e308 s") from None
+        self.check_step(self.step)
+        if self.coupling not in (None, *COUPLINGS):
+            raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
+        if self.coupling == LINEAR and self.order not in (None, GAUSS_SEIDEL, JACOBI):
+            raise InputError("coupling linear steps all components at once: leave out the order")
+        if self.order is None:
+            return
+        if not isinstance(self.order, str):
+            object.__setattr__(self, "order", tuple(self.order))
+        elif self.order not in ORDERS:
+            raise InputError(
+                f"order {self.order!r}: use one of {', '.join(ORDERS)}, or name every component"
+            )
+
+    def check_step(self, step: float) -> None:
+        """Check that it can be run in steps of a length [s].
+
+        Raises:
+            InputError: it cannot be.
+
+        """
+        if not (isfinite(step) and step > 0.0):
+            raise InputError(f"step {step:g} s must be positive, and finite")
+        if not (isfinite(self._length) and self._length > 0.0):
+            than = f"after the start time, {self.start_time:g} s" if self.start_time else "positive"
+            raise InputError(f"stop time {self.stop_time:g} s must be {than}, and finite")
+        if self._length / step > MOST_STEPS:
+            raise InputError(
+                f"{self._length:g} s in steps of {step:g} s are more than {MOST_STEPS:,} steps"
+            )
+
+    @property
+    def _length(self) -> float:
+        """How long it lasts [s]."""
+        return self.stop_time - self.start_time
+
+    @property
+    def acting_row(self) -> int:
+        """In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end.
+
+        It is all inputs, and the outputs that follow from inputs of the same time. In feedthrough
+        order they pass before the row shows them; in other orders the step computes them.
+        """
+        return 0 if self.order in (None, FEEDTHROUGH) else 1
+
+    @property
+    def full_steps(self) -> int:
+        """How many steps have the whole length."""
+        return floor(self._in_steps)
+
+    @property
+    def has_short_step(self) -> bool:
+        """Whether a shorter step follows them."""
+        return self._in_steps > self.full_steps
+
+    @property
+    def _in_steps(self) -> float:
+        """The run in steps; a whole number where it is one apart from rounding."""
+        return _in_steps(self._length, self.step)
+
+    def reaching(self, time: float) -> int:
+        """After how many steps a time [s] has come: the first t_k that is not before it."""
+        # Their number may be more than an integer can hold.
+        steps = min(max((time - self.start_time) / self.step, 0.0), MOST_STEPS + 1.0)
+        return ceil(_rounded(steps))
+
+    @property
+    def rows(self) -> int:
+        """How many rows a complete run has: one at the start, and one a step."""
+        return 1 + self.full_steps + self.has_short_step
+
+    def time(self, k: int) -> float:
+        """The time after k steps [s]."""
+        return self.start_time + k * self.step if k <= self.full_steps else self.stop_time
+
+    def length(self, k: int, n: int) -> float:
+        """How long n steps after the k-th last [s], or as many of them as are left."""
+        if k + n > self.full_steps and self.has_short_step:
+            return self.stop_time - self.time(k)
+        return (min(k + n, self.full_steps) - k) * self.step
+
+    def steps(self, made: int = 0) -> Iterator[tuple[int, float, float, float]]:
+        """Number, beginning, length and end of every step [s].
+
+        It ends at t_k = t_0 + k h, which is never accumulated.
+
+        Args:
+            made: how many steps have been made.
+
+        """
+        start, step, t = self.start_time, self.step, self.time(made)
+        for k in range(made + 1, self.full_steps + 1):
+            end = start + k * step
+            yield k, t, step, end
+            t = end
+        if self.has_short_step and made < self.rows - 1:
+            yield self.rows - 1, t, self.stop_time - t, self.stop_time
+
+
+# Studies ask again and again.
+@lru_cache
+def _in_steps(length: float, step: float) -> float:
+    # However small its share of a step, a run is not empty.
+    return _rounded(max(length / step, ulp(0.0)))
+
+
+def _rounded(n: float) -> float:
+    """A number of steps; a whole number where it is one apart from rounding."""
+    nearest = round(n)
+    return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n

@@ -1,0 +1,356 @@
+"""The library of an FMU: brought along or compiled from C sources, and loaded once a process."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+import struct
+import sysconfig
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from hashlib import sha256
+from pathlib import Path
+from shutil import copytree
+from tempfile import mkdtemp
+from threading import Lock
+from typing import Any, NamedTuple
+
+import fmpy
+from fmpy.model_description import read_build_description
+
+from orchestrator.cosim.fmi.slaves import slave_class
+from orchestrator.cosim.fmi.surroundings import restore_mode, within_folder
+from orchestrator.cosim.system.component import Component
+from orchestrator.machine import cache
+from orchestrator.machine.disk import hold_lock
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.libraries import compile_library, find_compiler
+
+#: How ELF files of 32 and of 64 bits say where they have what: the place and form of that part of
+#: their header, and the length and form of the entries for their segments.
+_ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
+
+#: The kind of segments that are mapped into memory.
+_LOADED = 1
+
+#: As the standard of C has it: no product is contracted with a sum, nothing is reordered. No
+#: function has a prefix, whether the sources go by FMI's headers or, as 20-sim's, by their own.
+_FLAGS = (
+    "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w",
+    "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+    "-DFMI2_FUNCTION_PREFIX=",
+)  # fmt: skip
+
+#: The headers of FMI, for FMUs that come without them.
+_HEADERS = Path(fmpy.__file__).parent / "c-code"
+
+#: What compiled libraries are in the user's cache folder.
+_CATEGORY = "sources"
+
+#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
+_libraries: dict[Path, Library] = {}
+_LOCK = Lock()
+
+
+class Library:
+    """A loaded FMU, which serves all its instances in this process.
+
+    Attributes:
+        fmu: fmpy's view of it.
+        corrupted: whether one of them has ended with status fatal: FMI then forbids every further
+            call, also for the others, even to free them.
+        runs_python: whether PythonFMU has made it.
+        is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
+            instance.
+        users: how many there are.
+
+    """
+
+    def __init__(self, component: Component, folder: Path) -> None:
+        """Load an FMU that has been unpacked into a folder.
+
+        Raises:
+            InputError: it cannot be loaded.
+
+        """
+        check_place(folder)
+        check_binary(component, folder)
+        make_binary(component, folder)
+        try:
+            # fmpy changes the current folder meanwhile, and leaves it so if it fails.
+            with within_folder(folder):
+                self.fmu = slave_class(component)(
+                    guid=component.description.guid,
+                    modelIdentifier=component.description.coSimulation.modelIdentifier,
+                    unzipDirectory=str(folder),
+                    libraryPath=str(binary_of(component, folder)),
+                )
+        except Exception as error:
+            raise InputError(
+                f"{name_with_fmu(component)} cannot be loaded: {reason(error)}"
+            ) from error
+        finally:
+            restore_mode()
+        self.runs_python = runs_python(folder)
+        self.is_akin = component.is_ours or self.runs_python
+        self.corrupted, self.users = False, 0
+
+
+def name_with_fmu(component: Component) -> str:
+    """A component and its FMU, for messages."""
+    return f"{component.name}: {component.fmu.name}"
+
+
+def runs_python(folder: Path) -> bool:
+    """Whether an unpacked FMU is one of PythonFMU's."""
+    return (folder / "resources" / "slavemodule.txt").is_file()
+
+
+def check_place(folder: Path) -> None:
+    """Check that an unpacked FMU can be told where it is.
+
+    Raises:
+        InputError: it cannot; the text says what to do.
+
+    """
+    # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
+    # loader, which has PythonFMU's library beside it, does that for it.
+    loader = any(Path(folder, "binaries", fmpy.platform).glob("*_pythonfmu.*"))
+    within_drive = folder.relative_to(folder.anchor).as_posix()
+    if (
+        runs_python(folder)
+        and not loader
+        and (odd := re.sub(r"[\w./~-]| ", "", within_drive, flags=re.ASCII))
+    ):
+        raise InputError(
+            f"temporary folder {str(folder)!r}: PythonFMU cannot handle {odd[0]!r} in it; set "
+            "TMPDIR to another, or build the FMU with --loader native"
+        )
+
+
+def binary_of(component: Component, folder: Path) -> Path:
+    """Where the library of an unpacked FMU for this machine is, if it has one.
+
+    fmpy knows only the old names of platforms, which FMI 2.0.4 has for x86, and some tools for ARM.
+    """
+    identifier = component.description.coSimulation.modelIdentifier
+    name = f"{identifier}{fmpy.sharedLibraryExtension}"
+    platforms = _platform(component), fmpy.platform_tuple
+    own, named = (Path(folder, "binaries", platform, name) for platform in platforms)
+    return named if named.is_file() else own
+
+
+def _platform(component: Component) -> str:
+    """What the FMU's version calls the folder of this machine's libraries."""
+    platform: str = slave_class(component).platform
+    return platform
+
+
+def make_binary(component: Component, folder: Path) -> None:
+    """Compile an unpacked FMU that has sources and no library for this machine, if none is kept.
+
+    Raises:
+        InputError: there is no compiler, or it refuses them.
+
+    """
+    binary = binary_of(component, folder)
+    if binary.is_file() or not (sources := _sources_of(component, folder)):
+        return
+    key = _key(component)
+    try:
+        with hold_lock(cache.category_folder(_CATEGORY), wait=True):
+            kept = cache.read_cached(_CATEGORY, key)
+            content = next(iter(kept.values())) if kept else _compiled(component, sources)
+            if not kept:
+                with suppress(OSError):
+                    cache.write_cached(_CATEGORY, key, {binary.name: content})
+        binary.parent.mkdir(parents=True, exist_ok=True)
+        # Other processes may be about to load it.
+        new = binary.with_name(f"{binary.name}.{os.getpid()}")
+        new.write_bytes(content)
+        new.replace(binary)
+    except OSError as error:
+        why = reason(error).replace(f"{sources.files[0].parent}{os.sep}", "")
+        raise InputError(f"{component.fmu}: cannot be compiled: {why}") from error
+
+
+def check_binary(component: Component, folder: Path) -> None:
+    """Check that an FMU, unpacked into a folder, has a whole library for this machine, or sources.
+
+    Raises:
+        InputError: it has neither.
+
+    """
+    binaries = folder / "binaries"
+    identifier = component.description.coSimulation.modelIdentifier
+    suffix = fmpy.sharedLibraryExtension
+    binary = binary_of(component, folder)
+    if binary.is_file():
+        for path in sorted(binary.parent.iterdir()):
+            if path.is_file() and _is_cut_short(path):
+                raise InputError(
+                    f"{name_with_fmu(component)}: its {path.name} is truncated: download it again"
+                )
+        return
+    if _sources_of(component, folder):
+        _check_compiler(component)
+        return
+    others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
+    named_otherwise = sorted(path.name for path in binary.parent.glob(f"*{suffix}"))
+    if others:
+        there = f"binaries for {', '.join(others)} only"
+    elif named_otherwise:
+        there = f"{', '.join(named_otherwise)} instead"
+    else:
+        there = "no binaries at all"
+    raise InputError(
+        f"{name_with_fmu(component)} has no {binary.name} for this machine, "
+        f"{_platform(component)}: it has {there}"
+    )
+
+
+def _is_cut_short(path: Path) -> bool:
+    """Whether an ELF file ends before what its header tells of: reading that ends the process.
+
+    The loaders of other systems look for themselves.
+    """
+    with path.open("rb") as file:
+        head = file.read(64).ljust(64, b"\0")
+        if head[:4] != b"\x7fELF" or head[4] not in _ELF or head[5] not in (1, 2):
+            return False
+        order, (start, header, width, segment) = "<>"[head[5] - 1], _ELF[head[4]]
+        segments, sections, _, _, length, count, section_length, section_count = struct.unpack_from(
+            order + header, head, start
+        )
+        ends: list[int] = [segments + length * count, sections + section_length * section_count]
+        file.seek(segments)
+        table = file.read(length * count)
+        for at in range(0, len(table) - width + 1, max(length, width)):
+            kind, offset, size = struct.unpack_from(order + segment, table, at)
+            ends += [offset + size] * (kind == _LOADED)
+        return path.stat().st_size < max(ends)
+
+
+@contextmanager
+def library_of(component: Component, folder: Path) -> Iterator[Library]:
+    """The library of an unpacked FMU, for one more instance of it.
+
+    Many libraries hold something of the instances that they have had: each is unloaded with its
+    last one, except the ones that are known not to.
+
+    Raises:
+        InputError: it cannot be loaded.
+
+    """
+    with _LOCK:
+        library = _libraries.get(folder)
+        if library is None:
+            library = Library(component, folder)
+        elif library.corrupted:
+            # It stays loaded, with all that it has in memory; under another name it is a new one.
+            library = Library(component, _copied(folder))
+        _libraries[folder] = library
+        library.users += 1
+    try:
+        yield library
+    finally:
+        with _LOCK:
+            library.users -= 1
+            if not (library.users or library.corrupted or library.is_akin):
+                del _libraries[folder]
+                library.fmu.freeLibrary()
+
+
+def _copied(folder: Path) -> Path:
+    try:
+        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
+
+
+class Sources(NamedTuple):
+    """What is compiled.
+
+    Attributes:
+        files: translation units.
+        options: of the compiler, for them.
+
+    """
+
+    files: list[Path]
+    options: list[str]
+
+
+def _sources_of(component: Component, folder: Path) -> Sources | None:
+    """The sources of an FMU that is unpacked into a folder; None: it has none.
+
+    Raises:
+        InputError: their description cannot be read, or names files that are not there.
+
+    """
+    place = folder / "sources"
+    # A list may leave out where headers are.
+    beside = sorted({f"-idirafter{header.parent}" for header in place.rglob("*.h")})
+    identifier = component.description.coSimulation.modelIdentifier
+    try:
+        described: list[Any] = read_build_description(folder, validate=False)
+    except Exception as error:
+        raise InputError(f"{component.fmu}: buildDescription.xml: {reason(error)}") from error
+    sets = [
+        one
+        for build in (*described, *component.description.buildConfigurations)
+        if build.modelIdentifier == identifier
+        for one in build.sourceFileSets
+    ]
+    if not sets:
+        files = sorted(place.glob("*.c"))
+        return Sources(files, [f"-I{place}", *beside]) if files else None
+    files = list(dict.fromkeys(place / name for one in sets for name in one.sourceFiles))
+    for file in files:
+        if not (file.is_file() and file.resolve().is_relative_to(place.resolve())):
+            raise InputError(f"{component.fmu}: holds no sources/{file.relative_to(place)}")
+    options = [f"-I{place / name}" for one in sets for name in ("", *one.includeDirectories)]
+    for one in sets:
+        for definition in one.preprocessorDefinitions:
+            if not definition.optional:
+                value = "" if definition.value is None else f"={definition.value}"
+                options.append(f"-D{definition.name}{value}")
+    return Sources(files, list(dict.fromkeys([*options, *beside])))
+
+
+def _check_compiler(component: Component) -> None:
+    """Check that an FMU can be compiled here, if it was not before.
+
+    Raises:
+        InputError: there is no compiler.
+
+    """
+    if find_compiler() is None and not cache.read_cached(_CATEGORY, _key(component)):
+        raise InputError(
+            f"{component.fmu}: has no binary for this machine, {_platform(component)}, and must be "
+            "compiled: install gcc or clang, or `pip install ziglang`"
+        )
+
+
+def _compiled(component: Component, sources: Sources) -> bytes:
+    _check_compiler(component)
+    run = find_compiler()
+    assert run is not None
+    warnings.warn(
+        f"{component.fmu.name} has no binary for this machine, {_platform(component)}: its C "
+        "sources are compiled now and kept for later runs",
+        stacklevel=2,
+    )
+    cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)
+    files = map(str, sources.files)
+    return compile_library(
+        run, *_FLAGS, *sources.options, "-idirafter", str(_HEADERS), *files, "-lm", *cpp
+    )
+
+
+def _key(component: Component) -> str:
+    """Of the FMU, the flags and the kind of machine."""
+    made_of = "\0".join((component.digest, *_FLAGS, sysconfig.get_platform()))
+    return sha256(made_of.encode()).hexdigest()[:16]

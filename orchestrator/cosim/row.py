@@ -1,0 +1,366 @@
+"""The row of all values, and their changes on the way from outputs to inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from math import isfinite
+from typing import Any
+
+import numpy as np
+
+from orchestrator.cosim.fmi.instance import Instance, Part
+from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of
+from orchestrator.cosim.system.variables import Variable, references_of
+
+#: A change so small, or so small a share of the value, is a rounding error.
+_ROUNDING = 1e-12
+
+#: Times one, plus minus zero: every number stays what it is, minus zero, too.
+FACTOR, OFFSET = 1.0, -0.0
+
+
+class Row:
+    """All inputs and outputs of a system side by side, as floats.
+
+    The ports of a component that have the same causality and type are neighbours, in the order
+    of its description, so that one FMI call moves them all.
+
+    Outputs of some components have a hidden place after all columns, into which their instance
+    writes them; they are shown once they are copied into their columns.
+
+    Attributes:
+        values: of all ports, and the hidden ones.
+        shown: a view of the columns only.
+        columns: where the value of a port is.
+        strings: what numbers in it stand for.
+        standing: the same for each port that may have such a number.
+
+    """
+
+    def __init__(
+        self, system: System, instances: Mapping[str, Instance], hidden: Collection[str] = ()
+    ) -> None:
+        """Lay out the row, tie the instances to it, and enter the inputs' values at the start.
+
+        Args:
+            system: whose ports these are.
+            instances: of its components.
+            hidden: the components whose outputs are hidden at first.
+
+        """
+        groups = [
+            (name, causality, fmi_type, ports)
+            for name in instances
+            for causality in ("input", "output")
+            for fmi_type in TYPES
+            if (ports := _ports(system.components[name], causality, fmi_type))
+        ]
+        n = sum(len(ports) for *_, ports in groups)
+        more = sum(
+            len(ports) for name, causality, _, ports in groups if _hides(name, causality, hidden)
+        )
+        self.values = np.zeros(n + more)
+        self.shown = self.values[:n]
+        self.columns: dict[PortName, int] = {}
+        self.strings = StringTable()
+        self.standing: dict[PortName, Standing] = {}
+        self._hidden: dict[PortName, int] = {}
+        self._components = system.components
+        self._sources = {c.target: c.source for c in system.connections}
+        self._ports: dict[str, list[tuple[PortName, str, str]]] = {name: [] for name in instances}
+        self._inputs: dict[str, list[int]] = {}
+        firsts: dict[str, int] = {}
+        parts: dict[str, list[Part]] = {name: [] for name in instances}
+        for component, causality, fmi_type, ports in groups:
+            column = len(self.columns)
+            where = column
+            if _hides(component, causality, hidden):
+                where = n + len(self._hidden)
+                for i, port in enumerate(ports, start=where):
+                    self._hidden[PortName(component, port.name)] = i
+            first = where - firsts.setdefault(component, column)
+            references = references_of(ports)
+            place = slice(first, first + len(ports))
+            parts[component].append(Part(causality, fmi_type, references, place))
+            for i, port in enumerate(ports, start=column):
+                name = PortName(component, port.name)
+                self.columns[name] = i
+                self._ports[component].append((name, causality, fmi_type))
+                if causality == "input":
+                    self._inputs.setdefault(fmi_type, []).append(i)
+                if TYPES[fmi_type].stands:
+                    self.standing[name] = Standing(fmi_type, self.strings)
+                self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
+        for component, instance in instances.items():
+            part = self.values[firsts.get(component, 0) :]
+            instance.tie(part, parts[component], self.strings)
+        self._hiding = {name: self.hidden(self._outputs(name)) for name in hidden}
+        self.enter(system.parameters)
+
+    def _outputs(self, component: str) -> list[PortName]:
+        return [port for port, causality, _ in self._ports[component] if causality == "output"]
+
+    def enter(self, values: Mapping[PortName, Value]) -> None:
+        """Take values of ports, except any that are not finite numbers."""
+        for port, value in values.items():
+            if port in self.columns and isfinite(number := self.number(value)):
+                self.values[self.columns[port]] = number
+
+    def number(self, value: Value) -> float:
+        """What stands for a value in the row."""
+        return self.strings.stand_in(value)
+
+    def number_of(self, port: PortName, value: float) -> float:
+        """What stands for a value of a port in the row."""
+        return self.standing[port].number(value) if port in self.standing else float(value)
+
+    def value(self, port: PortName) -> Value:
+        """The value of a port."""
+        number = float(self.values[self.columns[port]])
+        return self.standing[port].value(number) if port in self.standing else number
+
+    def inputs_of(self, fmi_type: str) -> list[int]:
+        """Where the inputs of a type are."""
+        return self._inputs.get(fmi_type, [])
+
+    def wrong(self, components: Iterable[str], passed: bool = False) -> str | None:
+        """The first value that is not finite or not of an input's type, in words.
+
+        Args:
+            components: in the order in which they are stepped: others may have passed it on.
+            passed: whether all values are of one time: then states come first, and of these what
+                no wrong input has reached.
+
+        Returns:
+            What is wrong and where it comes from; None: nothing is.
+
+        """
+        fit = all(are_of(of, self.values[places]).all() for of, places in self._inputs.items())
+        if fit and np.isfinite(self.shown).all():
+            return None
+        ports = [port for component in components for port in self._ports[component]]
+        if passed:
+            reached = {
+                name.component
+                for name, causality, _ in ports
+                if causality == "input" and not isfinite(self.values[self.columns[name]])
+            }
+            ports.sort(key=lambda port: (self._passes(*port[:2]), port[0].component in reached))
+        passed_on = None
+        for port, causality, fmi_type in ports:
+            value = self.values[self.columns[port]]
+            if not isfinite(value):
+                text = f"{port} is {value:g}"
+            elif causality == "input" and not are_of(fmi_type, value):
+                text = f"{port} is {value:.16g}, which FMI type {fmi_type} cannot hold"
+            else:
+                continue
+            if causality == "output":
+                return text
+            source = self._sources.get(port)
+            text += f", fed by {source}" if source else ", from a table or an event"
+            if source is None or isfinite(self.values[self.columns[source]]):
+                return text
+            passed_on = passed_on or text
+        return passed_on
+
+    def _passes(self, port: PortName, causality: str) -> bool:
+        """Whether a port is no state."""
+        return causality == "input" or self._components[port.component].has_feedthrough(port.port)
+
+    def moving(self, before: np.ndarray) -> list[PortName]:
+        """The ports whose values are not what they were, apart from rounding."""
+        same = np.isclose(self.values, before, rtol=_ROUNDING, atol=_ROUNDING)
+        standing = [self.columns[port] for port in self.standing]
+        same[standing] = self.values[standing] == before[standing]
+        return [port for port, column in self.columns.items() if not same[column]]
+
+    def places(self, connections: Sequence[Connection]) -> tuple[np.ndarray, np.ndarray]:
+        """Where the targets and the sources of some connections are."""
+        return (
+            np.array([self.columns[c.target] for c in connections], dtype=np.intp),
+            np.array([self.columns[c.source] for c in connections], dtype=np.intp),
+        )
+
+    def hidden(self, ports: Sequence[PortName]) -> tuple[np.ndarray, np.ndarray]:
+        """Where the columns and the hidden places of some outputs are, as far as they have any."""
+        known = [port for port in ports if port in self._hidden]
+        return (
+            np.array([self.columns[port] for port in known], dtype=np.intp),
+            np.array([self._hidden[port] for port in known], dtype=np.intp),
+        )
+
+    def show(self, component: str) -> None:
+        """Copy the hidden values of a component into its columns."""
+        if component in self._hiding:
+            targets, sources = self._hiding[component]
+            self.values[targets] = self.values[sources]
+
+
+def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
+    return causality == "output" and component in hidden
+
+
+def _ports(component: Component, causality: str, fmi_type: str) -> list[Variable]:
+    return [variable for variable in component.having(causality) if variable.type == fmi_type]
+
+
+class Gathering:
+    """Values moved within the row at the same time, each times a factor, plus an offset.
+
+    Attributes:
+        targets, sources: where they are in the row.
+        factors, offsets: one for each.
+        mapped: places of those that are mapped first, and what to; others stay what they are.
+        acts: whether there are any values.
+        is_plain: whether there are, and all arrive as they are.
+
+    """
+
+    def __init__(self, targets: np.ndarray, sources: np.ndarray) -> None:
+        """Move values as they are."""
+        self.targets, self.sources = targets, sources
+        self.factors = np.full(len(targets), FACTOR)
+        self.offsets = np.full(len(targets), OFFSET)
+        self.mapped: dict[int, Mapping[float, float]] = {}
+        self.acts = self.is_plain = len(targets) > 0
+
+    @classmethod
+    def along(cls, row: Row, connections: Sequence[Connection]) -> Gathering:
+        """What inputs take from outputs along some connections."""
+        gathering = cls(*row.places(connections))
+        for place, connection in enumerate(connections):
+            match connection.transformation:
+                case Linear(factor, offset):
+                    gathering.set(place, factor, offset)
+                case Mapped(pairs):
+                    gathering.mapped[place] = {
+                        row.number_of(connection.source, before): row.number_of(
+                            connection.target, after
+                        )
+                        for before, after in pairs
+                    }
+                    gathering.is_plain = False
+        return gathering
+
+    def __call__(self, values: np.ndarray) -> None:
+        """Move the values within the row."""
+        if self.is_plain:
+            values[self.targets] = values[self.sources]
+            return
+        taken = values[self.sources]
+        for place, pairs in self.mapped.items():
+            taken[place] = pairs.get(taken[place], taken[place])
+        values[self.targets] = self.factors * taken + self.offsets
+
+    def move(self, values: np.ndarray, place: int) -> None:
+        """Move one of the values."""
+        taken = values[self.sources[place]]
+        taken = self.mapped.get(place, {}).get(taken, taken)
+        values[self.targets[place]] = self.factors[place] * taken + self.offsets[place]
+
+    def set(self, place: int, factor: float, offset: float) -> None:
+        """Set the change to one of the values."""
+        self.factors[place], self.offsets[place] = factor, offset
+        plain = (self.factors == FACTOR) & (self.offsets == OFFSET) & np.signbit(self.offsets)
+        self.is_plain = bool(plain.all()) and not self.mapped
+
+
+class Overrides:
+    """Everything that is gathered in a step, and temporary changes to it."""
+
+    def __init__(
+        self, row: Row, gatherings: Iterable[Gathering], connections: Sequence[Connection]
+    ) -> None:
+        """Know where every input takes its value from.
+
+        Args:
+            row: of all values.
+            gatherings: of all stages.
+            connections: of the system.
+
+        """
+        self._row = row
+        # An input of a solved ring is gathered in more than one place.
+        self._fed: dict[int, list[tuple[Gathering, int]]] = {}
+        for gathering in gatherings:
+            for place, column in enumerate(gathering.targets.tolist()):
+                self._fed.setdefault(column, []).append((gathering, place))
+        self._own = {column: _factor_and_offset(fed) for column, fed in self._fed.items()}
+        self._targets = [connection.target for connection in connections]
+        # Of inputs that nothing feeds: what they would have, and what is done to it.
+        self._open: dict[int, tuple[float, float, float]] = {}
+
+    def override(self, target: PortName, value: Value) -> None:
+        """Let an input take a value, whatever feeds it."""
+        self._alter(target, 0.0, self._row.number(value))
+
+    def bias(self, target: PortName, offset: float) -> None:
+        """Let an input take the value that it would take, and something more."""
+        factor, own = self._own.get(self._row.columns[target], (FACTOR, OFFSET))
+        self._alter(target, factor, own + offset)
+
+    def release(self, target: PortName) -> None:
+        """Let an input take what feeds it, or what it would have."""
+        column = self._row.columns[target]
+        if column in self._fed:
+            self._alter(target, *self._own[column])
+        elif column in self._open:
+            self._row.values[column], _, _ = self._open.pop(column)
+
+    def supply(self, target: PortName, value: Value) -> None:
+        """Let an input that nothing feeds have a value, which is altered as one that is fed is."""
+        value = self._row.number(value)
+        column = self._row.columns[target]
+        if column in self._open:
+            _, factor, offset = self._open[column]
+            self._open[column] = value, factor, offset
+            value = factor * value + offset
+        self._row.values[column] = value
+
+    def supplied(self, target: PortName) -> float:
+        """What an input has that nothing feeds, before it is altered."""
+        column = self._row.columns[target]
+        value, *_ = self._open.get(column, (float(self._row.values[column]),))
+        return value
+
+    def refresh(self, component: str) -> None:
+        """Let the inputs of a component take at once what feeds them."""
+        for target in self._targets:
+            if target.component == component:
+                gathering, place = self._fed[self._row.columns[target]][0]
+                gathering.move(self._row.values, place)
+
+    def state(self) -> dict[str, Any]:
+        """What is done to them, as JSON has it."""
+        return {
+            "fed": [(column, *_factor_and_offset(fed)) for column, fed in self._fed.items()],
+            "open": list(self._open.items()),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Do to them what was done before; the row is left as it is."""
+        for column, factor, offset in state["fed"]:
+            for gathering, place in self._fed[column]:
+                gathering.set(place, factor, offset)
+        self._open = {column: tuple(values) for column, values in state["open"]}
+
+    def _alter(self, target: PortName, factor: float, offset: float) -> None:
+        column, values = self._row.columns[target], self._row.values
+        if column in self._fed:
+            for gathering, place in self._fed[column]:
+                gathering.set(place, factor, offset)
+        else:
+            value = self.supplied(target)
+            self._open[column] = value, factor, offset
+            values[column] = factor * value + offset
+
+
+def _factor_and_offset(fed: Sequence[tuple[Gathering, int]]) -> tuple[float, float]:
+    gathering, place = fed[0]
+    return float(gathering.factors[place]), float(gathering.offsets[place])

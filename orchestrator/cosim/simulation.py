@@ -1,0 +1,265 @@
+"""A run from the first exchange of values to the last step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from math import isfinite
+from time import monotonic
+
+import numpy as np
+
+from orchestrator.cosim.coupling import Coupling
+from orchestrator.cosim.early_end import make_steps
+from orchestrator.cosim.experiment import OURS, Exchange
+from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.fmi.placement import place_instances
+from orchestrator.cosim.fmi.surroundings import Surroundings, default_mode
+from orchestrator.cosim.hooks.hook import Hook, Hooks, Run
+from orchestrator.cosim.loop import PYTHON_LOOP, Stepping
+from orchestrator.cosim.observers.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.cosim.plan import Plan
+from orchestrator.cosim.row import Overrides, Row
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import same
+from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
+from orchestrator.machine.interrupts import held_interrupts
+from orchestrator.machine.texts import literal
+
+
+# What overflows on its way is named as the value of a port.
+@np.errstate(all="ignore")
+@default_mode()
+def simulate_plan(
+    plan: Plan,
+    observers: Sequence[Observer] = (),
+    isolation: Isolation | None = None,
+    stepping: Stepping = PYTHON_LOOP,
+    hooks: Sequence[Hook] = (),
+    exchange: Exchange = OURS,
+) -> Ending:
+    """Run a system.
+
+    Args:
+        plan: what to run, as :func:`.plan.make_plan` gives it.
+        observers: take the rows.
+        isolation: run each FMU in a separate process; None: all in this one.
+        stepping: how its steps are made.
+        hooks: act between them, in this order.
+        exchange: of values.
+
+    Returns:
+        How the run has ended: after a failure the observers have the rows before it.
+
+    Raises:
+        InputError: an FMU or a parameter is not usable; nothing was stepped.
+        KeyboardInterrupt: a signal has come to stop it, and an FMU does not come to its first step.
+
+    """
+    system, experiment = plan.system, plan.experiment
+    slow = {name for name, n in plan.decimations.items() if n > 1}
+    log = Log()
+    for line in plan.remarks:
+        log.remark(line)
+    with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
+        with _explained():
+            instances = stack.enter_context(
+                place_instances(system.components, log, isolation, interrupts)
+            )
+            # Before their processes are ended: a copy must not do that for the process itself.
+            stack.enter_context(surroundings)
+            stepping = _possible_stepping(stepping, instances, log)
+            row = Row(system, instances, slow)
+            coupling = Coupling(plan, instances, row, log, exchange)
+            coupling.initialise()
+            experiment = coupling.plan.experiment
+            header = Header(
+                tuple(map(str, row.columns)),
+                experiment,
+                _parameters(system, instances, log),
+                stepping.name,
+                {str(port): standing for port, standing in row.standing.items()},
+                _units(system, row.columns),
+            )
+        scheduled, gatherings = coupling.schedule()
+        with _told(header, observers, surroundings) as tell:
+            blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
+            interrupts.hand_over = blocks.hand_over
+            if scheduled.passing is None:
+                blocks.append(experiment.start_time, row.shown)
+            overrides = Overrides(row, gatherings, system.connections)
+            run = Run(
+                system, experiment, instances, row, scheduled.stepping, scheduled.passing,
+                overrides, blocks, log, interrupts, hooks,
+            )  # fmt: skip
+            order = [name for names in coupling.sequence for name in names]
+            remark = None
+            try:
+                failure = _advance(run, stepping, Hooks(run), order, surroundings)
+                if failure and (overflown := _overflown(row, coupling.delayed_ports())):
+                    failure += (
+                        f"; {overflown} is in a ring of direct feedthroughs that is delayed by a "
+                        "step, and may grow without bound; --coupling solve, if its FMUs allow "
+                        "it, or another --order may help"
+                    )
+            except NotKept as error:
+                # Rows that cannot be kept need not be computed.
+                failure = str(error)
+            except Ended as end:
+                failure, remark = None, str(end)
+            if failure is None:
+                for instance in instances.values():
+                    # The rows are there whether it can or not.
+                    with suppress(ComponentFailed):
+                        instance.terminate()
+            ending = Ending(
+                failure, remark, log.messages, tuple(interrupts.numbers), tuple(run.happened)
+            )
+            tell(ending)
+        return ending
+
+
+def simulate_to_end(
+    plan: Plan,
+    observers: Sequence[Observer] = (),
+    exchange: Exchange = OURS,
+    hooks: Sequence[Hook] = (),
+) -> None:
+    """Run a system of which nothing less than all rows will do.
+
+    Raises:
+        InputError: it cannot be run, or not to its end.
+        KeyboardInterrupt: a signal has come to stop it.
+
+    """
+    ending = simulate_plan(plan, observers, hooks=hooks, exchange=exchange)
+    if ending.interrupts:
+        raise KeyboardInterrupt
+    if ending.failure is not None:
+        raise InputError(f"{plan.system.name} {ending.failure}")
+
+
+def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:
+    """The stepping, or the one in Python where the other has nothing to call."""
+    apart = [name for name, instance in instances.items() if not instance.is_here]
+    if not apart or stepping == PYTHON_LOOP:
+        return stepping
+    log.remark(
+        f"{', '.join(apart)}: runs in a separate process, since the FMU allows one instance "
+        "per process; the Python loop takes the steps"
+    )
+    return PYTHON_LOOP
+
+
+def _parameters(
+    system: System, instances: Mapping[str, Instance], log: Log
+) -> dict[PortName, object]:
+    """Values of all parameters as the FMUs hold them; the log names any that were not kept.
+
+    Some FMUs overwrite values without a word.
+    """
+    parameters: dict[PortName, object] = {}
+    for name, instance in instances.items():
+        component, wanted = system.components[name], system.parameters_of(name)
+        own = [variable.name for variable in component.having("parameter")]
+        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        held = instance.read(list(dict.fromkeys((*own, *lasting))))
+        for port in lasting:
+            if not same(wanted[port], held[port]):
+                log.remark(
+                    f"{name}.{port} was set to {literal(wanted[port])}, but the FMU holds "
+                    f"{literal(held[port])}"
+                )
+        parameters |= {
+            PortName(name, port): component.variables[port].shown(held[port]) for port in own
+        }
+    return parameters
+
+
+def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
+    """The units of columns that have one."""
+    units = {
+        str(name): system.components[name.component].variables[name.port].unit for name in columns
+    }
+    return {name: unit for name, unit in units.items() if unit is not None}
+
+
+def _advance(
+    run: Run,
+    stepping: Stepping,
+    hooks: Hooks,
+    order: Sequence[str],
+    surroundings: Surroundings,
+) -> str | None:
+    """Step to the end, or to the first failure, and say what it was."""
+    blocks, failure = run.blocks, None
+    try:
+        hooks.act()
+        for _ in make_steps(stepping.steps, run):
+            if run.made >= run.due:
+                hooks.act()
+            if monotonic() > blocks.due:
+                blocks.hand_over()
+            if run.interrupts.numbers:
+                failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
+                break
+        run.show()
+    except ComponentFailed as error:
+        failure = f"stopped at t = {run.time:.12g} s: {error}"
+    except KeyboardInterrupt:
+        failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
+    except Ended as end:
+        with suppress(ComponentFailed):
+            run.show()
+        blocks.hand_over()
+        raise Ended(f"ended at t = {run.time:.12g} s: {end}") from None
+    except (InputError, NotKept):
+        raise
+    except Exception as error:
+        failure = f"stopped at t = {run.time:.12g} s: {unforeseen(error)}"
+    surroundings.put_back()
+    # Also where another component has refused it in the same step.
+    if wrong := run.row.wrong(order, run.passing is not None):
+        failure = f"stopped at t = {run.experiment.time(blocks.count):.12g} s: {wrong}"
+    blocks.hand_over()
+    return failure
+
+
+def _overflown(row: Row, ports: Iterable[PortName]) -> PortName | None:
+    """The first of some ports whose value is not finite."""
+    return next((port for port in ports if not isfinite(row.values[row.columns[port]])), None)
+
+
+@contextmanager
+def _explained() -> Iterator[None]:
+    """A component that fails before the first step."""
+    try:
+        yield
+    except ComponentFailed as error:
+        raise (StartError if error.fatal else InputError)(str(error)) from error
+
+
+@contextmanager
+def _told(
+    header: Header, observers: Sequence[Observer], surroundings: Surroundings
+) -> Iterator[Callable[[Ending], None]]:
+    """Tell observers of the beginning, and of the end even where one of them fails."""
+    begun: list[Observer] = []
+
+    def tell(ending: Ending) -> None:
+        surroundings.put_back()
+        while begun:
+            begun.pop(0).end(ending)
+
+    try:
+        with surroundings.ours():
+            for observer in observers:
+                observer.begin(header)
+                begun.append(observer)
+        yield tell
+    except BaseException as error:
+        with suppress(Exception):
+            tell(Ending(f"stopped: {reason(error)}"))
+        raise
