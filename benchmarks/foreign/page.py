@@ -79,6 +79,11 @@ def listed(found: Sequence[Mapping[str, Any]]) -> str:
     table.writerow(("kind", "file", "outcome"))
     for one in found:
         kind = "FMU" if one["is_fmu"] else "archive"
+        changed = one.get("changed", {})
+        if changed.get("lost"):
+            table.writerow((kind, _name(one), f"does not take {', '.join(changed['lost'])}"))
+        if changed and changed["outcome"] != "runs":
+            table.writerow((kind, _name(one), f"with other parameters {_why(changed)}"))
         if one["outcome"] == "absent":
             table.writerow((kind, _name(one), "could not be fetched"))
         elif one["outcome"] != "runs":
@@ -98,11 +103,14 @@ def _tools() -> Iterator[str]:
 
 def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     running = [one for one in archives if one["outcome"] == "runs"]
-    yield f"\n## Archives\n\n{len(running)} of {len(archives)} run. Deviations:\n"
+    yield f"\n## Archives\n\n{len(running)} of {len(archives)} run."
+    yield "Deviations of those that other programs run:\n"
     yield f"| archive | rows | {' | '.join(TOOLS)} |"
     yield f"| --- | --: |{' --- |' * len(TOOLS)}"
     for one in running:
         tools = one.get("tools", {})
+        if all(isinstance(tools.get(tool, ""), str) for tool in TOOLS):
+            continue
         cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
         yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} |"
 
@@ -199,16 +207,6 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         deviation = one["changed"].get("deviation")
         if isinstance(deviation, float) and not deviation <= FMU_BOUND:
             yield f"- {_name(one)} deviates by {deviation:.1e}: {_explained(one, _HOST)}."
-    for one in lost:
-        yield f"- {_name(one)} does not take {_listed(one['changed']['lost'])}."
-    for one in changed:
-        if one not in ran:
-            yield f"- {_name(one)}: {_why(one['changed'])}"
-
-
-def _listed(names: Sequence[str], most: int = 5) -> str:
-    shown = ", ".join(f"`{name}`" for name in names[:most])
-    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
 
 
 def _name(one: Mapping[str, Any]) -> str:
