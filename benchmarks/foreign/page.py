@@ -82,7 +82,7 @@ def listed(found: Sequence[Mapping[str, Any]]) -> str:
         changed = one.get("changed", {})
         if changed.get("lost"):
             table.writerow((kind, _name(one), f"does not take {', '.join(changed['lost'])}"))
-        if changed and changed["outcome"] != "runs":
+        if changed.get("outcome", "runs") != "runs":
             table.writerow((kind, _name(one), f"with other parameters {_why(changed)}"))
         if one["outcome"] == "absent":
             table.writerow((kind, _name(one), "could not be fetched"))

@@ -1,8 +1,9 @@
-"""docs/reference/fmi-answers.md, read: what an FMU answers to each call in each state."""
+"""fmi-answers.md and fmi-answers.csv of docs/reference: what an FMU answers to each call."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import csv
+from collections.abc import Iterator
 from functools import cache
 from itertools import product
 from typing import NamedTuple
@@ -20,16 +21,8 @@ STATES = (*MODES, ERROR)
 #: Rows that are about no instance: the function that makes one, and what stands in its place.
 CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 
-#: The header of a column about all states, and what stands for a name with fmi3 in it.
-EVERY_STATE, SAME_NAME = "every state", "the same"
-
-#: Names of several functions.
-_TYPES = ("Real", "Integer", "Boolean", "String")
-_FUNCTIONS = {
-    f"every {do}": [f"fmi2{do.title()}{type_}" for type_ in _TYPES] for do in ("set", "get")
-}
-
-_NOT_POSSIBLE = "\u2013"
+#: What stands for a name with fmi3 in it.
+SAME_NAME = "the same"
 
 _UNSOUND = ("NULL", "n = ", "not UTF-8", "freed", "pointer", "too few", "too many")
 
@@ -95,38 +88,26 @@ def answers() -> dict[str, Answer]:
     return {line[0]: Answer(*line) for line in _sections()["Answers"].rows}
 
 
-def _states(header: str) -> Sequence[str]:
-    """The states that a column is about."""
-    return STATES if header == EVERY_STATE else header.split(", ")
-
-
 def _keys(functions: str, cases: str) -> Iterator[tuple[str, str]]:
     """Each function and each case of a line."""
-    return product(_FUNCTIONS.get(functions) or functions.split(", "), cases.split("; "))
+    return product(functions.split(", "), cases.split("; "))
 
 
 @cache
 def rows() -> dict[tuple[str, str], Row]:
     """All calls on an instance, by function and case."""
     found: dict[tuple[str, str], Row] = {}
-    for section in sections(PAGE):
-        columns = [_states(header) for header in section.header[2:]]
-        if [state for column in columns for state in column] == [*STATES]:
-            for functions, cases, *cells in section.rows:
-                texts = {
-                    state: text
-                    for column, text in zip(columns, cells, strict=True)
-                    for state in column
-                }
-                for function, case in _keys(functions, cases):
-                    row = Row(function, case, _cells(texts))
-                    assert row.key not in found, f"{row} stands twice"
-                    found[row.key] = row
+    with PAGE.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        for function, case, *cells in csv.reader(file):
+            if function.startswith("fmi2"):
+                row = Row(function, case, _cells(dict(zip(STATES, cells, strict=True))))
+                assert row.key not in found, f"{row} stands twice"
+                found[row.key] = row
     return found
 
 
 def _cells(texts: dict[str, str]) -> dict[str, Cell]:
-    return {state: _cell(text, state) for state, text in texts.items() if text != _NOT_POSSIBLE}
+    return {state: _cell(text, state) for state, text in texts.items() if text}
 
 
 def _cell(text: str, state: str) -> Cell:
