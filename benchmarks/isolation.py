@@ -14,7 +14,7 @@ from measuring import options, python, steps_time, timed
 
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
-from orchestrator.cosim.experiment import GAUSS_SEIDEL, JACOBI, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
@@ -37,7 +37,7 @@ def main() -> None:
     print(f"{python()}, {len(os.sched_getaffinity(0))} cores")
     print(f"medians of {given.repetitions} repetitions of {given.steps} steps")
     starts = []
-    for order in (GAUSS_SEIDEL, JACOBI):
+    for order in ("gauss-seidel", "jacobi"):
         rows = []
         for _ in range(given.repetitions):
             rows.append(

@@ -1,6 +1,7 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-The build puts them as HTML into each FMU; `tools/pages.py` writes them into components.
+The build puts them as HTML into each FMU, with what holds for all FMUs; `tools/pages.py` writes
+them into docs/reference/components.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from string import Template
 
 from markdown_it import MarkdownIt
 
+from auv_fmu.language.variable import POSITIVE
 from fmus.discovery import Source, related_files
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.definition import Model
@@ -53,6 +55,12 @@ states and bad arguments is in `docs/reference/fmi-answers.md` of the project.""
 #: The place in a list of things that have members.
 _PLACE = re.compile(r"\[\d+\]\.")
 
+#: A link to another page of the project, which an FMU does not hold.
+_LINK = re.compile(r"\[([^]]+)\]\(\.\./\.\./(docs/[^)]+)\)")
+
+#: The last part of a name, where it has several.
+_MEMBER = re.compile(r"(?:\.\w+|\[[\d,]+\])$")
+
 _NATIVE = """\
 ## What it is made of
 
@@ -90,19 +98,21 @@ result = fmpy.simulate_fmu("{name}.fmu", stop_time=10.0, output_interval={step:g
 If the FMU has a parameter `h_max`, a longer step is split evenly, with held inputs."""
 
 
-def component_page(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
-    """Write the page of a component in Markdown: description, ports, refusals, an example."""
-    made_of = (_NATIVE,) if kind == NATIVE else ()
-    reference = (_REFERENCE.format(name=source.name),) if related_files(source) else ()
-    return page_of(source.definition, (source.page, *made_of), fmi, reference)
+def component_page(source: Source) -> str:
+    """Write the page of a component in Markdown: what it is, its ports, and more of it.
+
+    What holds for all components is in docs/reference/components/README.md.
+    """
+    page = source.page.replace("](../../docs/", "](../../")
+    return _joined(_parted(page, _tables(source.definition.ports, {})))
 
 
 def page_of(model: Model, head: Sequence[str], fmi: str = "2", more: Sequence[str] = ()) -> str:
-    """The page of a model in Markdown.
+    """The page of a model in Markdown, as its FMU holds it.
 
     Args:
         model: that it is about.
-        head: what stands before the ports.
+        head: what it is; its ports stand before the second heading of the first text.
         fmi: version.
         more: what stands before the example.
 
@@ -113,7 +123,21 @@ def page_of(model: Model, head: Sequence[str], fmi: str = "2", more: Sequence[st
     tables = _tables((*model.ports, FAULT), TYPES if fmi == "3" else {})
     experiment = model.experiment
     example = _EXAMPLE.format(name=model.name, step=experiment.step)
-    return "\n\n".join((*head, *tables, refusals, *more, example)) + "\n"
+    first, *others = head
+    return _joined((*_parted(first, tables), *others, refusals, *more, example))
+
+
+def _joined(parts: Iterable[str]) -> str:
+    return "\n\n".join(parts) + "\n"
+
+
+def _parted(page: str, tables: Iterable[str]) -> Iterator[str]:
+    """A page with the tables of ports before its second heading."""
+    first, heading, rest = page.partition("\n\n## ")
+    yield first
+    yield from tables
+    if heading:
+        yield f"## {rest}"
 
 
 def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
@@ -126,38 +150,74 @@ def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
         found = [port for port in ports if port.causality == causality]
         if not found:
             continue
-        columns = ["name", "type", "unit", "description"]
+        columns = ["name", "unit or type", "description"]
         if causality == "parameter":
-            columns[3:3] = ["start", "range", "variability"]
-        elif causality == "output":
+            columns[2:2] = ["start", "range"]
+        elif any(port.feedthrough for port in found):
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        lines += ["| " + " | ".join(_row(ports, types)) + " |" for ports in _alike(found)]
+        rows = (_row(ports, types)[: len(columns)] for ports in _alike(found))
+        lines += ["| " + " | ".join(row) + " |" for row in rows]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
 
-def _alike(ports: Sequence[Port]) -> Iterable[list[Port]]:
-    """Ports one by one, but the ports of a list together, as `waypoint[1].x` to `waypoint[9].x`."""
-    rows: dict[str, list[Port]] = {}
+def _alike(ports: Sequence[Port]) -> Iterable[list[list[Port]]]:
+    """The ports of each row: the members of a group that differ in nothing else, as `y.x`, `y.y`.
+
+    Of each member the ports of a list, as `waypoint[1].x` to `waypoint[9].x`, most often one.
+    """
+    rows: dict[object, dict[str, list[Port]]] = {}
     for port in ports:
-        rows.setdefault(_PLACE.sub("[].", port.name), []).append(port)
-    return rows.values()
+        listed = _PLACE.sub("[].", port.name)
+        key = (_MEMBER.sub("", listed), port.type, port.variability, _described(port),
+               _range(port), _groups(port))  # fmt: skip
+        rows.setdefault(key, {}).setdefault(listed, []).append(port)
+    return ([*members.values()] for members in rows.values())
 
 
-def _row(ports: Sequence[Port], types: Mapping[str, str]) -> list[str]:
-    port, last = ports[0], ports[-1]
-    cell = types.get(port.type, port.type)
-    name = f"`{port.name}`" if port is last else f"`{port.name}` to `{last.name}`"
-    cells = [name, cell, port.unit or "", port.description]
-    if port.causality == "parameter":
-        starts = [_start(one) for one in ports]
-        while len(starts) > 1 and starts[-1] == starts[-2]:
-            starts.pop()
-        cells[3:3] = [", ".join(starts), _range(port), port.variability]
-    elif port.causality == "output":
-        groups = dict.fromkeys(name.split(".")[0] for name in port.feedthrough)
-        cells.append(", ".join(f"`{group}`" for group in groups))
-    return cells
+def _described(port: Port) -> str:
+    """The description without the name of a member at its end."""
+    found = _MEMBER.search(port.name)
+    end = f": {found[0].strip('.[]')}" if found else ""
+    return port.description.removesuffix(end).replace("|", r"\|")
+
+
+def _groups(port: Port) -> str:
+    """The groups of inputs that an output follows at once."""
+    groups = dict.fromkeys(name.split(".")[0] for name in port.feedthrough)
+    return ", ".join(f"`{group}`" for group in groups)
+
+
+def _row(members: Sequence[Sequence[Port]], types: Mapping[str, str]) -> list[str]:
+    port = members[0][0]
+    cells = [_names([one[0] for one in members])]
+    if len(members[0]) > 1:
+        cells[0] += f" to {_names([one[-1] for one in members])}"
+    units = dict.fromkeys(one[0].unit or types.get(port.type, port.type) for one in members)
+    cells.append(", ".join(units))
+    description = _described(port)
+    if port.causality != "parameter":
+        return [*cells, description, _groups(port)]
+    starts = [_starts(one) for one in members]
+    if len({*starts}) == 1:
+        starts = starts[:1]
+    tunable = "; tunable" if port.variability == "tunable" else ""
+    between = "; " if len(members[0]) > 1 else ", "
+    return [*cells, between.join(starts), _range(port), f"{description}{tunable}"]
+
+
+def _names(ports: Sequence[Port]) -> str:
+    """The name of the first, and the last parts of the others' names."""
+    first, *others = (port.name for port in ports)
+    ends = (match[0] for match in map(_MEMBER.search, others) if match)
+    return f"`{' '.join((first, *ends))}`"
+
+
+def _starts(ports: Sequence[Port]) -> str:
+    starts = [_start(one) for one in ports]
+    while len(starts) > 1 and starts[-1] == starts[-2]:
+        starts.pop()
+    return ", ".join(starts)
 
 
 def _start(port: Port) -> str:
@@ -170,8 +230,11 @@ def _start(port: Port) -> str:
 def _range(port: Port) -> str:
     if port.choices:
         return ", ".join(f"{number:d} {text}" for text, number in port.choices.items())
-    lower = "" if port.minimum is None else f"≥ {port.minimum:g}"
-    upper = "" if port.maximum is None else f"≤ {port.maximum:g}"
+    lower = upper = ""
+    if port.minimum is not None:
+        lower = "> 0" if port.minimum == POSITIVE else f"≥ {port.minimum:g}"
+    if port.maximum is not None:
+        upper = "< 0" if port.maximum == -POSITIVE else f"≤ {port.maximum:g}"
     return " ".join(filter(None, (lower, upper)))
 
 
@@ -186,8 +249,11 @@ def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[st
 
 def component_html(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
     """The page of a component as one HTML file."""
-    citation = source.definition.origin.citation
-    return html_of(source.name, component_page(source, kind, fmi), citation)
+    made_of = (_NATIVE,) if kind == NATIVE else ()
+    reference = (_REFERENCE.format(name=source.name),) if related_files(source) else ()
+    text = _LINK.sub(r"\1 (`\2` of the project)", source.page)
+    page = page_of(source.definition, (text, *made_of), fmi, reference)
+    return html_of(source.name, page, source.definition.origin.citation)
 
 
 def html_of(title: str, page: str, citation: str = "") -> str:

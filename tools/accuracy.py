@@ -23,7 +23,7 @@ from auv_fmu.paper.output_feedback import ControllerState
 from fmus.ports.port import H_MAX
 from orchestrator import load, simulate
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
@@ -79,7 +79,7 @@ class Runs:
 
     def setting(self, name: str, values: Values) -> Setting:
         """What the equations are given."""
-        changed = {port_name(port): value for port, value in {**QUIET, **values}.items()}
+        changed = {PortName.read(port): value for port, value in {**QUIET, **values}.items()}
         return setting_of(self._systems[name].with_parameters(changed))
 
     def table(self, name: str, values: Values = EULER, step: float = STEP) -> Table:

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from orchestrator import Result, load, simulate
-from orchestrator.cosim.experiment import DELAY, JACOBI
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
@@ -79,7 +78,7 @@ def run(options: argparse.Namespace) -> dict[str, Any]:
             step=step,
             order=options.order,
             # Other masters open rings by a delay.
-            coupling=DELAY if options.order == JACOBI else None,
+            coupling="delay" if options.order == "jacobi" else None,
         )
     outputs = [
         (name, variable.name, variable.reference)

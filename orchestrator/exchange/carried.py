@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from fmus.discovery import RELATED, RELATED_MANIFEST
-from orchestrator.cosim.experiment import GAUSS_SEIDEL, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.formats.ssp.archive import read_document
 from orchestrator.cosim.formats.ssp.reader import bind_parameter_set
 from orchestrator.cosim.hooks.hook import Hook
@@ -229,7 +229,7 @@ class Carried:
             _note_unknown(stimuli, "the table of inputs", findings)
         table = Table()
         # Tools record results after a step, before they set the inputs of its end.
-        plan = make_plan(system, Experiment(stop, step, GAUSS_SEIDEL, start))
+        plan = make_plan(system, Experiment(stop, step, "gauss-seidel", start))
         simulate_to_end(plan, [table], hooks=hooks)
         _note_unknown(expected, "the table of results", findings)
         said = f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"

@@ -13,13 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.cosim.experiment import (
-    DELAY,
-    FEEDTHROUGH,
-    FULL,
-    NONE,
     ORDERS,
     ROUNDING,
-    ZERO,
     Exchange,
     Experiment,
     Order,
@@ -45,9 +40,9 @@ _FIRST = 5
 
 #: What is said of the exchange before the first step.
 _STARTS = {
-    FULL: "",
-    NONE: ", no values exchanged in initialisation mode",
-    ZERO: ", no values exchanged before the first step",
+    "full": "",
+    "none": ", no values exchanged in initialisation mode",
+    "zero": ", no values exchanged before the first step",
 }
 
 
@@ -71,7 +66,7 @@ class Algorithm(NamedTuple):
 
     def turn(self) -> Algorithm:
         """The same with outputs read on the other side."""
-        side = "before" if self.order == FEEDTHROUGH else "after"
+        side = "before" if self.order == "feedthrough" else "after"
         words = f"{self.words}, outputs read {side} values are passed on"
         return self._replace(words=words, turned=True)
 
@@ -129,7 +124,7 @@ def verify(
     order: Order | None = None,
     *,
     events: Sequence[Event] = (),
-    initial: str = FULL,
+    initial: str = "full",
     verbose: bool = False,
 ) -> str:
     """Compare a table from any tool with our own runs of the same system.
@@ -246,8 +241,8 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
         if names != tuple(order):
             return
     # Other tools solve rings, or delay them.
-    for coupling in (None, DELAY) if system.rings() else (None,):
-        delayed = ", rings delayed" * (coupling == DELAY)
+    for coupling in (None, "delay") if system.rings() else (None,):
+        delayed = ", rings delayed" * (coupling == "delay")
         for one in ORDERS if order is None else (order,):
             named = format_order(one)
             words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"

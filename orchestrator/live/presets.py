@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
-from orchestrator.cosim.experiment import LINEAR
 from orchestrator.cosim.hooks.events import (
     Action,
     Alter,
@@ -255,7 +254,7 @@ def _check(prepared: Prepared) -> None:
     most_steps = _MOST_STEPS // len(loops)
     lacking = {
         "rings of direct feedthroughs": system.rings(),
-        "linear inputs": experiment.coupling == LINEAR,
+        "linear inputs": experiment.coupling == "linear",
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,
         f"a system without the {loops[0].vehicle}": loops[0].vehicle not in system.components,

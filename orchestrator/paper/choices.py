@@ -19,7 +19,7 @@ from auv_fmu.paper.disturbance import Disturbance
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.motion_planner import TAU_D
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.cosim.experiment import JACOBI, OrderName
+from orchestrator.cosim.experiment import OrderName
 from orchestrator.paper.measures import (
     EFFORT_PD,
     EFFORT_PROPOSED,
@@ -167,7 +167,7 @@ OF_RUNS = (
         "order",
         (
             Option("everything at t_k"),
-            Option("Jacobi, 20 ms late", order=JACOBI),
+            Option("Jacobi, 20 ms late", order="jacobi"),
         ),
     ),
     Choice(

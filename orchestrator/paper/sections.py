@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
@@ -103,7 +103,7 @@ def _runs(reference: str, scenario: Scenario, kind: KindName) -> dict[str, Reque
         label = companion.scenario.legend
         label += " (2)" * (label == scenario.legend)
         return {scenario.legend: request, label: as_request(companion, prepared, request)}
-    noise, system = port_name(_NOISE), prepared.system
+    noise, system = PortName.read(_NOISE), prepared.system
     if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
         quiet = replace(request, parameters={_NOISE: 0.0})
         return {"with noise": request, "without noise": quiet}

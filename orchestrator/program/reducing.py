@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from fmus.ports.reducer import Reducer
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.vehicle.reduction import sources_of
 from orchestrator.vehicle.signals import Loop
@@ -40,5 +40,7 @@ def looking_at(system: System, loop: Loop, reducers: Iterable[Reducer]) -> Itera
             sources: dict[str, PortName | float] = {
                 port: float(value) for port, value in found.constants.items()
             }
-            sources |= {port: system.named(port_name(names[i])) for port, i in found.places.items()}
+            sources |= {
+                port: system.named(PortName.read(names[i])) for port, i in found.places.items()
+            }
             yield Looking(reducer, [sources[port.name] for port in reducer.ports])

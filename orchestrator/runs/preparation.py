@@ -9,27 +9,31 @@ from pathlib import Path
 
 from auv_fmu.paper.euler import STEP
 from orchestrator.cosim.experiment import (
-    FEEDTHROUGH,
-    GAUSS_SEIDEL,
-    SOLVE,
     Experiment,
 )
 from orchestrator.cosim.fmi.isolated import Isolation, isolation_of
 from orchestrator.cosim.hooks.events import Alter, Event, Events, Set
 from orchestrator.cosim.hooks.hook import Hook
-from orchestrator.cosim.hooks.timing import InputTable, Playback, check_factor
+from orchestrator.cosim.hooks.timing import InputTable, Playback, RealTime
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.cosim.observers.observer import Ending, Observer
 from orchestrator.cosim.plan import Plan, identity, make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import port_name, role_of
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
+from orchestrator.runs.scenario import (
+    Inputs,
+    Scenario,
+    check_events,
+    read_inputs,
+    read_scenario,
+    role_of,
+)
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
@@ -162,8 +166,8 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         step = DEFAULT_STEP if system.step is None else system.step
     order = request.order or scenario.order or None
     coupling = first_given(request.coupling, scenario.coupling)
-    if request.strict and coupling is None and order in (None, FEEDTHROUGH, GAUSS_SEIDEL):
-        coupling = SOLVE
+    if request.strict and coupling is None and order in (None, "feedthrough", "gauss-seidel"):
+        coupling = "solve"
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     plan = make_plan(system, experiment)
     with findings.collecting():
@@ -173,7 +177,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     isolation = isolation_of(request.isolate, request.step_timeout)
     stepping = choose_loop(request.loop, experiment, isolation)
     if request.real_time is not None:
-        check_factor(request.real_time)
+        RealTime.check(request.real_time)
     return Prepared(scenario, plan, isolation, stepping, request.real_time, events, input_table)
 
 
@@ -194,7 +198,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     if scenario.digest and companion.digest:
         companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
     inputs = scenario.inputs or companion.inputs
-    followed = {system.named(port_name(name)) for name in inputs.names} if inputs else ()
+    followed = {system.named(PortName.read(name)) for name in inputs.names} if inputs else ()
     given = prepared.system.expanded(request.parameters)
     shared = {
         target: value

@@ -20,10 +20,10 @@ import numpy as np
 from fmus.kinds import NATIVE, PYTHON
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.binary import runs_python
-from orchestrator.cosim.hooks.checkpoint import Checkpoints, interval_in
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.observers.files import TABLE_FORMATS
 from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import TYPES, Standing, StringTable
 from orchestrator.figures.style import Drawn
@@ -229,7 +229,7 @@ def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
         columns,
         Experiment(**known),
         {
-            port_name(name): value if types.get(name) == "String" else _as_numbers(value)
+            PortName.read(name): value if types.get(name) == "String" else _as_numbers(value)
             for name, value in record["parameters"].items()
         },
         record.get("loop", "python"),
@@ -381,7 +381,7 @@ def checkpoints_of(
 
     """
     if resume and every is None:
-        every = interval_in(folders[0])
+        every = Checkpoints.interval_in(folders[0])
         if every is None:
             raise InputError(
                 f"nothing to resume in {folders[0]}; a run with "

@@ -15,8 +15,6 @@ from typing import Annotated, Any, get_type_hints
 from fmus.kinds import AUTO, KINDS, KindName
 from orchestrator.cosim.experiment import (
     COUPLINGS,
-    FEEDTHROUGH,
-    GAUSS_SEIDEL,
     ORDERS,
     CouplingName,
     Order,
@@ -24,10 +22,10 @@ from orchestrator.cosim.experiment import (
     read_order,
 )
 from orchestrator.cosim.fmi.isolated import STEP_TIMEOUT
-from orchestrator.cosim.hooks.checkpoint import check_every
+from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.loop import LOOPS, LoopName
 from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
-from orchestrator.cosim.observers.observer import check_interval
+from orchestrator.cosim.observers.observer import Selection
 from orchestrator.machine.texts import literal
 
 
@@ -116,8 +114,8 @@ class Request:
         Order | None,
         CliOption(
             f"order in which values pass and components are stepped: {', '.join(ORDERS)}, or the "
-            f"names of all components; default: from the scenario, else {FEEDTHROUGH} where the "
-            f"outputs of the FMUs follow their inputs between steps, else {GAUSS_SEIDEL}",
+            f"names of all components; default: from the scenario, else feedthrough where the "
+            f"outputs of the FMUs follow their inputs between steps, else gauss-seidel",
             type=read_order,
             metavar=f"{'|'.join(ORDERS)}|NAME,...",
         ),
@@ -237,9 +235,9 @@ class Files:
 
     def __post_init__(self) -> None:
         if self.interval is not None:
-            check_interval(self.interval)
+            Selection.check(self.interval)
         if self.checkpoint_every is not None:
-            check_every(self.checkpoint_every)
+            Checkpoints.check(self.checkpoint_every)
 
 
 def _text(value: Any) -> str:

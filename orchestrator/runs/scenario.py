@@ -19,8 +19,8 @@ from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim.experiment import Order
 from orchestrator.cosim.hooks.timing import InputTable
-from orchestrator.cosim.system.names import PortName, port_name
-from orchestrator.cosim.system.structure import System, is_spread
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError
@@ -223,7 +223,8 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
 
     ScenarioFile.check(path, content)
     content["parameters"] = {
-        port_name(key): value for key, value in flatten(content.get("parameters", {}), is_spread)
+        PortName.read(key): value
+        for key, value in flatten(content.get("parameters", {}), System.is_spread)
     }
     vehicles = vehicle_names(content.get("vehicles"))
     for key in content.keys() & {"components", "wires", "steps"}:
@@ -268,7 +269,7 @@ def read_inputs(
     """
     columns = inputs.names
     with _in_file(inputs.file):
-        targets = [system.named(port_name(name)) for name in columns]
+        targets = [system.named(PortName.read(name)) for name in columns]
         variables = [system.component(one.component).variable(one.port) for one in targets]
     times, *values = inputs.columns(variables)
     with _in_file(inputs.file):
@@ -448,3 +449,8 @@ def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[
         if star in key
     }
     return found | {key: value for key, value in table.items() if star not in key or not names}
+
+
+def role_of(component: str) -> str:
+    """What a component is called in its innermost system."""
+    return component.rpartition(".")[2]

@@ -20,7 +20,7 @@ from orchestrator.cosim.hooks.events import (
     Stop,
 )
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, paired, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.cosim.system.values import TYPES, Value
@@ -140,7 +140,7 @@ def _ports(
         InputError: there is none.
 
     """
-    several = system.meant(port_name(text))
+    several = system.meant(PortName.read(text))
     if len(several) > 1:
         if single:
             raise InputError(f"{text} are {len(several)} signals; name one of them")
@@ -180,7 +180,7 @@ def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
 
 def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple[PortName, Any]]:
     """Ports of a group with their values: one for all, or a list with one for each."""
-    return paired(name, ports, value if isinstance(value, list) else [value] * len(ports))
+    return System.paired(name, ports, value if isinstance(value, list) else [value] * len(ports))
 
 
 # What events do

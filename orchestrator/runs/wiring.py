@@ -11,7 +11,7 @@ from typing import Any
 from fmus.discovery import name_of
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, port_name, splits
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.variables import BUS, COMPLETE, Terminal
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed
@@ -38,7 +38,7 @@ def read_wiring(vehicles: int | None = None) -> dict[str, Any]:
 
 def component_of(name: str, components: Collection[str]) -> str:
     """The component that a port or group belongs to; of an unknown one, the text before a dot."""
-    known = (component for component, _ in splits(name) if component in components)
+    known = (component for component, _ in PortName.splits(name) if component in components)
     return next(known, name.partition(".")[0])
 
 
@@ -70,7 +70,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
         PortName(name, variable.name)
         for name, component in components.items()
         for variable in component.having("input")
-        if any(group in groups for group, _ in splits(f"{name}.{variable.name}"))
+        if any(group in groups for group, _ in PortName.splits(f"{name}.{variable.name}"))
     }
     system = System(
         name=wiring["name"],
@@ -142,7 +142,7 @@ def _changed(
                 f"{scenario.name}: component {name!r}: write letters, digits and _ only, and dots "
                 "between the names of systems"
             )
-        for system, _ in splits(name):
+        for system, _ in PortName.splits(name):
             if system in there:
                 findings.problem(f"{scenario.name}: {system} and {name} cannot both be components")
     for target in scenario.wires.keys() - wires.keys():
@@ -174,7 +174,7 @@ def _changed(
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
     """The connections of one wire: of ports, of terminals, or inputs of a group take namesakes."""
     for name in (target, source):
-        port_name(name)
+        PortName.read(name)
     to, start = (component_of(name, components) for name in (target, source))
     group, source_group = target[len(to) + 1 :], source[len(start) + 1 :]
     for name in (to, start):

@@ -18,7 +18,7 @@ from orchestrator.cosim.experiment import Experiment, Order
 from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import InputError
@@ -187,11 +187,13 @@ class _Known:
         """All parameters of a program by their names, and the values that the system has."""
         names = ready.source.parameters
         parameters = {name: self._parameter(place, name) for place, name in enumerate(names)}
-        own = [_number(one, self.system.value(port_name(name))) for name, one in parameters.items()]
+        own = [
+            _number(one, self.system.value(PortName.read(name))) for name, one in parameters.items()
+        ]
         return parameters, np.array(own, dtype=float)
 
     def _parameter(self, place: int, text: str) -> _Parameter:
-        name = self.system.named(port_name(text))
+        name = self.system.named(PortName.read(text))
         variable = self.system.components[name.component].variables[name.port]
         port = self._ports[name]
         return _Parameter(place, port, {key: int(v) for key, v in variable.items.items()})

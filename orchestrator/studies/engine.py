@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 from orchestrator.cosim.experiment import Order
 from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, choose_loop
 from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
@@ -149,7 +149,7 @@ class FmuEngine:
     def _outcome(self, point: Point) -> Outcome:
         prepared = self._prepared[point.scenario]
         system = prepared.system.with_parameters(
-            {port_name(name): value for name, value in point.parameters.items()}
+            {PortName.read(name): value for name, value in point.parameters.items()}
         )
         experiment = replace(
             prepared.experiment, stop_time=point.stop_time, step=point.step, order=point.order

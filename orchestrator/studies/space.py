@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
@@ -120,7 +120,7 @@ class Space:
         self._points = draw_shares(study.sample) if study.sample else np.empty((1, 0))
         names = {name for name in (*given, *study.varied) if name != STEP}
         self._has = {
-            scenario: {name for name in names if system.has(port_name(name))}
+            scenario: {name for name in names if system.has(PortName.read(name))}
             for scenario, (_, system) in systems.items()
         }
         self.prepared: dict[str, Prepared] = {}
@@ -216,7 +216,7 @@ class _Known:
         """The unit of a value; empty: it has none, or not the same in all systems."""
         if name == STEP:
             return "s"
-        target = port_name(name)
+        target = PortName.read(name)
         having = [(one, one.named(target)) for one in self._systems if one.has(target)]
         units = {one.component(of.component).variable(of.port).unit or "" for one, of in having}
         return units.pop() if len(units) == 1 else ""
@@ -233,7 +233,7 @@ class _Known:
 
     def expanded(self, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values by ports only, as the first system has them that has a port."""
-        stated = {port_name(name): value for name, value in values.items()}
+        stated = {PortName.read(name): value for name, value in values.items()}
         found: dict[str, Any] = {}
         unknown = dict.fromkeys(map(str, stated))
         for system in reversed(self._systems):
@@ -244,7 +244,7 @@ class _Known:
         return {**{name: values[name] for name in unknown}, **found}
 
     def _variable(self, name: str) -> Variable:
-        target = port_name(name)
+        target = PortName.read(name)
         system = next((one for one in self._systems if one.has(target)), self._systems[-1])
         target = system.named(target)
         return system.component(target.component).variable(target.port)

@@ -15,8 +15,8 @@ import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from orchestrator.cosim.experiment import ORDERS
-from orchestrator.cosim.system.names import port_name
-from orchestrator.cosim.system.structure import is_spread
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
 from orchestrator.figures.study_values import (
     CHARTS,
     INFLUENCE,
@@ -237,7 +237,7 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         str(path.parent / scenario) if path and is_path(scenario) else scenario
         for scenario in ([names] if isinstance(names, str) else names)
     )
-    entries["parameters"] = dict(flatten(content.get("parameters", {}), is_spread))
+    entries["parameters"] = dict(flatten(content.get("parameters", {}), System.is_spread))
     entries["vary"] = {}
     for key, value in flatten(content.get("vary", {}), _is_range):
         with findings.collecting():
@@ -310,7 +310,7 @@ def _check_names(where: str, study: Study) -> None:
     for name in stated:
         if name != STEP or name in study.parameters:
             try:
-                port_name(name)
+                PortName.read(name)
             except InputError as error:
                 findings.problem(f"{where}: {error}")
         if stated.count(name) > 1:

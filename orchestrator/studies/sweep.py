@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
-from orchestrator.cosim.experiment import LINEAR
 from orchestrator.cosim.loop import LOOPS, LoopName
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.study_values import FigureEntry
@@ -303,9 +302,9 @@ def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
         if name == BATCH and one.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
-        if name == BATCH and one.experiment.coupling == LINEAR:
+        if name == BATCH and one.experiment.coupling == "linear":
             raise InputError(
-                f"{scenario}: coupling {LINEAR} goes back in time, which engine {BATCH!r} cannot; "
+                f"{scenario}: coupling linear goes back in time, which engine {BATCH!r} cannot; "
                 f"use --engine {FMU}"
             )
 

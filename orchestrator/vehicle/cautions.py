@@ -18,7 +18,7 @@ from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from fmus.ports.reducer import read_reducer
 from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import listed
@@ -73,7 +73,7 @@ def values_of(system: System) -> ValueOf:
     """The values of the parameters of a system."""
 
     def value(name: str) -> Value | None:
-        port = port_name(name)
+        port = PortName.read(name)
         return system.value(port) if system.has(port) else None
 
     return value
@@ -119,7 +119,7 @@ def differing_vehicle(system: System) -> str | None:
 def _differing(system: System, loop: Loop) -> str | None:
     texts, others = [], set()
     for text in (loop.ell, *loop.vehicle_parameters, *loop.limits):
-        name = system.named(port_name(text))
+        name = system.named(PortName.read(text))
         true, held = _real_parameter(system, name), dict[float, list[str]]()
         for other in (loop.controller, loop.planner):
             same = PortName(other, name.port)

@@ -23,7 +23,7 @@ from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from orchestrator.cosim.observers.files import CsvLines
 from orchestrator.cosim.observers.observer import Ending, Header, every
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.cautions import gain_of_a_step, values_of
@@ -71,7 +71,7 @@ def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
     system.check()
 
     def value(name: str) -> Any:
-        return system.value(port_name(name))
+        return system.value(PortName.read(name))
 
     def of(name: str) -> Any:
         return value(f"{loop.controller}.{name}")
@@ -162,7 +162,7 @@ def stated(found: Theorem) -> Iterator[str]:
 def _sampling(system: System, loop: Loop) -> list[str]:
     """What the step asks of k_d."""
     lambda_, h = (
-        float(system.value(port_name(f"{loop.controller}.{name}")) or 0.0)
+        float(system.value(PortName.read(f"{loop.controller}.{name}")) or 0.0)
         for name in ("lambda", "h_max")
     )
     rate = observer_rate(lambda_, gain_of_a_step(values_of(system), h, loop.controller))

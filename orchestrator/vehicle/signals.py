@@ -18,7 +18,7 @@ from auv_fmu.paper.attitude import rotation_from_euler
 from auv_fmu.paper.control_point import control_point
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName, splits
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 from orchestrator.machine.errors import InputError
@@ -229,7 +229,7 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
 
 def value_of(table: Table, name: str) -> Value | None:
     """The value of a parameter `component.name` in a run; None: there is none."""
-    names = (PortName(component, port) for component, port in splits(name))
+    names = (PortName(component, port) for component, port in PortName.splits(name))
     return next((table.parameters[one] for one in names if one in table.parameters), None)
 
 

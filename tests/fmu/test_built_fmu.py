@@ -228,11 +228,16 @@ def test_page_icon_and_licences_are_inside(dist: Path, name: str):
         licences = archive.read("documentation/licenses/license.txt").decode()
         assert archive.read("model.png").startswith(b"\x89PNG")
     description = fmpy.read_model_description(dist / f"{name}.fmu")
-    first: dict[str, str] = {}
+    named: set[str] = set()
+    for code in re.findall(r"<code>([^<]+)</code>", shown):
+        # The members of a group have one row, `y.x .y .z`.
+        first, *ends = code.split()
+        stem = re.sub(r"(\.\w+|\[\d+\])$", "", first)
+        named |= {first, *(stem + end for end in ends)}
     for variable in description.modelVariables:
         # A list of things with members has one row: from the first of them to the last.
-        name = first.setdefault(re.sub(r"\[\d+\]\.", "[].", variable.name), variable.name)
-        assert f"<code>{name}</code>" in shown
+        first = re.sub(r"\[\d+\]\.", "[1].", variable.name)
+        assert named & {variable.name, first, first.replace("[1].", "[2].")}, variable.name
     assert licences.count("Permission is hereby granted") == 2
 
 

@@ -113,7 +113,7 @@ def test_page_has_the_ports(tree: Path):
         f"print(component_page(source_of({NAME!r})))",
     )
     assert page.startswith("# FirstOrderLag\n\n```text\nT dx/dt = u - x")
-    assert "| `y` | Real | m | Value, measured |" in page
+    assert "| `y` | m | Value, measured |" in page
 
 
 def test_both_kinds_give_the_same_numbers_and_they_are_right(tree: Path):

@@ -14,7 +14,7 @@ from orchestrator.cosim.observers.observer import Ending
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
@@ -49,7 +49,7 @@ def outcome(
         experiment: how long, in which steps.
 
     """
-    changes = {port_name(name): value for name, value in values.items()}
+    changes = {PortName.read(name): value for name, value in values.items()}
     table = Table()
     try:
         system = closed_loop(fmus, read_scenario(scenario)).with_parameters(changes)

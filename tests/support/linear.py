@@ -14,7 +14,7 @@ from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from support.small_fmus import description, unknown, variable, write
 
@@ -174,7 +174,7 @@ def system_of(
             _PARAMETERS, np.concatenate([m.ravel() for m in part.matrices()]), strict=True
         )
     }
-    connections = tuple(Connection(port_name(s), port_name(t)) for t, s in wires.items())
+    connections = tuple(Connection(PortName.read(s), PortName.read(t)) for t, s in wires.items())
     components = {name: read_component(name, fmu) for name, fmu in fmus.items()}
     return System("linear", components, connections, values, **others)
 

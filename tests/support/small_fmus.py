@@ -16,7 +16,7 @@ import pytest
 
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 
@@ -165,8 +165,10 @@ def connected(
 
     """
     components = {component: read_component(component, fmu) for component, fmu in fmus.items()}
-    connections = tuple(Connection(port_name(s), port_name(t)) for t, s in (wires or {}).items())
-    values = {port_name(parameter): value for parameter, value in (parameters or {}).items()}
+    connections = tuple(
+        Connection(PortName.read(s), PortName.read(t)) for t, s in (wires or {}).items()
+    )
+    values = {PortName.read(parameter): value for parameter, value in (parameters or {}).items()}
     return System(name, components, connections, **others).with_parameters(values)
 
 

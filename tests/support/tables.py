@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.language.quantities import ETA, NU, TAU
-from orchestrator.cosim.experiment import FEEDTHROUGH, Experiment, Order
+from orchestrator.cosim.experiment import Experiment, Order
 from orchestrator.cosim.observers.observer import Header
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 COLUMNS = (
@@ -44,7 +44,9 @@ def loop_table(
     parameters |= dict.fromkeys(STANDARD.lower_limits, -80.0) | dict.fromkeys(
         STANDARD.upper_limits, 80.0
     )
-    known = {port_name(name): value for name, value in parameters.items() if name not in without}
+    known = {
+        PortName.read(name): value for name, value in parameters.items() if name not in without
+    }
     experiment = Experiment(max(n - 1, 1) * STEP, STEP, order)
     return Table.of(Header(columns, experiment, known, units=UNITS), rows)
 
@@ -54,7 +56,7 @@ def at_its_time(table: Table, acting: Collection[str]) -> Table:
 
     The last row then holds what never acts: here it is no number.
     """
-    experiment = replace(table.header.experiment, order=FEEDTHROUGH)
+    experiment = replace(table.header.experiment, order="feedthrough")
     rows = table.rows.copy()
     places = [table.header.place[name] for name in acting if name in table]
     rows[:-1, places] = table.rows[1:, places]
@@ -77,7 +79,7 @@ def fleet_table(n: int, rows: int = 400, without: Collection[str] = ()) -> Table
     values = np.column_stack([one.rows[:, 1:] for one in of_each.values()])
     kept = [i for i, column in enumerate(columns) if column not in without]
     parameters = {
-        port_name(f"{name}.{port}"): value
+        PortName.read(f"{name}.{port}"): value
         for name, one in of_each.items()
         for port, value in one.parameters.items()
     }

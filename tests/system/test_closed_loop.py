@@ -15,7 +15,7 @@ from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.plant import RollAxis
 from auv_fmu.paper.saturation import Saturation
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import tracking_error, true_control_point
@@ -143,7 +143,7 @@ def test_loop_of_fmus_is_the_straight_line_bit_for_bit(noisy: Table):
 )
 @pytest.mark.parametrize("step", [0.02, 0.05])
 def test_additions_are_the_straight_line_bit_for_bit_too(system, values, setting, step):
-    changes = {port_name(name): value for name, value in values.items()}
+    changes = {PortName.read(name): value for name, value in values.items()}
     table = run(system.with_parameters(changes), 200 * step, step)
     rows = rows_of(list(closed_loop(200, setting._replace(h=step))), setting, table)
     for name in rows[0]:

@@ -22,7 +22,7 @@ from orchestrator.commands.main import main
 from orchestrator.cosim.formats.ssp.reader import read_ssp
 from orchestrator.cosim.formats.ssp.writer import write_ssp
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.cosim.system.values import Value
 from orchestrator.exchange.verify import verify
@@ -257,7 +257,7 @@ def test_integers_of_64_bits_are_mapped_exactly(fmu: Path, drawn, how):
     with TemporaryDirectory() as place:
         for value in (sources[0], other):
             system = typed.system_of(fmu, "ab", parameters={f"a.u_{kind}": value})
-            ends = port_name(f"a.y_{kind}"), port_name(f"b.u_{kind}")
+            ends = PortName.read(f"a.y_{kind}"), PortName.read(f"b.u_{kind}")
             system = replace(system, connections=(Connection(*ends, Mapped(pairs)),))
             [path] = write_ssp(system, Path(place))
             read_again = read_ssp(path)
@@ -270,7 +270,7 @@ def test_integers_of_64_bits_are_mapped_exactly(fmu: Path, drawn, how):
 def test_a_mapping_to_what_its_target_cannot_hold_is_refused_by_its_number(fmu: Path, target: int):
     kind = "Int64" if target == 2**63 else "UInt64"
     system = typed.system_of(fmu, "ab")
-    ends = port_name(f"a.y_{kind}"), port_name(f"b.u_{kind}")
+    ends = PortName.read(f"a.y_{kind}"), PortName.read(f"b.u_{kind}")
     system = replace(system, connections=(Connection(*ends, Mapped(((0, target),))),))
     assert mentions(" ".join(map(str, system.problems())), f"{target} {kind}")
 

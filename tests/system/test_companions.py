@@ -10,12 +10,12 @@ import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName, role_of
+from orchestrator.cosim.system.names import PortName
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario import names, read_scenario, role_of
 from orchestrator.vehicle.signals import STANDARD
 from support.markdown import DOCS, blocks
 from support.texts import mentions

@@ -17,7 +17,7 @@ import pytest
 from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import JACOBI, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.hosts import comparison, here
@@ -127,7 +127,7 @@ def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
     assert system.step is not None
     h = system.step
     names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
-    experiment = Experiment(12 * h, h, JACOBI, 0.0)
+    experiment = Experiment(12 * h, h, "jacobi", 0.0)
     rows, *_ = comparison._ran(HOSTS[host], "", system, experiment, str)
     before, after = (dict(zip(names, row, strict=True)) for row in rows[-2:])
     given = (after["sum.x"] - before["sum.x"]) / h

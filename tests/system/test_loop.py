@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, JACOBI, ORDERS, Experiment
+from orchestrator.cosim.experiment import ORDERS, Experiment
 from orchestrator.cosim.fmi.instance import Ended
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.events import Alter, Event, Events
@@ -25,7 +25,7 @@ from orchestrator.cosim.loop import choose_loop
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import StartError
@@ -40,7 +40,7 @@ from support.texts import mentions
 H = 0.5
 
 #: Orders that any system can be run in; None: the first, or the second where its FMUs want that.
-ANY = (None, GAUSS_SEIDEL, JACOBI)
+ANY = (None, "gauss-seidel", "jacobi")
 
 WAYS = pytest.mark.parametrize(
     "way",
@@ -202,7 +202,7 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
     assert table.failure.startswith(f"stopped at t = {len(table) * H:g} s: ")
     # The row that shows it is that of its time, or that of the end of the step; that an integer
     # is too large is seen where it is set, after the row.
-    at_once = order == FEEDTHROUGH and "Integer" not in words
+    at_once = order == "feedthrough" and "Integer" not in words
     assert len(table) == 7 - at_once if target else 7 < len(table) < 400
 
 
@@ -300,10 +300,10 @@ class Pushes:
         return min(self._acts, default=NEVER)
 
     def _begin(self, run: Run) -> None:
-        run.overrides.override(port_name("plant.tau.u"), 0.0)
+        run.overrides.override(PortName.read("plant.tau.u"), 0.0)
 
     def _end(self, run: Run) -> None:
-        run.overrides.release(port_name("plant.tau.u"))
+        run.overrides.release(PortName.read("plant.tau.u"))
 
     def _stop(self, run: Run) -> None:
         raise Ended("enough")

@@ -18,7 +18,7 @@ from orchestrator.cosim.observers.files import CsvFile, ParquetFile
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
@@ -123,7 +123,7 @@ def test_integers_beyond_doubles_come_to_files_exactly(fmu, tmp_path):
     plan = make_plan(system, Experiment(STOP, H))
     simulate_plan(plan, [table, *files])
     assert table["a.counter"].tolist() == expected
-    assert table.header.parameters[port_name("a.counts_from")] == begin
+    assert table.header.parameters[PortName.read("a.counts_from")] == begin
     lines = (tmp_path / "it.csv").read_text().splitlines()
     places = [lines[0].split(",").index(name) for name in ("a.counter", "a.y_UInt64")]
     found = [[int(line.split(",")[place]) for place in places] for line in lines[1:]]
@@ -202,7 +202,7 @@ def test_versions_feed_each_other(fmu, tmp_path, way, source, target):
     for name in {target, *(["new.u_Float64"] if source == "new.w[2]" else [])}:
         values.pop(name, None)
     system = feeding(tmp_path, fmu, source, target)
-    system = system.with_parameters({port_name(name): value for name, value in values.items()})
+    system = system.with_parameters({PortName.read(name): value for name, value in values.items()})
     table = run(system, **way)
     assert table.failure is None
     assert table[target].tolist() == table[source].tolist()

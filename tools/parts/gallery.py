@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from orchestrator.figures.run_figures import FLEET
 from orchestrator.figures.study_values import Values
@@ -17,26 +17,23 @@ PICTURES = "images"
 
 #: What one sees on the pictures of scenarios, by their kind of figure.
 SEEN = {
-    "tracking": "path of the vehicle and its reference in space; over time the tracking errors, "
-    "the commands and their limits, and the estimated parameters",
-    "comparison": "paths of both vehicles and their reference in space; over time the commands and "
-    "their limits, and the tracking errors, also on a logarithmic scale",
-    FLEET: "paths of all vehicles and their references in space, and from above; over time the "
-    "sizes of their tracking errors, and the distances between them",
-    "comparison-errors": "tracking errors of both controllers over time, also on a logarithmic "
-    "scale",
-    "open-loop-surge": "path of the vehicle in space; over time its surge velocity and "
-    "acceleration",
-    "open-loop-turn": "path of the vehicle in space and from above; over time its linear and "
-    "angular velocities and accelerations",
+    "tracking": "path, tracking errors, commands and estimated parameters",
+    "comparison": "both paths, commands and tracking errors",
+    FLEET: "paths, tracking errors and distances of all vehicles",
+    "comparison-errors": "tracking errors of both controllers",
+    "open-loop-surge": "path, surge velocity and acceleration",
+    "open-loop-turn": "path, velocities and accelerations",
 }
+
+#: How many pictures are side by side.
+_COLUMNS = 2
 
 
 def gallery() -> dict[str, str]:
     """The scenarios and the studies."""
     return {
-        "scenarios": "\n\n".join(map(_scenario, sorted(map(read_scenario, names()), key=_place))),
-        "studies": "\n\n".join(map(_study, map(read_study, ready_studies()))),
+        "scenarios": _grid(map(_scenario, sorted(map(read_scenario, names()), key=_place))),
+        "studies": _grid(map(_study, map(read_study, ready_studies()))),
     }
 
 
@@ -72,16 +69,15 @@ def seen(study: Study, figure: str) -> str:
 
 
 def _scenario(scenario: Scenario) -> str:
-    title = scenario.title
-    figure = FLEET if scenario.vehicles else scenario.figure
-    shown = f"{title}: {SEEN[figure]}", f"{PICTURES}/{scenario.name}.png"
-    command = f"run {scenario.name}"
-    return _entry(title, shown, _sentence(scenario.remark), command, scenario.name)
+    alternative = SEEN[FLEET if scenario.vehicles else scenario.figure]
+    file = f"{PICTURES}/{scenario.name}.png"
+    return _cell(scenario.title, alternative, file, f"run {scenario.name}", scenario.name)
 
 
-def _place(scenario: Scenario) -> tuple[bool, str]:
-    """The paper's scenarios come first."""
-    return not scenario.name.startswith("fig"), scenario.name
+def _place(scenario: Scenario) -> tuple[bool, bool, str]:
+    """The paper's scenarios come first, and of these the ones without a controller last."""
+    name = scenario.name
+    return not name.startswith("fig"), name.startswith("fig3"), name
 
 
 def _study(study: Study) -> str:
@@ -92,23 +88,26 @@ def _study(study: Study) -> str:
     stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
     # The live page knows no stars in names.
     preset = "" if any("*" in one for one in stated) else "&".join(stated)
-    return _entry(
-        study.title,
-        (seen(study, first), f"{PICTURES}/{picture(study, first)}"),
-        _sentence(study.remark),
-        f"sweep {study.name}",
-        preset,
+    alternative = seen(study, first).removeprefix(f"{study.title}: ")
+    file = f"{PICTURES}/{picture(study, first)}"
+    return _cell(study.title, alternative, file, f"sweep {study.name}", preset)
+
+
+def _cell(title: str, alternative: str, file: str, command: str, preset: str) -> str:
+    live = f" <!-- live: {preset} -->" if preset else ""
+    shown = f"[![{alternative}]({file})]({file})"
+    return f"{shown}<br>**{title}**<br>`auv-fmu {command}`{live}"
+
+
+def _grid(cells: Iterable[str]) -> str:
+    """A table of pictures."""
+    left = [*cells]
+    rows = [left[k : k + _COLUMNS] for k in range(0, len(left), _COLUMNS)]
+    rows[-1] += [""] * (_COLUMNS - len(rows[-1]))
+    return "\n".join(
+        [
+            f"|{' |' * _COLUMNS}",
+            f"|{'---|' * _COLUMNS}",
+            *(f"| {' | '.join(row)} |" for row in rows),
+        ]
     )
-
-
-def _entry(title: str, shown: tuple[str, str], sentence: str, command: str, preset: str) -> str:
-    words, file = shown
-    live = f"\n\n<!-- live: {preset} -->" if preset else ""
-    return f"### {title}\n\n[![{words}]({file})]({file})\n\n{sentence}\n\n`auv-fmu {command}`{live}"
-
-
-def _sentence(remark: str) -> str:
-    """The first sentence."""
-    text = " ".join(remark.removeprefix("\n").split()).removeprefix("Not in the paper: ")
-    first = re.split(r"(?<=\.)\s+(?=[A-Z])", text)[0]
-    return first[:1].upper() + first[1:]

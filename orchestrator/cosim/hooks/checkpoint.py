@@ -174,17 +174,6 @@ class _Stored(NamedTuple):
     lasting: Sequence[Any] = ()
 
 
-def check_every(every: float) -> None:
-    """Check before a run that there can be a checkpoint for so many seconds.
-
-    Raises:
-        InputError: they are not positive, or not finite.
-
-    """
-    if not (isfinite(every) and every > 0.0):
-        raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
-
-
 class Checkpoints:
     """An observer and hook that writes checkpoints, and begins with the one that it finds.
 
@@ -195,6 +184,28 @@ class Checkpoints:
         time: of the checkpoint in the folder [s]; None: there is none.
 
     """
+
+    @staticmethod
+    def check(every: float) -> None:
+        """Check before a run that there can be a checkpoint for so many seconds.
+
+        Raises:
+            InputError: they are not positive, or not finite.
+
+        """
+        if not (isfinite(every) and every > 0.0):
+            raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
+
+    @staticmethod
+    def interval_in(folder: Path) -> float | None:
+        """Interval of the last checkpoint in a folder [s]; None: there is none.
+
+        Raises:
+            InputError: it cannot be read.
+
+        """
+        found = _read(folder)
+        return None if found is None else found.every
 
     def __init__(
         self,
@@ -219,7 +230,7 @@ class Checkpoints:
             InputError: the checkpoint there is not asked for, or not the right one.
 
         """
-        check_every(every)
+        Checkpoints.check(every)
         self.folder, self._identity, self._every = folder, identity, every
         self._found = self._look(resume, force)
         self._token = self._found.identity if self._found else token or uuid4().hex
@@ -359,17 +370,6 @@ class Checkpoints:
 def _lasting(run: Run) -> list[Lasting]:
     hooks = [one for one in run.hooks if isinstance(one, Lasting)]
     return [run.row.strings, run.overrides, run.log, *hooks]
-
-
-def interval_in(folder: Path) -> float | None:
-    """For how many seconds the last checkpoint in a folder was written [s]; None: there is none.
-
-    Raises:
-        InputError: it cannot be read.
-
-    """
-    found = _read(folder)
-    return None if found is None else found.every
 
 
 def _read(folder: Path) -> _Stored | None:

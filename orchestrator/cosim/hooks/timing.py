@@ -155,17 +155,6 @@ class Lateness:
         return self._worst
 
 
-def check_factor(factor: float) -> None:
-    """Check before a run that a clock can set its pace.
-
-    Raises:
-        InputError: it cannot.
-
-    """
-    if not (isfinite(factor) and factor > 0.0):
-        raise InputError(f"real time x {factor:g}: the factor must be positive and finite")
-
-
 class RealTime:
     """A hook that makes a run wait for a clock, and measures by how much it is late.
 
@@ -177,6 +166,17 @@ class RealTime:
         lateness: of the steps whose time the clock was asked for.
 
     """
+
+    @staticmethod
+    def check(factor: float) -> None:
+        """Check before a run that a clock can set its pace.
+
+        Raises:
+            InputError: it cannot.
+
+        """
+        if not (isfinite(factor) and factor > 0.0):
+            raise InputError(f"real time x {factor:g}: the factor must be positive and finite")
 
     def __init__(self, factor: float) -> None:
         """Run as many simulated seconds in a second."""

@@ -250,19 +250,19 @@ def every(interval: float | None, header: Header) -> Every | None:
     return Every(interval, header.experiment.start_time)
 
 
-def check_interval(interval: float) -> None:
-    """Check before a run that its interval can be kept.
-
-    Raises:
-        InputError: it is not positive.
-
-    """
-    if not interval > 0.0:
-        raise InputError(f"interval {interval:g} s must be positive")
-
-
 class Selection:
     """An observer that hands on a part of the rows and columns to another."""
+
+    @staticmethod
+    def check(interval: float) -> None:
+        """Check before a run that its interval can be kept.
+
+        Raises:
+            InputError: it is not positive.
+
+        """
+        if not interval > 0.0:
+            raise InputError(f"interval {interval:g} s must be positive")
 
     def __init__(
         self,
@@ -280,7 +280,7 @@ class Selection:
         """
         self._observer, self._columns = observer, columns
         if interval is not None:
-            check_interval(interval)
+            self.check(interval)
         self._interval = interval
         self._last = np.empty((0, 0))
 

@@ -19,7 +19,7 @@ from orchestrator.cosim.experiment import MOST_STEPS, ROUNDING
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection, can_feed, check_connection
 from orchestrator.cosim.system.graph import in_levels, opened, strongly_connected, without_rings
-from orchestrator.cosim.system.names import PortName, likely_port, paired, port_name, splits
+from orchestrator.cosim.system.names import PortName, likely_port
 from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import InputError, did_you_mean, listed
@@ -95,7 +95,7 @@ class System:
         """Values by ports only: a list for a group has a value for each member. The last one wins.
 
         A star in a component's name stands for any text without a dot. A value that
-        :func:`is_spread` differs from component to component. Names without a star win.
+        :meth:`is_spread` differs from component to component. Names without a star win.
 
         Raises:
             InputError: a name is not one of a port, or there are not as many values as ports.
@@ -108,12 +108,36 @@ class System:
             for name, value in zip(meant, _spread(stated, values_of, len(meant)), strict=True):
                 several = None if self.has(name) else _several(value)
                 ports = [] if several is None else self.members(str(name), ("parameter", "input"))
-                found |= dict(paired(name, ports, several)) if several and ports else {name: value}
+                found |= (
+                    dict(self.paired(name, ports, several)) if several and ports else {name: value}
+                )
         return found
+
+    @staticmethod
+    def paired(
+        name: object, ports: Sequence[PortName], values: Sequence[Any]
+    ) -> Iterator[tuple[PortName, Any]]:
+        """The ports of a group, each with its value.
+
+        Raises:
+            InputError: there are more of one than of the other.
+
+        """
+        if len(values) != len(ports):
+            raise InputError(f"{name}: takes {len(ports)} values, not {len(values)}")
+        return zip(ports, values, strict=True)
+
+    @staticmethod
+    def is_spread(value: object) -> bool:
+        """Whether a value says what each of several components gets.
+
+        `{"each": [1, 2, 4]}` lists the values, `{"first": 1, "step": 2}` counts from the first on.
+        """
+        return isinstance(value, Mapping) and value.keys() in ({"each"}, {"first", "step"})
 
     def meant(self, name: PortName) -> list[PortName]:
         """The ports or groups that a name with stars means; any other name means itself."""
-        for like, port in splits(str(name)) if STAR in str(name) else ():
+        for like, port in PortName.splits(str(name)) if STAR in str(name) else ():
             starts = tuple(port + mark for mark in _MEMBER)
             found = [
                 PortName(one, port)
@@ -128,16 +152,16 @@ class System:
     def _port_name(self, text: str) -> PortName:
         """The name of a port; where it lacks a component, the message says which ones have it."""
         try:
-            return port_name(text)
+            return PortName.read(text)
         except InputError as error:
             whole = (f"{name}.{text}" for name in self.components)
-            having = [name for name in whole if self.has(port_name(name))]
+            having = [name for name in whole if self.has(PortName.read(name))]
             hint = f"; did you mean {' or '.join(having)}?" if having else ""
             raise InputError(f"{error}{hint}") from None
 
     def members(self, text: str, causalities: Sequence[str]) -> list[PortName]:
         """The ports of a group `component.group`, in their order; none: there is no such group."""
-        for component, group in splits(text):
+        for component, group in PortName.splits(text):
             if component in self.components:
                 starts = tuple(group + mark for mark in _MEMBER)
                 found = [
@@ -157,7 +181,7 @@ class System:
         of the one that was likely meant. With a star, it is the first of those it means.
         """
         name, components, likely = self.meant(name)[0], self.components, None
-        for component, port in splits(str(name)):
+        for component, port in PortName.splits(str(name)):
             if component in components:
                 if port in components[component].variables:
                     return PortName(component, port)
@@ -289,7 +313,7 @@ class System:
     def _ambiguous(self) -> Iterator[str]:
         """Names that two ports share, when one component's name begins another's."""
         for name, component in self.components.items():
-            for outer, rest in splits(name):
+            for outer, rest in PortName.splits(name):
                 if outer in self.components:
                     others = self.components[outer].variables
                     for port in component.variables:
@@ -548,14 +572,6 @@ class System:
         )
 
 
-def is_spread(value: object) -> bool:
-    """Whether a value says what each of several components gets.
-
-    `{"each": [1, 2, 4]}` lists the values, `{"first": 1, "step": 2}` counts from the first on.
-    """
-    return isinstance(value, Mapping) and value.keys() in ({"each"}, {"first", "step"})
-
-
 def _could_feed(source: Component, variable: Variable) -> bool:
     """Whether a component has an output of the name and type of an input."""
     output = source.variables.get(variable.name)
@@ -583,7 +599,7 @@ def _spread(name: PortName, value: Any, n: int) -> list[Any]:
         InputError: there are more or fewer of them.
 
     """
-    if not is_spread(value):
+    if not System.is_spread(value):
         return [value] * n
     if "each" in value:
         if not isinstance(value["each"], list) or len(value["each"]) != n:

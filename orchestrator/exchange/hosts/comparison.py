@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import FULL, JACOBI, NONE, ZERO, Experiment, read_order
+from orchestrator.cosim.experiment import Experiment, read_order
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.hosts import drivers, here
@@ -57,8 +57,8 @@ class Host:
     package: str
     run: Callable[..., Any]
     fmi: Sequence[str] = _FMI_2
-    order: str = JACOBI
-    initial: str = FULL
+    order: str = "jacobi"
+    initial: str = "full"
     turned: bool = False
     pins: Sequence[str] = ()
 
@@ -108,29 +108,31 @@ HOSTS: dict[str, Host] = {
     "libcosim-osp": Host("libcosimpy", here.libcosim_osp),
     "ecos": Host("ecospy", here.ecos, _BOTH, turned=True),
     "fmpy": Host("fmpy", drivers.fmpy_slaves, _BOTH),
-    "fmpy-ssp": Host("fmpy", here.fmpy_ssp, initial=ZERO),
-    "cofmupy": Host("cofmupy", drivers.cofmupy, _BOTH, _REST, ZERO, pins=["cofmupy==1.0.0"]),
+    "fmpy-ssp": Host("fmpy", here.fmpy_ssp, initial="zero"),
+    "cofmupy": Host("cofmupy", drivers.cofmupy, _BOTH, _REST, "zero", pins=["cofmupy==1.0.0"]),
     "fmuloader": Host("fmuloader", drivers.fmuloader, _BOTH, pins=["fmuloader==0.1.2rc0"]),
     "gemseo-fmu": Host(
-        "gemseo-fmu", drivers.gemseo_fmu, _BOTH, _REST, ZERO, pins=["gemseo-fmu==3.1.1"]
+        "gemseo-fmu", drivers.gemseo_fmu, _BOTH, _REST, "zero", pins=["gemseo-fmu==3.1.1"]
     ),
     "pathsim-fmi": Host(
         "pathsim-fmi",
         drivers.pathsim_fmi,
         _BOTH,
         "plant,controller,disturbance,planner",
-        NONE,
+        "none",
         pins=["pathsim-fmi==0.1.1", "pathsim==0.27.1"],
     ),
     "pycosimlibrary": Host(
         "PyCosimLibrary",
         drivers.pycosimlibrary,
-        initial=NONE,
+        initial="none",
         turned=True,
         pins=["PyCosimLibrary==0.0.5", "fmpy==0.2.14"],
     ),
-    "sdf4sim": Host("sdf4sim", drivers.sdf4sim, initial=ZERO, pins=["sdf4sim==0.6.0"]),
-    "sofirpy": Host("sofirpy", drivers.sofirpy, initial=ZERO, turned=True, pins=["sofirpy==1.0.2"]),
+    "sdf4sim": Host("sdf4sim", drivers.sdf4sim, initial="zero", pins=["sdf4sim==0.6.0"]),
+    "sofirpy": Host(
+        "sofirpy", drivers.sofirpy, initial="zero", turned=True, pins=["sofirpy==1.0.2"]
+    ),
     "syssimx": Host(
         "syssimx",
         drivers.syssimx_gauss_seidel,
@@ -162,7 +164,7 @@ def compare(
 
     """
     start = system.start_time or 0.0
-    asked = Experiment(start + steps * step, step, JACOBI, start)
+    asked = Experiment(start + steps * step, step, "jacobi", start)
     names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
 
     @cache

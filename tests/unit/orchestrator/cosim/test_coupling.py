@@ -14,7 +14,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.instance import Log
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.row import Row
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.errors import InputError, StartError
 from support.static import Static, static_system
 from support.texts import mentions
@@ -36,7 +36,7 @@ def coupled(folder: Path, wires, coupling: str | None = None, steps=(), **functi
 
 
 def value(row: Row, name: str) -> float:
-    return float(row.values[row.columns[port_name(name)]])
+    return float(row.values[row.columns[PortName.read(name)]])
 
 
 def test_values_rest_before_the_first_step_whatever_the_order_of_components(folder):

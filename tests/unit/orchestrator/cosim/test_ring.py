@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from orchestrator.cosim.fmi.instance import ComponentFailed
 from orchestrator.cosim.ring import Ring
 from orchestrator.cosim.row import Row
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.units import Linear
 from support.static import Function, Static, static_system
 from support.texts import mentions
@@ -40,7 +40,7 @@ def ring_of(folder: Path, wires=BACK, kind: str = "Real", **functions: Function)
 
 
 def value(row: Row, name: str) -> float:
-    return float(row.values[row.columns[port_name(name)]])
+    return float(row.values[row.columns[PortName.read(name)]])
 
 
 SLOPES = st.lists(st.floats(-20.0, 20.0), min_size=8, max_size=8)
@@ -124,10 +124,10 @@ def test_a_ring_is_closed_anew_only_where_something_has_changed(folder):
     assert not ring.renew()
     assert [instances[name].exchanged for name in "ab"] == before
     assert ring.renew(always=True)
-    row.values[row.columns[port_name("a.u")]] = 5.0
+    row.values[row.columns[PortName.read("a.u")]] = 5.0
     assert ring.renew()
     assert value(row, "b.y") == pytest.approx(6.0, abs=1e-12)
-    row.values[row.columns[port_name("c.y")]] = 4.0
+    row.values[row.columns[PortName.read("c.y")]] = 4.0
     assert ring.renew()
     assert value(row, "b.y") == pytest.approx(8.0, abs=1e-12)
 

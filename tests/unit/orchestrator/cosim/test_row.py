@@ -12,7 +12,7 @@ import pytest
 from orchestrator.cosim.row import Gathering, Overrides, Row
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
 from support.archives import fmu, variable
@@ -60,8 +60,8 @@ def test_ports_of_one_causality_and_type_are_neighbours(system: System):
 
 
 def test_inputs_start_with_what_their_description_says_and_what_is_set(system: System):
-    values = {port_name("a.u"): 5.0, port_name("a.v"): nan, port_name("b.k"): 1.0}
-    row, _ = made(system.with_parameters({port_name("a.u"): 5.0}))
+    values = {PortName.read("a.u"): 5.0, PortName.read("a.v"): nan, PortName.read("b.k"): 1.0}
+    row, _ = made(system.with_parameters({PortName.read("a.u"): 5.0}))
     row.enter(values)
     found = {str(port): row.values[column] for port, column in row.columns.items()}
     assert (found["a.u"], found["a.v"], found["a.n"]) == (5.0, 4.0, 3.0)
@@ -97,7 +97,7 @@ def test_hidden_outputs_are_shown_when_they_are_copied(system: System):
 def test_the_first_value_that_cannot_be_is_named(system: System, values, words):
     row, _ = made(system)
     for name, value in values.items():
-        row.values[row.columns[port_name(name)]] = value
+        row.values[row.columns[PortName.read(name)]] = value
     with np.errstate(all="ignore"):
         said = row.wrong("ab")
     assert said is None if words is None else mentions(said, words)
@@ -106,16 +106,16 @@ def test_the_first_value_that_cannot_be_is_named(system: System, values, words):
 def test_ports_that_move_are_those_that_change_by_more_than_rounding(system: System):
     row, _ = made(system)
     before = row.values.copy()
-    row.values[row.columns[port_name("a.u")]] *= 1.0 + 1e-15
-    row.values[row.columns[port_name("b.v")]] += 1e-9
-    assert row.moving(before) == [port_name("b.v")]
+    row.values[row.columns[PortName.read("a.u")]] *= 1.0 + 1e-15
+    row.values[row.columns[PortName.read("b.v")]] += 1e-9
+    assert row.moving(before) == [PortName.read("b.v")]
 
 
 def test_places_are_those_of_both_ends_of_each_connection(system: System):
     row, _ = made(system)
     targets, sources = row.places(system.connections)
-    np.testing.assert_array_equal(targets, [row.columns[port_name("b.u")]])
-    np.testing.assert_array_equal(sources, [row.columns[port_name("a.y")]])
+    np.testing.assert_array_equal(targets, [row.columns[PortName.read("b.u")]])
+    np.testing.assert_array_equal(sources, [row.columns[PortName.read("a.y")]])
 
 
 OUT, FED, ALSO, FREE = (PortName("a", name) for name in ("out", "fed", "also", "free"))

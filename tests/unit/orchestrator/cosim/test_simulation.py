@@ -13,7 +13,7 @@ from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan, simulate_to_end
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from support.linear import SINE, Part, linear, system_of
@@ -62,7 +62,7 @@ def test_observers_are_told_header_rows_and_end(system: System):
     told: list[object] = []
     ending = simulate_plan(make_plan(system, EXPERIMENT), [Watching(told)])
     header, *blocks, last = told
-    assert header.parameters[port_name("sine.x1")] == 1.0
+    assert header.parameters[PortName.read("sine.x1")] == 1.0
     assert header.experiment == replace(EXPERIMENT, order="feedthrough")
     assert np.vstack(blocks).shape == (9, 1 + len(header.columns))
     assert last == ending
@@ -78,7 +78,9 @@ def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
 
 def test_a_value_that_is_not_finite_ends_the_run_before_its_row(system: System):
     table = Table()
-    grows = system.with_parameters({port_name("sine.A00"): 1e308, port_name("sine.x0"): 1.0})
+    grows = system.with_parameters(
+        {PortName.read("sine.A00"): 1e308, PortName.read("sine.x0"): 1.0}
+    )
     ending = simulate_plan(make_plan(grows, EXPERIMENT), [table])
     assert mentions(ending.failure, "0.125 sine.y0")
     assert len(table) == 1

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cosim.experiment import GAUSS_SEIDEL
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import compose, draw, overlay
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
@@ -57,7 +56,7 @@ def test_lines_hold_the_numbers_of_the_table():
 
 @pytest.mark.parametrize("figure", FIGURES)
 def test_the_row_that_signals_stand_in_changes_no_line(figure):
-    table = loop_table(order=GAUSS_SEIDEL)
+    table = loop_table(order="gauss-seidel")
     acting = (*STANDARD.commanded, *STANDARD.dy_hat, *STANDARD.theta_hat)
     for rows in FIGURES[figure].values():
         one, other = (
@@ -229,8 +228,8 @@ def test_an_unknown_figure_is_refused_with_a_hint():
 def test_waypoints_stand_in_the_path():
     table = loop_table()
     points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
-    known = {port_name("planner.count"): 2} | {
-        port_name(f"planner.waypoint[{k}].{axis}"): value
+    known = {PortName.read("planner.count"): 2} | {
+        PortName.read(f"planner.waypoint[{k}].{axis}"): value
         for k, point in enumerate([*points, [9.0, 9.0, 9.0]], start=1)
         for axis, value in zip("xyz", point, strict=True)
     }

@@ -12,7 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from orchestrator.cosim.observers.observer import Header
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.page_series import extremes
 from orchestrator.figures.style import REFERENCE, Drawn, vehicle_colours
 from orchestrator.figures.view import view_page
@@ -190,7 +190,9 @@ def test_the_names_of_vehicles_are_text_and_no_markup():
     run = three()
     loops = [replace(loop, vehicle=f"<i>.{loop.vehicle}") for loop in run.loops]
     columns = [f"<i>.{name}" if ".plant." in name else name for name in run.result.columns]
-    parameters = {port_name(f"<i>.{name}"): value for name, value in run.result.parameters.items()}
+    parameters = {
+        PortName.read(f"<i>.{name}"): value for name, value in run.result.parameters.items()
+    }
     header = Header(tuple(columns), run.result.header.experiment, parameters)
     text = view_page("run", Drawn("run", Table.of(header, run.result.rows), loops=loops))
     assert '<option value="0">&lt;i&gt;.auv1</option>' in text

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.sections import draw_section, section_text, sections
 from orchestrator.runs.request import Request
@@ -118,7 +118,7 @@ def test_what_is_ours_is_stated_in_the_file(name):
     for entry, why in scenario.ours.items():
         assert why
         if "." in entry:
-            assert port_name(entry) in scenario.parameters
+            assert PortName.read(entry) in scenario.parameters
         else:
             assert getattr(scenario, entry)
 

@@ -7,7 +7,7 @@ import csv
 import numpy as np
 import pytest
 
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.paper import choices
 from orchestrator.paper.choices import (
     END_TIMES,
@@ -52,7 +52,7 @@ COLUMNS = (*STANDARD.posture, *STANDARD.y_d, *STANDARD.applied, *STANDARD.comman
 def run_of(rows=10_001, **columns):
     """A run of 200 s in steps of 20 ms; what is not given is zero."""
     zeros = dict.fromkeys((name.replace(".", "__") for name in COLUMNS), 0.0)
-    known = {port_name(STANDARD.ell): 0.35}
+    known = {PortName.read(STANDARD.ell): 0.35}
     return table_of(0.02 * np.arange(rows), known, **{**zeros, **columns})
 
 
@@ -307,7 +307,9 @@ def test_every_option_changes_the_system(scenario, option):
     """Each parameter is there, takes the value, and has another one in the scenario."""
     system = prepare(*load_scenario(scenario), Request()).system
     for name, value in option.parameters.items():
-        changed = system.with_parameters({port_name(name): value})
-        variable = system.component(port_name(name).component).variable(port_name(name).port)
-        assert changed.value(port_name(name)) != system.value(port_name(name))
-        assert variable.shown(changed.value(port_name(name))) == value
+        changed = system.with_parameters({PortName.read(name): value})
+        variable = system.component(PortName.read(name).component).variable(
+            PortName.read(name).port
+        )
+        assert changed.value(PortName.read(name)) != system.value(PortName.read(name))
+        assert variable.shown(changed.value(PortName.read(name))) == value

@@ -9,7 +9,7 @@ import pytest
 
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import check_brings_its_own, is_path, left_behind, read_fmu
@@ -69,7 +69,7 @@ def test_orders_steps_and_parameters_are_the_user_s(system):
 @pytest.mark.parametrize(
     ("request_", "word"),
     [
-        (Request(parameters={port_name("c.k"): 1.0}), "'c'"),
+        (Request(parameters={PortName.read("c.k"): 1.0}), "'c'"),
         (Request(step=-1.0), "-1 s"),
         (Request(steps={"a": 0.15}), "a"),
         (Request(order=("a",)), "b"),
@@ -86,7 +86,7 @@ def test_inputs_that_nobody_feeds_are_doubts(system):
     scenario = Scenario("s", stop_time=1.0)
     [doubt] = prepare(scenario, system, Request()).doubts()
     assert "a.u" in doubt and "b.u" not in doubt
-    fed = Request(parameters={port_name("a.u"): 0.0})
+    fed = Request(parameters={PortName.read("a.u"): 0.0})
     assert prepare(scenario, system, fed).doubts() == []
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cosim.system.names import port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
@@ -41,7 +41,7 @@ plant.noise.std = 0.0
 plant.noise.std = "no sensor"
 """
 
-U = port_name("plant.tau.u")
+U = PortName.read("plant.tau.u")
 
 
 def read(folder: Path, text: str) -> Scenario:
@@ -235,4 +235,4 @@ def test_table_that_is_no_path_is_refused_in_one_line(tmp_path: Path, text: str,
 def test_path_of_a_scenario_lies_beside_it_and_goes_to_its_planner(tmp_path: Path):
     (tmp_path / "path.csv").write_text("x,y,z\n0,0,0\n9,0,0\n")
     found = read(tmp_path, '[path]\nfile = "path.csv"\ncomponent = "leader"\n')
-    assert found.parameters[port_name("leader.waypoint[2].x")] == 9.0
+    assert found.parameters[PortName.read("leader.waypoint[2].x")] == 9.0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from orchestrator.cosim.hooks.events import Alter, Freeze, Set
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.machine.errors import InputError, Refused
@@ -36,7 +36,7 @@ def action(system, **table):
 
 
 def names(*ports):
-    return tuple(map(port_name, ports))
+    return tuple(map(PortName.read, ports))
 
 
 def test_an_output_means_whoever_it_feeds_and_an_input_itself_alone(system):
@@ -58,7 +58,7 @@ def test_a_group_means_its_members(system):
 
 
 def test_what_is_overridden_is_transformed_as_the_signal_is(system):
-    source, target = port_name("plant.eta.phi"), port_name("controller.eta.phi")
+    source, target = PortName.read("plant.eta.phi"), PortName.read("controller.eta.phi")
 
     def through(transformation, **table):
         wires = (Connection(source, target, transformation),)
@@ -91,8 +91,8 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
     ),
 )
 def test_to_lose_a_signal_is_to_override_it_with_zero(system, source, transformation):
-    target = port_name("controller.eta.phi")
-    wires = (Connection(port_name(source), target, transformation),)
+    target = PortName.read("controller.eta.phi")
+    wires = (Connection(PortName.read(source), target, transformation),)
     wired = replace(system, connections=wires)
     lost = action(wired, lose=source)
     assert lost == action(wired, override={source: 0})

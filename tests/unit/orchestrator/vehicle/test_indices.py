@@ -13,13 +13,13 @@ import pytest
 from fmus.language.build import Program
 from fmus.ports.reducer import read_reducer
 from orchestrator import simulate as run
-from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.loop import choose_loop
 from orchestrator.cosim.observers.observer import Ending, Header
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.study_values import Values
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import FmuEngine
@@ -60,10 +60,10 @@ ESTIMATES = (*STANDARD.dy_hat, *STANDARD.theta_hat)
 TIME = H * np.arange(round(T / H) + 1)
 
 
-def table_with(signals=SIGNALS, order=FEEDTHROUGH, more=()) -> Table:
+def table_with(signals=SIGNALS, order="feedthrough", more=()) -> Table:
     ends = dict.fromkeys(STANDARD.lower_limits, -2.0) | dict.fromkeys(STANDARD.upper_limits, 2.0)
     values = {STANDARD.ell: ELL, **ends, **dict(more)}
-    parameters = {port_name(name): value for name, value in values.items()}
+    parameters = {PortName.read(name): value for name, value in values.items()}
     header = Header(tuple(signals), Experiment(T, H, order), parameters)
     return Table.of(header, np.column_stack([TIME, *(of(TIME) for of in signals.values())]))
 
@@ -121,14 +121,14 @@ def test_blocks_in_which_rows_come_change_nothing(blocks):
 @pytest.mark.parametrize("blocks", [1, 7, len(TIME)])
 def test_the_row_that_signals_stand_in_changes_nothing(blocks):
     """To the last bit; the last row holds what never acts."""
-    lagged = table_with(noise(), GAUSS_SEIDEL)
+    lagged = table_with(noise(), "gauss-seidel")
     acting = (*ESTIMATES, *STANDARD.commanded, *STANDARD.applied)
     assert indices_of(at_its_time(lagged, acting), blocks) == indices_of(lagged)
 
 
 def test_of_actuators_with_a_lag_the_end_of_a_step_counts():
     """What they give is a state, which stands in the row of its time."""
-    lagged = table_with(noise(), GAUSS_SEIDEL, {"plant.actuator.T.q": 0.1}.items())
+    lagged = table_with(noise(), "gauss-seidel", {"plant.actuator.T.q": 0.1}.items())
     u, q, r = STANDARD.applied
     moved = at_its_time(lagged, (*ESTIMATES, *STANDARD.commanded, u, r))
     assert indices_of(moved) == indices_of(lagged)

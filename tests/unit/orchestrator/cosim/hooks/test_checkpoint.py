@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.hooks.checkpoint import Checkpoints, RowLog, interval_in
+from orchestrator.cosim.hooks.checkpoint import Checkpoints, RowLog
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
@@ -41,7 +41,7 @@ def test_a_resumed_run_has_the_rows_of_one_that_was_not(tmp_path: Path):
     whole = run(system, 2.0)
     first = Checkpoints(folder, OURS, 0.375, resume=False)
     run(system, 1.0, first)
-    assert (first.time, interval_in(folder)) == (0.75, 0.375)
+    assert (first.time, Checkpoints.interval_in(folder)) == (0.75, 0.375)
     second = Checkpoints(folder, OURS, 0.375, resume=True)
     assert second.time == 0.75
     again = run(system, 2.0, second)
@@ -77,7 +77,7 @@ def test_a_damaged_checkpoint_is_refused_with_its_name(tmp_path: Path):
 def test_an_interval_is_positive_and_finite(tmp_path: Path, every: float):
     with pytest.raises(InputError, match=f"{every:g} s"):
         Checkpoints(tmp_path, OURS, every, resume=False)
-    assert interval_in(tmp_path) is None
+    assert Checkpoints.interval_in(tmp_path) is None
 
 
 ROWS = np.random.default_rng(1).normal(size=(10_000, 3))

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.cosim.experiment import FEEDTHROUGH, GAUSS_SEIDEL, Experiment, Order
+from orchestrator.cosim.experiment import Experiment, Order
 from orchestrator.cosim.observers.observer import Header
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.errors import InputError
 
 
-def table(times: list[float], order: Order = GAUSS_SEIDEL) -> Table:
+def table(times: list[float], order: Order = "gauss-seidel") -> Table:
     """`a.t` holds the time; `a.start` the time at which the step of the row began, 0.1 s before."""
     t = np.array(times)
     header = Header(("a.t", "a.start"), Experiment(10.0, 0.1, order), {PortName("a", "gain"): 2.0})
@@ -35,7 +35,7 @@ def test_steps_keep_their_times_where_rows_were_left_out():
 def test_without_a_lag_values_of_a_step_stand_in_the_row_of_its_time():
     """The last row begins no step; where rows were left out, each has its own time."""
     for times in ([0.0, 0.1, 0.2, 0.3], [0.0, 0.1, 1.0, 1.1, 2.0]):
-        whole = table(times, FEEDTHROUGH)
+        whole = table(times, "feedthrough")
         assert whole.step_start.tolist() == times[:-1]
         assert whole.step_values("a.t")[:, 0].tolist() == times[:-1]
         assert whole.start_values("a.t")[:, 0].tolist() == times[:-1]

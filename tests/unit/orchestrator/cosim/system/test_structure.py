@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName, port_name
+from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System, _is_like
 from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
@@ -49,11 +49,11 @@ def several(tmp_path_factory: pytest.TempPathFactory) -> System:
     ],
 )
 def test_name_belongs_to_the_longest_component_that_has_such_a_port(system, text, port):
-    assert system.named(port_name(text)) == PortName(*port)
-    assert system.has(port_name(text))
-    changed = system.with_parameters({port_name(text): 3})
+    assert system.named(PortName.read(text)) == PortName(*port)
+    assert system.has(PortName.read(text))
+    changed = system.with_parameters({PortName.read(text): 3})
     assert changed.parameters == {PortName(*port): 3.0}
-    assert changed.value(port_name(text)) == 3.0
+    assert changed.value(PortName.read(text)) == 3.0
     changed.check()
 
 
@@ -65,9 +65,9 @@ def test_two_ports_of_one_name_are_refused(system, tmp_path: Path):
 
 
 def test_name_of_no_port_is_refused(system):
-    assert not system.has(port_name("a.b.x"))
+    assert not system.has(PortName.read("a.b.x"))
     with pytest.raises(InputError, match=r"a\.b has no port or parameter 'x'"):
-        system.with_parameters({port_name("a.b.x"): 1})
+        system.with_parameters({PortName.read("a.b.x"): 1})
 
 
 @pytest.mark.parametrize(
@@ -96,17 +96,17 @@ def test_name_without_a_component_is_refused_with_those_that_have_it(system):
 
 def test_output_that_is_calculated_cannot_be_set(system):
     with pytest.raises(InputError, match=r"a\.y has causality output and cannot be set"):
-        system.with_parameters({port_name("a.y"): 1.0}).check()
+        system.with_parameters({PortName.read("a.y"): 1.0}).check()
 
 
 @given(st.lists(st.integers(-9, 9), min_size=1, max_size=6), st.booleans())
 def test_list_for_a_group_has_a_value_for_each_member(several, values, as_text):
     """In the order in which they are declared; of any other length, it is refused."""
     given = ", ".join(map(str, values)) if as_text else values
-    name = port_name("a.b.v")
+    name = PortName.read("a.b.v")
     if len(values) == 3:
         members = [PortName("a.b", f"v[{i}]") for i in (3, 1, 2)]
-        changed = several.with_parameters({port_name("a.b.w"): 1.0, name: given})
+        changed = several.with_parameters({PortName.read("a.b.w"): 1.0, name: given})
         assert changed.parameters == dict(zip(members, map(float, values), strict=True)) | {
             PortName("a.b", "w"): 1.0
         }
@@ -119,7 +119,7 @@ def test_list_for_a_group_has_a_value_for_each_member(several, values, as_text):
 
 
 def test_last_value_of_a_port_wins(several):
-    group, member = port_name("a.b.v"), port_name("a.b.v[1]")
+    group, member = PortName.read("a.b.v"), PortName.read("a.b.v[1]")
     for values, wanted in (
         ({group: [1, 2, 3], member: 9}, 9.0),
         ({member: 9, group: [1, 2, 3]}, 2.0),
@@ -130,16 +130,18 @@ def test_last_value_of_a_port_wins(several):
 def test_outputs_and_single_ports_take_no_list(several):
     for name in ("a.b.y", "a.b.w", "a.b.none", "c.v"):
         with pytest.raises(InputError):
-            several.with_parameters({port_name(name): [1.0, 2.0]})
+            several.with_parameters({PortName.read(name): [1.0, 2.0]})
 
 
 def test_array_without_dimensions_is_one_value(several):
     assert (
-        several.with_parameters({port_name("a.b.w"): np.array(2.0)}).value(port_name("a.b.w"))
+        several.with_parameters({PortName.read("a.b.w"): np.array(2.0)}).value(
+            PortName.read("a.b.w")
+        )
         == 2.0
     )
     with pytest.raises(InputError, match="a list of 3 values"):
-        several.with_parameters({port_name("a.b.v"): np.array(2.0)})
+        several.with_parameters({PortName.read("a.b.v"): np.array(2.0)})
 
 
 @pytest.fixture(scope="module")
@@ -168,7 +170,7 @@ def fleet(tmp_path_factory: pytest.TempPathFactory) -> System:
 def test_a_star_stands_for_a_part_of_a_component_s_name(fleet, values, k):
     expected = {PortName(component, "k"): value for component, value in k.items()}
     assert fleet.with_parameters(values).parameters == expected
-    assert fleet.with_parameters({port_name(n): v for n, v in values.items()}).parameters == (
+    assert fleet.with_parameters({PortName.read(n): v for n, v in values.items()}).parameters == (
         expected
     )
 
@@ -192,8 +194,8 @@ def test_a_list_for_a_group_of_several_components_is_of_each(fleet):
     found = fleet.with_parameters({"auv*.a.v": [1.0, 2.0]}).parameters
     of_each = {PortName("auv2.a", "v[1]"): 1.0, PortName("auv2.a", "v[2]"): 2.0}
     assert len(found) == 6 and of_each.items() <= found.items()
-    assert fleet.named(port_name("auv*.a.k")) == PortName("auv1.a", "k")
-    assert not fleet.has(port_name("auv*.c.k"))
+    assert fleet.named(PortName.read("auv*.a.k")) == PortName("auv1.a", "k")
+    assert not fleet.has(PortName.read("auv*.c.k"))
 
 
 @pytest.mark.parametrize(
