@@ -34,7 +34,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.instance import Instance
 from orchestrator.cosim.fmi.slaves import FMU2OfOthers
 from orchestrator.cosim.loop import Stepping, choose_loop
-from orchestrator.cosim.schedule import Member
+from orchestrator.cosim.stages import Member
 from orchestrator.cosim.system.structure import System
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
@@ -83,7 +83,7 @@ def master_alone(system: System, steps: int) -> float:
             [nothing] * len(set_inputs), do_step and nothing, [nothing] * len(get_outputs), instance
         )
 
-    with patch("orchestrator.cosim.schedule.Member", idle):
+    with patch("orchestrator.cosim.stages.Member", idle):
         return steps_time(system, steps)
 
 

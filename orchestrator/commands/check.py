@@ -153,7 +153,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
         to_know += [
             f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved if the FMUs "
             "compute their outputs between steps, else delayed by a step"
-            for ring in prepared.system.rings()
+            for ring in prepared.plan.rings
         ]
         to_know += prepared.doubts()
     return to_know

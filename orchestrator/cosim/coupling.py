@@ -11,6 +11,7 @@ from orchestrator.cosim.experiment import (
     FEEDTHROUGH,
     FULL,
     GAUSS_SEIDEL,
+    JACOBI,
     LINEAR,
     NONE,
     OURS,
@@ -19,15 +20,18 @@ from orchestrator.cosim.experiment import (
     Order,
 )
 from orchestrator.cosim.fmi.instance import ComponentFailed, Instance, Log
-from orchestrator.cosim.plan import Plan, delays, stages
+from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.ring import Ring, why_not_following
 from orchestrator.cosim.row import Gathering, Row
-from orchestrator.cosim.schedule import (
-    Schedule,
-    Stage,
+from orchestrator.cosim.stages import (
+    Arrangement,
+    LinkedStage,
     StageCall,
+    Stages,
+    arrange,
+    link_stages,
     member,
-    schedule,
+    stages_of,
     step_members,
 )
 from orchestrator.cosim.system.names import PortName
@@ -159,8 +163,7 @@ class Coupling:
     """The rings of direct feedthroughs of a system, and what follows from them.
 
     Attributes:
-        plan: what is run; once components are initialised, with the order that is taken.
-        sequence: all components in stages, once they are initialised.
+        plan: of the run; once components are initialised, with the order that is taken.
 
     """
 
@@ -185,9 +188,8 @@ class Coupling:
         self.plan, self._exchange = plan, exchange
         self._system, self._experiment = plan.system, plan.experiment
         self._instances, self._row, self._log = instances, row, log
-        self._rings = [self._ring(names) for names in plan.system.rings()]
+        self._rings = self._made(plan.rings)
         self._solved: list[Ring] = []
-        self.sequence: list[list[str]] = []
 
     def initialise(self) -> None:
         """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
@@ -203,7 +205,7 @@ class Coupling:
             instance.enter_initialization(system.parameters_of(name), start)
             self._enter(name, system.open_inputs(name))
         if self._exchange.initial == FULL:
-            settling = self._settling(self._rings)
+            settling = self._settling(self.plan.arrangement, self._rings)
             self._read_ahead(settling.places)
             settling.hand_on(everything=True)
             settling.settle()
@@ -211,11 +213,11 @@ class Coupling:
         for instance in instances.values():
             instance.exit_initialization()
         order = self._order_taken()
-        self.plan = replace(self.plan, experiment=replace(self._experiment, order=order))
-        self._solved = self._solvable(order)
-        self.sequence = self._in_stages(order, self._solved)
+        experiment, arrangement = replace(self._experiment, order=order), self._arranged(order)
+        self.plan = replace(self.plan, experiment=experiment, arrangement=arrangement)
+        self._solved = self._made(arrangement.solved)
         if self._exchange.initial == FULL:
-            self._settling(self._solved).hand_on(everything=True)
+            self._settling(arrangement, self._solved).hand_on(everything=True)
         elif self._exchange.initial == NONE:
             for name in instances:
                 self._enter(name, [port.name for port in system.components[name].having("output")])
@@ -223,31 +225,21 @@ class Coupling:
         if self._log.refusals:
             raise InputError("; ".join(self._log.refusals))
 
-    def schedule(self) -> tuple[Schedule, list[Gathering]]:
+    def stages(self) -> tuple[Stages[LinkedStage], list[Gathering]]:
         """The stages of every step, and all that is gathered in one."""
         system, instances, row = self._system, self._instances, self._row
         if self._experiment.coupling == LINEAR:
-            settling = self._settling(self._solved)
+            settling = self._settling(self.plan.arrangement, self._solved)
             steps = _LinearSteps(system, instances, row, settling)
-            stage = Stage(Gathering.along(row, ()), [StageCall(steps.step).member])
-            return Schedule([stage]), settling.gatherings
-        latest = bool(self._exchange.groups)
-        found = schedule(self.plan, self.sequence, instances, row, self._solved, latest=latest)
+            stage = LinkedStage(Gathering.along(row, ()), [StageCall(steps.step).member])
+            return Stages([stage]), settling.gatherings
+        by_names = stages_of(
+            system, self.plan.arrangement, self.plan.decimations, latest=bool(self._exchange.groups)
+        )
+        stages = link_stages(by_names, system, instances, row, self._solved)
+        gatherings = [stage.gather for stage in (*(stages.passing or ()), *stages.stepping)]
         own = [gather for ring in self._solved for gather in ring.gatherings]
-        return found, found.gatherings + own
-
-    def delayed_ports(self) -> list[PortName]:
-        """The inputs that a ring feeds itself, for rings that are not solved as a whole."""
-        solved = [set(ring.names) for ring in self._solved]
-        left = [ring.names for ring in self._rings if set(ring.names) not in solved]
-        ring_of = {name: i for i, names in enumerate(left) for name in names}
-        return [
-            connection.target
-            for connection in self._system.connections
-            if connection.source.component in ring_of
-            and ring_of[connection.source.component] == ring_of.get(connection.target.component)
-            and self._system.has_feedthrough(connection)
-        ]
+        return stages, gatherings + own
 
     def _order_taken(self) -> Order:
         """The order that is asked for, or else the best one that the FMUs allow.
@@ -276,12 +268,17 @@ class Coupling:
                 raise InputError(f"order {FEEDTHROUGH}: {why}; --order {GAUSS_SEIDEL} runs it")
         return FEEDTHROUGH
 
-    def _solvable(self, order: Order) -> list[Ring]:
-        """The rings that are solved in every step."""
+    def _arranged(self, order: Order) -> Arrangement:
+        """The components in an order, and the rings that are solved in every step.
+
+        Raises:
+            InputError: a ring is to be solved that cannot be.
+
+        """
         system, coupling = self._system, self._experiment.coupling
         if coupling == LINEAR:
             # Where outputs are computed in steps only, the second one has them right.
-            return self._rings
+            return arrange(system, order, self.plan.rings)
         reasons: dict[str, str] = {}
         if coupling == DELAY or self._exchange.groups:
             reasons = dict.fromkeys(system.components, "")
@@ -292,25 +289,24 @@ class Coupling:
                 if n > 1:
                     reasons[name] = f"{name} takes longer steps"
         solved = system.rings(system.components.keys() - reasons.keys())
-        if coupling == SOLVE:
-            for delay in delays(system, GAUSS_SEIDEL, solved, reasons):
-                raise InputError(f"coupling solve: {delay}")
-        for delay in delays(system, order, solved, reasons):
-            self._log.remark(delay)
-        return [self._ring(names) for names in solved]
+        arrangement = arrange(system, order, solved)
+        delays = arrangement.delays(reasons)
+        if delays and coupling == SOLVE:
+            raise InputError(f"coupling solve: {delays[0]}")
+        if isinstance(order, str):
+            for delay in delays if order != JACOBI else ():
+                self._log.remark(delay)
+        elif self._exchange.groups:
+            return arrangement._replace(stages=self._exchange.groups)
+        return arrangement
 
-    def _ring(self, names: Sequence[str]) -> Ring:
-        return Ring(names, self._system, self._instances, self._row)
+    def _made(self, rings: Sequence[Sequence[str]]) -> list[Ring]:
+        return [Ring(names, self._system, self._instances, self._row) for names in rings]
 
-    def _in_stages(self, order: Order, solved: Sequence[Ring]) -> list[list[str]]:
-        if self._exchange.groups and not isinstance(order, str):
-            return [[*group] for group in self._exchange.groups]
-        return stages(self._system, order, [ring.names for ring in solved])
-
-    def _settling(self, solved: Sequence[Ring]) -> _Settling:
+    def _settling(self, arrangement: Arrangement, solved: Sequence[Ring]) -> _Settling:
         ring_of = {ring.names[0]: ring for ring in solved}
         units: list[Ring | _Single] = []
-        for stage in self._in_stages(GAUSS_SEIDEL, solved):
+        for stage in arrangement.settling:
             units += [ring_of[name] for name in stage if name in ring_of] or [
                 _Single(self._system, self._instances[name], self._row) for name in stage
             ]

@@ -16,7 +16,7 @@ import numpy as np
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.hook import Run
-from orchestrator.cosim.schedule import make_stages
+from orchestrator.cosim.stages import make_stages
 from orchestrator.cosim.stepper import compile_stepper, load_stepper, step_compiled
 from orchestrator.machine.errors import InputError
 
@@ -44,6 +44,7 @@ class Steps(Protocol):
 
         Raises:
             ComponentFailed: by the step after them.
+            Ended: a component ends the run within that step.
 
         """
 

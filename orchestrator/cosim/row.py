@@ -58,7 +58,7 @@ class Row:
             for name in instances
             for causality in ("input", "output")
             for fmi_type in TYPES
-            if (ports := _ports(system.components[name], causality, fmi_type))
+            if (ports := ports_of_type(system.components[name], causality, fmi_type))
         ]
         n = sum(len(ports) for *_, ports in groups)
         more = sum(
@@ -206,7 +206,8 @@ def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
     return causality == "output" and component in hidden
 
 
-def _ports(component: Component, causality: str, fmi_type: str) -> list[Variable]:
+def ports_of_type(component: Component, causality: str, fmi_type: str) -> list[Variable]:
+    """The inputs or outputs of a type, in the order of a row."""
     return [variable for variable in component.having(causality) if variable.type == fmi_type]
 
 

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
-from math import isfinite
 from time import monotonic
 
 import numpy as np
 
 from orchestrator.cosim.coupling import Coupling
-from orchestrator.cosim.early_end import make_steps
 from orchestrator.cosim.experiment import OURS, Exchange
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.fmi.placement import place_instances
+from orchestrator.cosim.fmi.isolated import Isolation, place_instances
 from orchestrator.cosim.fmi.surroundings import Surroundings, default_mode
 from orchestrator.cosim.hooks.hook import Hook, Hooks, Run
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping
@@ -83,27 +80,21 @@ def simulate_plan(
                 {str(port): standing for port, standing in row.standing.items()},
                 _units(system, row.columns),
             )
-        scheduled, gatherings = coupling.schedule()
+        (stages, passing), gatherings = coupling.stages()
         with _told(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
             interrupts.hand_over = blocks.hand_over
-            if scheduled.passing is None:
+            if passing is None:
                 blocks.append(experiment.start_time, row.shown)
             overrides = Overrides(row, gatherings, system.connections)
             run = Run(
-                system, experiment, instances, row, scheduled.stepping, scheduled.passing,
+                system, experiment, instances, row, stages, passing,
                 overrides, blocks, log, interrupts, hooks,
             )  # fmt: skip
-            order = [name for names in coupling.sequence for name in names]
+            order = [name for names in coupling.plan.arrangement.stages for name in names]
             remark = None
             try:
                 failure = _advance(run, stepping, Hooks(run), order, surroundings)
-                if failure and (overflown := _overflown(row, coupling.delayed_ports())):
-                    failure += (
-                        f"; {overflown} is in a ring of direct feedthroughs that is delayed by a "
-                        "step, and may grow without bound; --coupling solve, if its FMUs allow "
-                        "it, or another --order may help"
-                    )
             except NotKept as error:
                 # Rows that cannot be kept need not be computed.
                 failure = str(error)
@@ -197,7 +188,7 @@ def _advance(
     blocks, failure = run.blocks, None
     try:
         hooks.act()
-        for _ in make_steps(stepping.steps, run):
+        for _ in stepping.steps(run):
             if run.made >= run.due:
                 hooks.act()
             if monotonic() > blocks.due:
@@ -225,11 +216,6 @@ def _advance(
         failure = f"stopped at t = {run.experiment.time(blocks.count):.12g} s: {wrong}"
     blocks.hand_over()
     return failure
-
-
-def _overflown(row: Row, ports: Iterable[PortName]) -> PortName | None:
-    """The first of some ports whose value is not finite."""
-    return next((port for port in ports if not isfinite(row.values[row.columns[port]])), None)
 
 
 @contextmanager

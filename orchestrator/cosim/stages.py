@@ -1,4 +1,20 @@
-"""The stages of a communication step, by the names of its components.
+"""The stages of a communication step: by the names of its components, and as calls of FMUs.
+
+Loaded FMUs decide which stages a step has: where rings are solved, and, for FMUs of other tools,
+where no order is stated. Before a stage is stepped its inputs are gathered; the outputs of a
+component are read as soon as it was stepped.
+
+- `feedthrough`: two parts. First values of t_k pass: a component whose outputs have direct
+  feedthrough takes its inputs and is read without a step, before those it feeds. The row shows
+  them. Then all components are stepped.
+- `jacobi`: one stage. All inputs are outputs of t_k.
+- `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
+  stage than those it feeds, so they receive without delay what follows from t_k. Outputs
+  without feedthrough are states: all take them at t_k.
+- the names of all components: the same in the order that they stand in.
+
+A ring of feedthroughs that is not solved is opened before the one of its components that stands
+first in the system, which takes what feeds it at t_k.
 
 In `feedthrough` order values pass first, then all components are stepped. Rings of feedthroughs
 that are solved are closed where values come to them.
@@ -15,14 +31,29 @@ shown when they pass, or as soon as the component was stepped, unless the order 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Literal, NamedTuple, TypeAlias, get_args
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from ctypes import c_double
+from functools import partial
+from typing import ClassVar, Generic, Literal, NamedTuple, TypeAlias, TypeVar, get_args
 
-from orchestrator.cosim.experiment import FEEDTHROUGH, JACOBI, Order
-from orchestrator.cosim.plan import Plan, gathered_connections
+import numpy as np
+from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
+
+from orchestrator.cosim.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
+from orchestrator.cosim.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
+from orchestrator.cosim.fmi.surroundings import PRODUCT, A, B, C, restore_mode
+from orchestrator.cosim.fmi.transfer import CMember, CMove, DoStepCallback, address_of
+from orchestrator.cosim.ring import Ring
+from orchestrator.cosim.row import Gathering, Row
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system.values import TYPES
+from orchestrator.machine.errors import shortened
+
+#: By names or as calls.
+AnyStage = TypeVar("AnyStage", "Stage", "LinkedStage")
 
 #: Which outputs are read: all; those with direct feedthrough; the others, which are states; of
 #: these, the ones that are not read together with the former.
@@ -35,6 +66,100 @@ ALL, DIRECT, STATES, ONLY_STATES = READS
 Closing: TypeAlias = Literal["check", "renew", "renew always"]
 CLOSINGS: tuple[Closing, ...] = get_args(Closing)
 CHECK, RENEW, RENEW_ALWAYS = CLOSINGS
+
+#: What closes a ring.
+_CLOSES: Mapping[Closing, Callable[[Ring], object]] = {
+    CHECK: Ring.check,
+    RENEW: Ring.renew,
+    RENEW_ALWAYS: partial(Ring.renew, always=True),
+}
+
+
+class Arrangement(NamedTuple):
+    """The order of the components of a system, in stages, where it is known which rings are solved.
+
+    Attributes:
+        order: of the components.
+        solved: rings of them that are stepped as one, in stages of their own.
+        settling: stages in which values settle at one time: a component with direct feedthrough
+            comes before those that it feeds.
+        late: connections with direct feedthrough that are a step late in these.
+        stages: in which components are stepped; within one they are independent.
+
+    """
+
+    order: Order
+    solved: Sequence[Sequence[str]]
+    settling: Sequence[Sequence[str]]
+    late: Sequence[Connection]
+    stages: Sequence[Sequence[str]]
+
+    def delays(self, reasons: Mapping[str, str] | None = None) -> list[str]:
+        """Where a ring is opened, in words.
+
+        Args:
+            reasons: why components are in no ring that is solved.
+
+        """
+        late: dict[str, list[PortName]] = {}
+        for connection in self.late:
+            late.setdefault(connection.target.component, []).append(connection.source)
+        texts = []
+        for name, sources in late.items():
+            text = f"{name} takes {shortened(', '.join(map(str, sources)))} one step late: "
+            concerned = (name, *(source.component for source in sources))
+            why = next((reasons[one] for one in concerned if one in reasons), "") if reasons else ""
+            texts.append(f"{text}direct feedthroughs form a ring{why and f'; {why}'}")
+        return texts
+
+
+def arrange(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) -> Arrangement:
+    """Arrange the components of a system.
+
+    Args:
+        system: that is stepped.
+        order: of its components; one that is stated names each of them once.
+        solved: rings of them that are stepped as one.
+
+    """
+    derived = system.derived_order(solved)
+    settling = system.in_stages(derived, solved)
+    stages = settling
+    if order == JACOBI:
+        ringed = {name for ring in solved for name in ring}
+        others = [name for name in system.components if name not in ringed]
+        stages = [others] * bool(others) + list(map(list, solved))
+    elif not isinstance(order, str):
+        stages = system.in_stages(order, solved)
+    late = system.delayed_connections(derived, solved)
+    return Arrangement(order, solved, settling, late, stages)
+
+
+def gathered_connections(
+    system: System, arrangement: Arrangement, *, latest: bool = False
+) -> list[list[Connection]]:
+    """The connections along which values are gathered before each stage.
+
+    Args:
+        system: whose connections say what feeds what.
+        arrangement: of its components; rings that are solved gather by themselves what they feed
+            themselves.
+        latest: whether stages take all that those before them have computed.
+
+    """
+    stage_of = {name: i for i, names in enumerate(arrangement.stages) for name in names}
+    ring_of = {name: i for i, ring in enumerate(arrangement.solved) for name in ring}
+    gathered: list[list[Connection]] = [[] for _ in arrangement.stages]
+    for connection in system.connections:
+        start, end = connection.source.component, connection.target.component
+        if start in ring_of and ring_of[start] == ring_of.get(end):
+            continue
+        source, target = stage_of[start], stage_of[end]
+        # An output without feedthrough is a state, and must be read before any component advances.
+        at_once = latest or (arrangement.order != JACOBI and system.has_feedthrough(connection))
+        there = arrangement.order == FEEDTHROUGH or (at_once and source < target)
+        gathered[target if there else 0].append(connection)
+    return gathered
 
 
 def types_read(reads: Reads, component: Component, outputs: Iterable[str]) -> set[str]:
@@ -129,7 +254,7 @@ class Stage(NamedTuple):
         return bool(self.connections or self.visits or self.shows)
 
 
-class Stages(NamedTuple):
+class Stages(NamedTuple, Generic[AnyStage]):
     """The stages of every communication step; in each there is something to do.
 
     Attributes:
@@ -139,35 +264,34 @@ class Stages(NamedTuple):
 
     """
 
-    stepping: list[Stage]
-    passing: list[Stage] | None = None
+    stepping: list[AnyStage]
+    passing: list[AnyStage] | None = None
 
 
 def stages_of(
-    plan: Plan,
-    sequence: Sequence[Sequence[str]],
-    rings: Sequence[Sequence[str]] = (),
+    system: System,
+    arrangement: Arrangement,
+    decimation: Mapping[str, int],
     *,
     latest: bool = False,
-) -> Stages:
+) -> Stages[Stage]:
     """The stages of every step.
 
     Args:
-        plan: what is run, in an order that is not left open.
-        sequence: its components in :func:`.plan.stages`.
-        rings: that are solved, in stages of their own.
+        system: that is run.
+        arrangement: of its components.
+        decimation: how many communication steps one step of each component takes.
         latest: whether stages take all that those before them have computed.
 
     """
-    system, order, decimation = plan.system, plan.experiment.order, plan.decimations
-    assert order is not None
-    gathered = gathered_connections(system, sequence, rings, order, latest=latest)
+    order, rings = arrangement.order, arrangement.solved
+    gathered = gathered_connections(system, arrangement, latest=latest)
     if order == FEEDTHROUGH:
-        return _passing_first(plan, sequence, gathered, rings)
+        return _passing_first(system, arrangement, decimation, gathered)
     ring_of = {ring[0]: ring for ring in rings}
     found: list[Stage] = []
     shown: list[Stage] = []
-    for names, connections in zip(sequence, gathered, strict=True):
+    for names, connections in zip(arrangement.stages, gathered, strict=True):
         slow, taken = _taken(connections, decimation)
         found += slow
         fast = [Visit(name) for name in names if decimation[name] == 1]
@@ -192,13 +316,13 @@ def stages_of(
 
 
 def _passing_first(
-    plan: Plan,
-    sequence: Sequence[Sequence[str]],
+    system: System,
+    arrangement: Arrangement,
+    decimation: Mapping[str, int],
     gathered: Sequence[Sequence[Connection]],
-    rings: Sequence[Sequence[str]],
-) -> Stages:
+) -> Stages[Stage]:
     """The stages in feedthrough order."""
-    components, decimation = plan.system.components, plan.decimations
+    components, rings = system.components, arrangement.solved
     outputs = {
         name: [PortName(name, output.name) for output in component.having("output")]
         for name, component in components.items()
@@ -210,7 +334,7 @@ def _passing_first(
     ring_of = {ring[0]: ring for ring in rings}
     ringed = {name for ring in rings for name in ring}
     passing: list[Stage] = []
-    for names, connections in zip(sequence, gathered, strict=True):
+    for names, connections in zip(arrangement.stages, gathered, strict=True):
         slow, taken = _taken(
             [one for one in connections if one.target.component not in ringed], decimation
         )
@@ -230,16 +354,16 @@ def _passing_first(
         passing += [
             Stage(visits=[Close(ring_of[name], RENEW_ALWAYS)]) for name in names if name in ring_of
         ]
-    place = {name: i for i, names in enumerate(sequence) for name in names}
+    place = {name: i for i, names in enumerate(arrangement.stages) for name in names}
     # What is read when values pass is read after a step too if something takes it before it passes.
     early = {
         one.source.component
-        for one in plan.system.connections
+        for one in system.connections
         if place[one.source.component] >= place[one.target.component]
     }
     # Whatever takes an output with direct feedthrough then, takes what follows from the inputs of
     # this step.
-    late = {one.source.component for one in plan.system.delayed_connections([*place], rings)}
+    late = {one.source.component for one in arrangement.late}
 
     def stepped(name: str) -> Visit:
         if not direct[name]:
@@ -283,3 +407,207 @@ def _shown(component: Component, order: Order) -> tuple[list[PortName], list[Por
 
 def _acting(stages: Sequence[Stage]) -> list[Stage]:
     return [stage for stage in stages if stage.acts]
+
+
+class Member(NamedTuple):
+    """The calls that step one component, or let values pass through it."""
+
+    set_inputs: list[Callable[[], int]]
+    do_step: Callable[[c_double, c_double, int], int] | None
+    get_outputs: list[Callable[[], int]]
+    instance: Instance | StageCall
+
+
+class StageCall:
+    """Takes the place of an instance in a stage that acts but steps no component."""
+
+    name, is_here = "", True
+    get_outputs: ClassVar[list[Callable[[], int]]] = []
+
+    def __init__(self, act: Callable[[float, float], object]) -> None:
+        """Do something in every step.
+
+        Args:
+            act: what to do, with the time and the length of the step.
+
+        """
+        self._act = act
+        self._error: Exception | None = None
+        self._called_back = DoStepCallback(lambda _, t, h, __: self._tried(t, h))
+
+    @property
+    def member(self) -> Member:
+        """As the loops know it."""
+        return Member([], self.do_step, [], self)
+
+    def do_step(self, t: c_double, h: c_double, _: int) -> int:
+        """Act; the status says whether it went well."""
+        return self._tried(t.value, h.value)
+
+    def failed(self, status: int, function: str) -> Exception:
+        """What it has raised."""
+        assert self._error is not None
+        return self._error
+
+    def pointers(self) -> CMember:
+        """The same for the compiled loop."""
+        nothing = (CMove * 0)()
+        return CMember(None, address_of(self._called_back), None, nothing, nothing, 0, 0)
+
+    def _tried(self, t: float, h: float) -> int:
+        try:
+            self._act(t, h)
+        except Exception as error:
+            # No exception can leave through the compiled loop.
+            self._error = error
+            return int(fmi2Error)
+        return int(fmi2OK)
+
+
+class LinkedStage(NamedTuple):
+    """Inputs to gather, and the components to step then.
+
+    Attributes:
+        gather: moves values within the row.
+        members: the components.
+        decimation: in which communication steps; None: in all of them.
+
+    """
+
+    gather: Gathering
+    members: list[Member]
+    decimation: Decimation | None = None
+
+
+def link_stages(
+    stages: Stages[Stage],
+    system: System,
+    instances: Mapping[str, Instance],
+    row: Row,
+    rings: Sequence[Ring] = (),
+) -> Stages[LinkedStage]:
+    """The stages of every step as calls.
+
+    Args:
+        stages: by the names of components.
+        system: that is run.
+        instances: of all components.
+        row: that they are tied to.
+        rings: that are solved.
+
+    """
+    ring_of = {ring.names[0]: ring for ring in rings}
+
+    def linked(visit: Visit | Close) -> Member:
+        if isinstance(visit, Close):
+            close, ring = _CLOSES[visit.how], ring_of[visit.ring[0]]
+            return StageCall(lambda _t, _h: close(ring)).member
+        return _visiting(visit, instances[visit.component], system.components[visit.component])
+
+    def all_linked(some: Sequence[Stage]) -> list[LinkedStage]:
+        return [
+            LinkedStage(
+                Gathering(*row.hidden(stage.shows))
+                if stage.shows
+                else Gathering.along(row, stage.connections),
+                list(map(linked, stage.visits)),
+                stage.decimation,
+            )
+            for stage in some
+        ]
+
+    passing = None if stages.passing is None else all_linked(stages.passing)
+    return Stages(all_linked(stages.stepping), passing)
+
+
+def member(instance: Instance) -> Member:
+    """The calls of an instance that is tied to a row."""
+    return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
+
+
+def _visiting(visit: Visit, instance: Instance, component: Component) -> Member:
+    """The calls that do what a component does in a stage."""
+    return Member(
+        instance.set_inputs if visit.takes else [],
+        instance.do_step if visit.steps else instance.do_exchange,
+        _reading(visit.reads, instance, component),
+        instance,
+    )
+
+
+def _reading(reads: Reads, instance: Instance, component: Component) -> list[Callable[[], int]]:
+    """The calls that read some outputs of a component, each all of a type."""
+    # The answer of another process has to be taken.
+    if reads == ALL or not instance.is_here:
+        return instance.get_outputs
+    outputs = component.having("output")
+    types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
+    wanted = types_read(reads, component, (one.name for one in outputs))
+    return [call for call, of in zip(instance.get_outputs, types, strict=True) if of in wanted]
+
+
+def make_stages(
+    stages: Sequence[LinkedStage],
+    values: np.ndarray,
+    experiment: Experiment,
+    steps: int,
+    k: int,
+    t: c_double,
+    h: c_double,
+) -> None:
+    """Make some stages of a step.
+
+    Args:
+        stages: to make.
+        values: of the row.
+        experiment: that the step belongs to.
+        steps: how many there are.
+        k: how many were made before.
+        t, h: beginning and length of the step [s].
+
+    """
+    for gather, members, decimation in stages:
+        if decimation is None:
+            # What most stages are costs no call.
+            if gather.is_plain:
+                values[gather.targets] = values[gather.sources]
+            elif gather.acts:
+                gather(values)
+            step_members(members, t, h)
+        elif decimation.is_due(k, steps):
+            gather(values)
+            step_members(members, t, c_double(experiment.length(k, decimation.every)))
+
+
+def step_members(
+    members: Sequence[Member], t: c_double, h: c_double, is_final: bool = True
+) -> None:
+    """Step the components of a stage, which may run side by side until their outputs are asked.
+
+    Values only pass through a component whose calls have no step.
+
+    Args:
+        members: the components.
+        t, h: beginning and length of the step [s].
+        is_final: whether no component will go back to its beginning.
+
+    """
+    for set_inputs, do_step, _, instance in members:
+        for call in set_inputs:
+            if (status := call()) != fmi2OK and status != fmi2Warning:
+                raise instance.failed(status, SET_INPUTS)
+        if (
+            do_step is not None
+            and (status := do_step(t, h, is_final)) != fmi2OK
+            and status != fmi2Warning
+        ):
+            raise instance.failed(status, DO_STEP)
+        # To call a function that looks costs more than to look.
+        if A * B * C != PRODUCT:
+            restore_mode()
+    for _, _, get_outputs, instance in members:
+        for call in get_outputs:
+            if (status := call()) != fmi2OK and status != fmi2Warning:
+                raise instance.failed(status, GET_OUTPUTS)
+        if A * B * C != PRODUCT:
+            restore_mode()

@@ -13,8 +13,7 @@ from orchestrator.cosim.fmi.instance import CALLS
 from orchestrator.cosim.fmi.transfer import CMember, CMove
 from orchestrator.cosim.hooks.hook import Run
 from orchestrator.cosim.observers.observer import CBlock
-from orchestrator.cosim.schedule import Member, Stage
-from orchestrator.cosim.stages import Decimation
+from orchestrator.cosim.stages import Decimation, LinkedStage, Member
 from orchestrator.machine.cache import users_folder
 from orchestrator.machine.compilers import FLAGS
 from orchestrator.machine.errors import InputError, reason
@@ -133,7 +132,7 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
         raise member.instance.failed(failure.status, CALLS[failure.call])
 
 
-def _laid_out(stage: Stage) -> CStage:
+def _laid_out(stage: LinkedStage) -> CStage:
     gather, members = stage.gather, [_pointers(member) for member in stage.members]
     mappings = [_mapping(place, gather.mapped[place]) for place in sorted(gather.mapped)]
     return CStage(

@@ -23,7 +23,7 @@ from orchestrator.cosim.experiment import (
 from orchestrator.cosim.hooks.events import Event, Events
 from orchestrator.cosim.hooks.hook import Hook, Run
 from orchestrator.cosim.observers.observer import Ending, Header, Observer
-from orchestrator.cosim.plan import check_order, make_plan
+from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_to_end
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
@@ -235,7 +235,7 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
     elif order is not None:
         groups = [name.split("+") for name in order]
         names = tuple(chain(*groups))
-        check_order(system, names)
+        system.check_order(names)
         words = f"in the order {format_order(order)}, each with the latest outputs{start}"
         yield Algorithm(names, None, exchange._replace(groups=groups), words)
         if names != tuple(order):

@@ -253,7 +253,7 @@ def _check(prepared: Prepared) -> None:
     system, experiment, loops = plan.system, plan.experiment, prepared.loops
     most_steps = _MOST_STEPS // len(loops)
     lacking = {
-        "rings of direct feedthroughs": system.rings(),
+        "rings of direct feedthroughs": plan.rings,
         "linear inputs": experiment.coupling == "linear",
         "a table of inputs": prepared.input_table is not None,
         "a start time other than 0": experiment.start_time != 0.0,

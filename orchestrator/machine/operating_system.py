@@ -34,8 +34,6 @@ _ALREADY_EXISTS, _ACCESS_DENIED = 183, 5
 #: Windows waits for at most 63 handles at once; two are for the process that starts the others.
 _MOST_PROCESSES = 61
 
-_PR_SET_PDEATHSIG = 1
-
 
 def can_isolate() -> bool:
     """Whether processes can be forked, and inherit sockets by their numbers."""
@@ -206,10 +204,9 @@ def wait_for_end(pipe: int) -> None:
     os.read(pipe, 1)
 
 
-def die_with_parent() -> None:
-    """Have the system kill this process with its parent, and before others if memory is short."""
+def end_first_without_memory() -> None:
+    """Have the system end this process before others if memory is short."""
     if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
         with suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
 

@@ -519,8 +519,8 @@ class SystemModel:
 
     def _renewed(self) -> Iterator[str]:
         """Outputs that nothing computes again as values pass, and that follow parameters."""
-        sequence = self.text.sequence
-        place = {name: i for i, names in enumerate(sequence) for name in names}
+        stages = self.plan.arrangement.stages
+        place = {name: i for i, names in enumerate(stages) for name in names}
         early = {
             one.source.component
             for one in self.plan.system.connections

@@ -27,8 +27,7 @@ from fmus.native.reducer import ReducerText
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
-from orchestrator.cosim.experiment import Order
-from orchestrator.cosim.plan import Plan, stages
+from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
@@ -378,17 +377,18 @@ class Text:
 
         """
         system = self.plan.system
-        if closed_rings := system.rings():
-            names = listed(closed_rings[0])
+        if self.plan.rings:
+            names = listed(self.plan.rings[0])
             raise Unsupported(
                 f"direct feedthroughs of {names} form a ring, which no program can have"
             )
         if self.plan.experiment.coupling == "linear":
             raise Unsupported("coupling linear goes back in time, which no program can")
-        order: Order = self.plan.experiment.order or "feedthrough"
-        self.plan = replace(self.plan, experiment=replace(self.plan.experiment, order=order))
-        self.sequence = stages(system, order)
-        self.stages: Stages = stages_of(self.plan, self.sequence)
+        arrangement = self.plan.arrangement
+        self.plan = replace(
+            self.plan, experiment=replace(self.plan.experiment, order=arrangement.order)
+        )
+        self.stages: Stages[Stage] = stages_of(system, arrangement, self.plan.decimations)
         self.passes = self.stages.passing is not None
         self.is_tuned = self.is_tuned or self.alters
         self.components = [*system.components]
@@ -601,7 +601,7 @@ class Text:
     def _rest(self) -> str:
         """What lets values come to rest at the start."""
         system = self.plan.system
-        order = [name for names in stages(system, "gauss-seidel") for name in names]
+        order = [name for names in self.plan.arrangement.settling for name in names]
         turn = {name: i for i, name in enumerate(order)}
         # What feeds a component before it is its own component's turn.
         early = {

@@ -17,7 +17,7 @@ from orchestrator.cosim.hooks.hook import Hook
 from orchestrator.cosim.hooks.timing import InputTable, Playback, RealTime
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.cosim.observers.observer import Ending, Observer
-from orchestrator.cosim.plan import Plan, identity, make_plan
+from orchestrator.cosim.plan import Plan, make_plan
 from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
@@ -113,7 +113,7 @@ class Prepared:
     def identity(self) -> Identity:
         """All that its rows depend on."""
         inputs = self.input_table.digest if self.input_table else ""
-        return identity(self.plan, self.events, inputs)
+        return self.plan.identity(self.events, inputs)
 
     def _hooks(self) -> list[Hook]:
         playing: list[Hook] = [] if self.input_table is None else [Playback(self.input_table)]

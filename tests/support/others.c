@@ -11,10 +11,6 @@
 #include "mode.h"
 #include "slave.h"
 
-#ifdef MUTE
-#define ENDS_AT 0.5
-#endif
-
 /* Called in every function. */
 static void change_mode(void)
 {
@@ -39,7 +35,7 @@ typedef struct {
     int booleans[VARIABLES];
     char texts[VARIABLES][1000];
     double time, step, end, sum;
-    int asked, steps, is_mute;
+    int asked, steps;
     const char *name;
     const Callbacks *callbacks;
 } Instance;
@@ -124,8 +120,6 @@ Status fmi2Terminate(Component c)
     Status fmi2Get##kind(Component c, const unsigned *r, size_t n, type *values) \
     { \
         Instance *it = c; \
-        if (it->is_mute) \
-            return Error; \
         it->values_of[Y] = it->values_of[U]; \
         it->reals[Y] = it->reals[GAIN] * it->reals[U] + it->sum; \
         for (size_t i = 0; i < n; i++) \
@@ -168,13 +162,9 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
         return Discard;
 #endif
 #ifdef ENDS_AT
-    const int ends = t + h > ENDS_AT - 1e-9;
     it->time = t + h < ENDS_AT ? t + h : ENDS_AT;
     it->sum += (it->time - t) * (1.0 + it->reals[U]);
-#ifdef MUTE
-    it->is_mute = ends;
-#endif
-    if (ends)
+    if (t + h > ENDS_AT - 1e-9)
         return Discard;
 #endif
     if (t + h > it->end)

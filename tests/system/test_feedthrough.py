@@ -17,7 +17,7 @@ from orchestrator.cosim.formats.ssp.writer import write_ssp
 from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.hooks.hook import Run
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import identity, make_plan
+from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.structure import System
 from support.linear import Part, linear, system_of
@@ -130,7 +130,7 @@ def test_a_run_goes_on_from_its_checkpoint(folder, tmp_path, made):
     whole, resumed = Table(), Table()
 
     def checkpoints(resume: bool) -> Checkpoints:
-        return Checkpoints(tmp_path / "c", identity(plan), made * H, resume)
+        return Checkpoints(tmp_path / "c", plan.identity(), made * H, resume)
 
     simulate_plan(plan, [whole])
     first = checkpoints(False)

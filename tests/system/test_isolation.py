@@ -193,12 +193,11 @@ def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, is
 
 
 @pytest.mark.slow
-def test_what_is_written_and_said_is_kept_within_bounds(c_fmu, capfd):
+def test_what_is_written_is_shown_and_what_is_said_is_kept_within_bounds(c_fmu, capfd):
     """And none of it speaks to the terminal."""
     assert run_isolated(foreign_system(c_fmu, "WRITES", at=0.46)).failure is None
     shown = capfd.readouterr().err
-    assert shown.count("auv-fmu: bad: ") == 1
-    assert len(shown) < 100_000
+    assert shown == 2 * 100_000 * "to be or not to be, that is the question\n"
     table = run_isolated(foreign_system(c_fmu, "LOGS", at=0.46))
     assert table.failure is None
     assert len(table.ending.messages) == 101
@@ -208,23 +207,6 @@ def test_what_is_written_and_said_is_kept_within_bounds(c_fmu, capfd):
     first, second, *_ = capfd.readouterr().err.split("\n")
     assert first == r"\x1b]0;owned\x07 grün"
     assert second.startswith(r"\r\x9b")
-
-
-def test_nothing_hangs_where_the_supervisor_is_killed(c_fmu: Path, mark: str):
-    class Kills(Table):
-        def begin(self, header: Header) -> None:
-            super().begin(header)
-            for process in marked(mark):
-                if f"PPid:\t{os.getpid()}\n" in (process / "status").read_text():
-                    os.kill(int(process.name), signal.SIGKILL)
-
-    table = Kills()
-    simulate_plan(
-        make_plan(foreign_system(c_fmu), Experiment(50.0, STEP)), [table], Isolation(20.0)
-    )
-    assert table.failure is not None
-    assert "SIGKILL" in table.failure
-    assert left_over(mark) == []
 
 
 def test_runs_in_several_threads(c_fmu: Path):

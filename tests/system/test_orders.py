@@ -15,8 +15,9 @@ from orchestrator.commands.main import main
 from orchestrator.cosim.experiment import ORDERS, Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import delays, make_plan, stages
+from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim.stages import arrange
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load
@@ -53,7 +54,7 @@ def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder
     ending = simulate_plan(make_plan(system, Experiment(3 * H, H, coupling="delay")), [table])
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
-    assert stages(system, "gauss-seidel") == [["a"], ["b"], ["c"]]
+    assert arrange(system, "gauss-seidel").stages == [["a"], ["b"], ["c"]]
     # What closes the ring is a step old, everything else is new.
     np.testing.assert_array_equal(table["a.u"][1:], table["c.g"][:-1])
     np.testing.assert_array_equal(table["b.u"][1:], table["a.g"][1:])
@@ -65,8 +66,9 @@ def test_a_ring_that_feeds_another_is_opened_first(folder):
     fmus = {name: relay(folder) for name in "abcde"}
     wires = {"a.u": "b.g", "b.u": "a.g", "a.v": "d.g", "c.u": "d.g", "d.u": "c.g", "e.u": "b.g"}
     system = system_of(fmus, wires)
-    assert stages(system, "gauss-seidel") == [["c"], ["d"], ["a"], ["b"], ["e"]]
-    said = delays(system, "gauss-seidel")
+    arrangement = arrange(system, "gauss-seidel")
+    assert arrangement.stages == [["c"], ["d"], ["a"], ["b"], ["e"]]
+    said = arrangement.delays()
     assert [mentions(*pair) for pair in zip(said, ("a b.g", "c d.g"), strict=True)] == [True, True]
 
 
@@ -86,7 +88,7 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     system, experiment = load("fig4", NATIVE), Experiment(2.0, 0.02, "gauss-seidel")
     derived = run(system, experiment)
     if order == "gauss-seidel":
-        order = [name for names in stages(system, order) for name in names]
+        order = [name for names in arrange(system, order).stages for name in names]
     else:
         order = ("disturbance", "planner", *order)
     table = run(system, replace(experiment, order=order))

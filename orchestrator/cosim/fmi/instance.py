@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from ctypes import c_double
-from math import inf
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -12,16 +11,12 @@ from fmpy.fmi2 import fmi2Discard, fmi2Warning
 
 from orchestrator.cosim.fmi.transfer import CMember
 from orchestrator.cosim.system.values import StringTable, Value
-from orchestrator.machine.errors import shortened
 
 #: What a component is asked for in every step, one after the other.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "doStep", "getting outputs"
 
 #: Messages that are kept: an FMU may have something to say in every step.
-_MOST_MESSAGES = 100
-
-#: Letters of a message on its way from another process.
-_LONGEST_LETTER = 10_000
+MOST_MESSAGES = 100
 
 
 class ComponentFailed(Exception):
@@ -39,18 +34,7 @@ class ComponentFailed(Exception):
 
 
 class Ended(Exception):
-    """The run ends here, and well; the text says why.
-
-    Attributes:
-        component: that has ended it in a step; empty: none has.
-        time: until which that component has computed [s].
-
-    """
-
-    def __init__(self, text: str, component: str = "", time: float = -inf) -> None:
-        """Say why."""
-        super().__init__(text)
-        self.component, self.time = component, time
+    """The run ends with the last step that was made, and well; the text says why."""
 
 
 class Part(NamedTuple):
@@ -205,9 +189,9 @@ class Log:
         """Take a message."""
         if status >= fmi2Warning:
             self._n += 1
-            self._said += [text] * (len(self._said) < _MOST_MESSAGES)
+            self._said += [text] * (len(self._said) < MOST_MESSAGES)
         if status == fmi2Discard:
-            self.refusals += [text] * (len(self.refusals) < _MOST_MESSAGES)
+            self.refusals += [text] * (len(self.refusals) < MOST_MESSAGES)
 
     @property
     def messages(self) -> tuple[str, ...]:
@@ -228,21 +212,3 @@ class Log:
         """Take on what another one has taken."""
         self._remarks, self.refusals = state["remarks"], state["refusals"]
         self._said, self._n = state["said"], state["n"]
-
-
-class MessageQueue:
-    """Messages on their way to the log of another process."""
-
-    def __init__(self) -> None:
-        """Start empty."""
-        self._waiting: list[tuple[int, str]] = []
-
-    def take(self, status: int, text: str) -> None:
-        """Take a message; of a flood the log would not keep more than this."""
-        if status >= fmi2Warning and len(self._waiting) < _MOST_MESSAGES:
-            self._waiting.append((status, shortened(text, _LONGEST_LETTER)))
-
-    def handed_over(self) -> list[tuple[int, str]]:
-        """Those that have come since the last call."""
-        waiting, self._waiting = self._waiting, []
-        return waiting

@@ -1,55 +1,117 @@
-"""FMUs in processes of their own: what they do there ends a run at most, and nothing else."""
+"""FMUs in separate processes: what they do there ends a run at most, and nothing else.
+
+A message between the two processes is a frame of numbers, whose size both sides know, and a note,
+which is JSON, with bytes in base64; the first number of the frame is the note's length. In a step
+there is nothing to note, so that a message is one write and one read. Numbers and JSON are all that
+is read: the process of an FMU cannot make this one run anything.
+"""
 
 from __future__ import annotations
 
+import json
+import os
 import signal
 import socket
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+import sys
+from base64 import b64decode, b64encode
+from codecs import getincrementaldecoder
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from ctypes import c_double
 from dataclasses import dataclass
-from math import inf, isfinite
+from functools import partial
+from math import isfinite
 from numbers import Real
+from pathlib import Path
+from shutil import rmtree
+from subprocess import DEVNULL, Popen, TimeoutExpired
+from threading import Lock, Thread
+from time import monotonic, sleep
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from fmpy.fmi2 import fmi2OK, fmi2Pending, fmi2Warning
+from fmpy.model_description import ModelVariable
 
-from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Log, Part
+from orchestrator.cosim.fmi.binary import make_binary
+from orchestrator.cosim.fmi.instance import (
+    MOST_MESSAGES,
+    ComponentFailed,
+    Ended,
+    Instance,
+    Log,
+    Part,
+)
+from orchestrator.cosim.fmi.loaded import load_instance
+from orchestrator.cosim.fmi.surroundings import Surroundings
 from orchestrator.cosim.fmi.transfer import CMember
-from orchestrator.cosim.fmi.worker import LONGEST_NOTE, LONGEST_STATE, Channel, sizes
-from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.row import Row, ports_of_type
+from orchestrator.cosim.stages import member, step_members
+from orchestrator.cosim.system.component import Component, read_description
+from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of
-from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.errors import (
+    InputError,
+    StartError,
+    escape_unprintable,
+    reason,
+    shortened,
+)
 from orchestrator.machine.interrupts import Interrupts
+from orchestrator.machine.operating_system import can_isolate, end_first_without_memory
 
-#: How long a call may take by default [s]: an FMU may fetch a licence or read maps first.
+#: Default limit of a call [s]: an FMU may fetch a licence or read maps first.
 STEP_TIMEOUT = 60.0
 
-#: How long a process may take to begin [s].
+#: Limit for the start of a process [s].
 _START = 60.0
 
-#: How often the wait for an FMU looks about [s], how long it still waits when the user wants to
-#: stop [s], and how long an FMU has to be freed when the run has failed [s].
-_GLANCE, _PATIENCE, FAREWELL = 0.1, 1.0, 5.0
+#: Interval of looks at the interrupts and at the parent, wait for an FMU after an interrupt, and
+#: time that a process has to end by itself [s].
+_GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
+
+#: Longest note with the state of an FMU, which may be large, and longest other note [bytes].
+LONGEST_STATE, LONGEST_NOTE = 1 << 30, 1 << 25
+
+#: Longest message of an FMU [letters].
+_LONGEST_MESSAGE = 10_000
+
+#: Key of an object that stands for bytes in a note; no variable has this name.
+_BYTES = "\0base64"
 
 #: Statuses that a message can have.
 _STATUSES = range(fmi2OK, fmi2Pending + 1)
 
+#: Calls that are steps, as messages name them.
+_STEP, _EXCHANGE = "doStep", "exchanging values"
+
+#: Start of a process: it finds the modules that this one would find, and has no main module.
+_BEGIN = """
+import importlib, json, sys
+order = json.loads(sys.argv.pop())
+sys.path[:] = order.pop("path")
+importlib.import_module("orchestrator.cosim.fmi.isolated").serve(**order)
+"""
+
+#: FMUs that allow one instance per process, and have it in this one, for runs in several threads.
+_taken: set[str] = set()
+_LOCK = Lock()
+
 
 @dataclass(frozen=True)
 class Isolation:
-    """How FMUs are run in processes of their own.
+    """Settings of FMUs in separate processes.
 
     Attributes:
-        step_timeout: how long one call of an FMU may take [s].
+        step_timeout: limit of one call of an FMU [s].
 
     """
 
     step_timeout: float = STEP_TIMEOUT
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be waited for."""
+        """Refuse a limit that is no positive number."""
         seconds = self.step_timeout
         number = isinstance(seconds, Real) and not isinstance(seconds, bool)
         if not (number and isfinite(seconds) and seconds > 0.0):
@@ -57,7 +119,7 @@ class Isolation:
 
 
 def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
-    """What a user asks for.
+    """Make the settings of a user's two options.
 
     Raises:
         InputError: a timeout without isolation: a call in this process cannot be ended.
@@ -70,6 +132,264 @@ def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
             "--step-timeout needs --isolate: only an FMU in a separate process can be ended"
         )
     return None
+
+
+@contextmanager
+def place_instances(
+    components: Mapping[str, Component],
+    log: Log,
+    isolation: Isolation | None,
+    interrupts: Interrupts,
+) -> Iterator[dict[str, Instance]]:
+    """Place instances of components, by name: all in this process, or each in a separate one.
+
+    A further instance of an FMU that allows one per process always gets a separate process.
+
+    Args:
+        components: by their names.
+        log: takes the messages of the FMUs.
+        isolation: of the FMUs; None: all are in this process.
+        interrupts: end the wait for an FMU.
+
+    Raises:
+        InputError: an FMU cannot be loaded.
+        StartError: no process can be started.
+        ComponentFailed: an FMU has failed while it was instantiated.
+
+    """
+    with ExitStack() as stack:
+        apart: dict[str, Component] = {}
+        instances: dict[str, Instance] = {}
+        for name, component in components.items():
+            if isolation is None and stack.enter_context(_has_room(component)):
+                instances[name] = stack.enter_context(load_instance(component, log))
+            else:
+                apart[name] = component
+                # Here there is time for it, and a caller to tell.
+                make_binary(component, component.folder)
+        if apart:
+            settings = isolation or Isolation()
+            instances |= stack.enter_context(isolate_instances(apart, log, settings, interrupts))
+        yield {name: instances[name] for name in components}
+
+
+@contextmanager
+def _has_room(component: Component) -> Iterator[bool]:
+    """Whether this process may have one more instance, which then counts until the end."""
+    if not component.is_once_per_process:
+        yield True
+        return
+    guid = component.description.guid
+    with _LOCK:
+        has_room = guid not in _taken
+        _taken.add(guid)
+    try:
+        yield has_room
+    finally:
+        if has_room:
+            _taken.remove(guid)
+
+
+@contextmanager
+def isolate_instances(
+    components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
+) -> Iterator[dict[str, Instance]]:
+    """Place instances, each in a separate process; all end with the context.
+
+    Raises:
+        InputError: this system has no such processes.
+        StartError: no process can be started.
+
+    """
+    if not can_isolate():
+        raise InputError(
+            f"{', '.join(components)}: FMUs cannot be run in separate processes on Windows: leave "
+            "out --isolate, and use an FMU that allows one instance per process only once"
+        )
+    with ExitStack() as stack:
+        instances = []
+        try:
+            reading, writing = os.pipe()
+            with os.fdopen(writing, "wb") as output:
+                shown = Thread(target=_show_output, args=(reading,), daemon=True)
+                shown.start()
+                stack.callback(shown.join, _PATIENCE)
+                for component in components.values():
+                    here, there = socket.socketpair()
+                    stack.enter_context(here)
+                    with there:
+                        process = _Process(component, there.fileno(), output.fileno())
+                    stack.callback(process.end)
+                    timeout = isolation.step_timeout
+                    instances.append(
+                        IsolatedInstance(component, here, process.status, log, timeout, interrupts)
+                    )
+        except (OSError, RuntimeError) as error:
+            raise StartError(f"cannot start processes for FMUs: {reason(error)}") from error
+        try:
+            for instance in instances:
+                instance.wait()
+            yield {instance.name: instance for instance in instances}
+        finally:
+            for instance in instances:
+                instance.leave()
+            for instance in instances:
+                instance.farewell()
+
+
+def _show_output(reading: int) -> None:
+    """Show what the processes write, escaped for the terminal, until all of them have ended."""
+    # A letter may come in two pieces.
+    decode = getincrementaldecoder("utf-8")("backslashreplace").decode
+    with os.fdopen(reading, "rb", buffering=0) as output:
+        while written := output.read(1 << 16):
+            text = escape_unprintable(decode(written), "\n\t")
+            # The standard error may be closed.
+            with suppress(OSError), open(2, "w", encoding="utf-8", closefd=False) as errors:
+                errors.write(text)
+
+
+class _Process:
+    """The process of an FMU, in a process group of its own: what it starts ends with it."""
+
+    def __init__(self, component: Component, connection: int, output: int) -> None:
+        """Start it.
+
+        Args:
+            component: that it instantiates.
+            connection: descriptor of its end of the connection.
+            output: descriptor that it writes to.
+
+        Raises:
+            OSError: it cannot be started.
+
+        """
+        order = {
+            "path": [entry for entry in sys.path if isinstance(entry, str)],
+            "name": component.name,
+            "fmu": str(component.fmu),
+            "digest": component.digest,
+            "folder": str(component.folder),
+            "connection": connection,
+            "parent": os.getpid(),
+        }
+        self._process = Popen(
+            [sys.executable, "-P", "-c", _BEGIN, json.dumps(order)],
+            stdin=DEVNULL,
+            stdout=output,
+            stderr=output,
+            pass_fds=[connection],
+            process_group=0,
+        )
+
+    def status(self, seconds: float) -> int | None:
+        """Wait some seconds for its exit status; None: it has not ended."""
+        if self._process.returncode is None:
+            with suppress(TimeoutExpired):
+                self._process.wait(seconds)
+                self._kill_group()
+        return self._process.returncode
+
+    def end(self) -> None:
+        """End it, and all that it has started."""
+        if self.status(0.0) is None:
+            self._kill_group()
+            self.status(_FAREWELL)
+
+    def _kill_group(self) -> None:
+        with suppress(OSError):
+            os.killpg(self._process.pid, signal.SIGKILL)
+
+
+class Channel:
+    """One end of a connection.
+
+    Attributes:
+        outgoing, incoming: numbers of the next message, and of the last one.
+
+    """
+
+    def __init__(
+        self,
+        connection: socket.socket,
+        outgoing: int,
+        incoming: int,
+        waited: Callable[[float], None] = lambda _: None,
+    ) -> None:
+        """Use a connected socket.
+
+        Args:
+            connection: its timeout, if it has one, is the interval of the calls of `waited`.
+            outgoing, incoming: number of numbers in each message.
+            waited: called with the seconds for which a message is waited for, to raise something.
+
+        """
+        self._connection = connection
+        self._waited = waited
+        self._sent, self._received = np.zeros(1 + outgoing), np.zeros(1 + incoming)
+        self._sent_bytes = self._sent.data.cast("B")
+        self._received_bytes = self._received.data.cast("B")
+        self.outgoing, self.incoming = self._sent[1:], self._received[1:]
+
+    def send(self, note: Mapping[str, Any] = MappingProxyType({})) -> None:
+        """Send a message.
+
+        Raises:
+            OSError: the other end is closed.
+
+        """
+        written = json.dumps(note, default=_as_text, ensure_ascii=False) if note else ""
+        text = written.encode(errors="replace")
+        self._sent[0] = len(text)
+        self._move(self._connection.send, self._sent_bytes)
+        if text:
+            self._move(self._connection.send, memoryview(text))
+
+    def receive(self, longest: int = LONGEST_STATE) -> Any:
+        """Receive a message, and return its note.
+
+        Args:
+            longest: note that may come [bytes].
+
+        Raises:
+            EOFError, OSError: the other end is closed.
+            ValueError, RecursionError, MemoryError: it is not a message.
+
+        """
+        self._move(self._connection.recv_into, self._received_bytes)
+        length = self._received[0]
+        if length == 0.0:
+            return {}
+        if not 1.0 <= length <= longest:
+            raise ValueError(f"a message of {length:g} bytes, more than {longest:,}")
+        text = bytearray(int(length))
+        self._move(self._connection.recv_into, memoryview(text))
+        return json.loads(text, object_hook=_from_text)
+
+    def close(self) -> None:
+        """Tell the other end that nothing more follows."""
+        self._connection.close()
+
+    def _move(self, move: Callable[[memoryview], int], data: memoryview) -> None:
+        """Send or receive all of some bytes."""
+        begun = monotonic()
+        while True:
+            with suppress(TimeoutError):
+                n = move(data)
+                if n == len(data):
+                    return
+                if n == 0:
+                    raise EOFError
+                data = data[n:]
+            self._waited(monotonic() - begun)
+
+
+def _as_text(value: bytes) -> dict[str, str]:
+    return {_BYTES: b64encode(value).decode("ascii")}
+
+
+def _from_text(read: dict[str, Any]) -> Any:
+    return b64decode(read[_BYTES], validate=True) if read.keys() == {_BYTES} else read
 
 
 class IsolatedInstance:
@@ -92,12 +412,12 @@ class IsolatedInstance:
         """Use a process that instantiates a component now.
 
         Args:
-            component: that it is an instance of.
+            component: of the instance.
             connection: to the process.
-            status: gives the exit status of the process, for which it waits some seconds.
-            log: takes what the FMU says.
-            timeout: how long a call may take [s].
-            interrupts: that end the wait for a call.
+            status: waits some seconds for the exit status of the process.
+            log: takes the messages of the FMU.
+            timeout: limit of a call [s].
+            interrupts: end the wait for a call.
 
         """
         self.name, self._component = component.name, component
@@ -106,46 +426,29 @@ class IsolatedInstance:
         self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
         self._timeout, self._interrupts = timeout, interrupts
-        self._doing, self._hangs, self._steps = "start", False, False
+        # The call that is made now, whether it hangs, and whether it is a step.
+        self._call, self._hangs, self._steps = "start", False, False
         connection.settimeout(min(timeout, _GLANCE))
-        self._inputs, self._outputs = np.zeros(0), np.zeros(0)
-        # Where numbers may stand for values, in the run and in the process, and outputs by types.
-        self._standing: dict[str, list[tuple[int, Standing, Standing]]] = {
-            "input": [],
-            "output": [],
-        }
-        self._typed_outputs: list[tuple[str, slice]] = []
-        # What numbers stand for in the process, which has its own, and how many of them both know.
-        self._theirs, self._told = StringTable(), len(StringTable())
-        inputs, outputs = sizes(component)
-        self._channel = Channel(connection, 2 + inputs, outputs, self._waited)
+        incoming, outgoing = sizes(component)
+        self._channel = Channel(connection, outgoing, incoming, self._waited)
 
     def wait(self) -> None:
         """Wait for the process to begin, and to instantiate the FMU.
 
         Raises:
-            InputError: it cannot be.
+            InputError: the FMU cannot be instantiated.
 
         """
         # Before it begins nothing foreign is run, and a busy machine may take its time.
         self._receive()
-        self._doing = "instantiate"
+        self._call = "instantiate"
         self._receive()
 
     def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Say where its values are."""
-        inputs, outputs = len(self._channel.outgoing) - 2, len(self._channel.incoming)
-        first = next((part.place.start for part in parts if part.causality == "output"), inputs)
-        self._inputs, self._outputs = values[:inputs], values[first : first + outputs]
-        for part in parts:
-            of, is_input = TYPES[part.fmi_type], part.causality == "input"
-            begin = part.place.start - (0 if is_input else first)
-            end = begin + part.place.stop - part.place.start
-            if of.stands:
-                ours, theirs = (Standing(part.fmi_type, s) for s in (strings, self._theirs))
-                self._standing[part.causality] += [(i, ours, theirs) for i in range(begin, end)]
-            if not is_input and of.family != "Real":
-                self._typed_outputs.append((part.fmi_type, slice(begin, end)))
+        first = next((part.place.start for part in parts if part.causality == "output"), 0)
+        self._inputs = _Ports(self._component, "input", values, strings)
+        self._outputs = _Ports(self._component, "output", values[first:], strings)
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
@@ -157,30 +460,25 @@ class IsolatedInstance:
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
-        self._put_inputs()
-        self._ask("exchange")
-        self._read_outputs()
+        self._begin(_EXCHANGE, 0.0, 0.0)
+        self._take_outputs()
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
         """How some outputs change with one input at the same time."""
-        found = self._ask("derivatives", list(outputs), of)
-        if not (isinstance(found, list) and len(found) == len(outputs)):
-            raise self._nonsense()
-        if not all(type(value) is float for value in found):
-            raise self._nonsense()
-        return found
+        values = self._ask("derivatives", list(outputs), of)
+        self._check(isinstance(values, list) and len(values) == len(outputs))
+        self._check(all(type(value) is float for value in values))
+        return list(values)
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
         """Values of some variables, as the FMU holds them."""
         if not ports:
             return {}
         values = self._ask("read", list(ports))
-        if not (isinstance(values, dict) and values.keys() == set(ports)):
-            raise self._nonsense()
+        self._check(isinstance(values, dict) and values.keys() == set(ports))
         variables = self._component.variables
-        if not all(variables[port].holds(value) for port, value in values.items()):
-            raise self._nonsense()
-        return values
+        self._check(all(variables[port].holds(value) for port, value in values.items()))
+        return dict(values)
 
     def tune(self, values: Mapping[str, Value]) -> None:
         """Set tunable parameters between two steps."""
@@ -205,9 +503,8 @@ class IsolatedInstance:
     def state(self) -> bytes:
         """The FMU's whole state between two steps."""
         state = self._ask("state")
-        if not isinstance(state, bytes):
-            raise self._nonsense()
-        return state
+        self._check(isinstance(state, bytes))
+        return bytes(state)
 
     def restore(self, state: bytes) -> None:
         """Take on a state."""
@@ -218,22 +515,21 @@ class IsolatedInstance:
         raise NotImplementedError
 
     def failed(self, status: int, function: str) -> ComponentFailed:
-        """What to raise after a call that has ended with a status; its own calls raise at once."""
+        """Name a call that has ended with a status; calls of this class raise at once."""
         return ComponentFailed(f"{self.name}: {function} ended with status {status}")
 
     def do_step(self, t: c_double, h: c_double, _: int) -> int:
         """Have a step begun, whose end the first of `get_outputs` waits for."""
-        return self._begin("doStep", t.value, h.value)
+        return self._begin(_STEP, t.value, h.value)
 
     def do_exchange(self, t: c_double, _h: c_double, _: int) -> int:
         """Have values exchanged, in the same way; the step has no length."""
-        return self._begin("exchanging values", t.value, 0.0)
+        return self._begin(_EXCHANGE, t.value, 0.0)
 
-    def _begin(self, what: str, t: float, h: float) -> int:
+    def _begin(self, call: str, t: float, h: float) -> int:
         self._channel.outgoing[:2] = t, h
-        self._put_inputs()
-        self._doing, self._steps = what, True
-        self._send({})
+        self._call, self._steps = call, True
+        self._send(self._inputs.put(self._channel.outgoing[2:]))
         return 0
 
     def terminate(self) -> None:
@@ -241,7 +537,7 @@ class IsolatedInstance:
         try:
             self._ask("terminate")
             self.leave()
-            self._doing, waited = "freeInstance", 0.0
+            self._call, waited = "freeInstance", 0.0
             while (status := self._status(_GLANCE)) is None:
                 waited += _GLANCE
                 self._waited(waited)
@@ -250,7 +546,7 @@ class IsolatedInstance:
         except ComponentFailed as error:
             self._log.take(fmi2Warning, str(error))
         except KeyboardInterrupt:
-            self._log.take(fmi2Warning, f"{self.name}: interrupted in {self._doing}")
+            self._log.take(fmi2Warning, f"{self.name}: interrupted in {self._call}")
 
     def leave(self) -> None:
         """Want nothing more: the process frees the FMU and ends, if it can."""
@@ -259,71 +555,41 @@ class IsolatedInstance:
     def farewell(self) -> None:
         """Give the process some time to end; it is no use waiting for one that hangs."""
         if not self._hangs:
-            self._status(min(self._timeout, FAREWELL))
+            self._status(min(self._timeout, _FAREWELL))
 
     def _take_outputs(self) -> int:
-        # Outputs of a step that has ended the run are there already.
         if self._steps:
             self._steps = False
-            try:
-                self._receive()
-            except Ended:
-                self._read_outputs()
-                raise
-            self._read_outputs()
+            self._receive()
         return 0
-
-    def _put_inputs(self) -> None:
-        """Have the inputs go with the next message."""
-        inputs = self._channel.outgoing[2:]
-        inputs[:] = self._inputs
-        for i, ours, theirs in self._standing["input"]:
-            inputs[i] = theirs.number(ours.value(inputs[i]))
-
-    def _read_outputs(self) -> None:
-        """Take the outputs that have come with a message."""
-        outputs = self._channel.incoming
-        if not all(are_of(of, outputs[place]).all() for of, place in self._typed_outputs):
-            raise self._nonsense()
-        try:
-            for i, ours, theirs in self._standing["output"]:
-                outputs[i] = ours.number(theirs.value(outputs[i]))
-        except (ValueError, OverflowError) as error:
-            raise self._nonsense(error) from error
-        self._outputs[:] = outputs
 
     def _ask(self, call: str, *arguments: Any) -> Any:
         if self._steps:
             # Another component has ended the run in this step, and its outputs are not wanted.
             with suppress(ComponentFailed, Ended):
                 self._take_outputs()
-        self._doing = call
+        self._call = call
         self._send({"call": call, "arguments": arguments})
         return self._receive()
 
     def _send(self, note: dict[str, Any]) -> None:
-        """Send a note, with the texts that are new there."""
-        if news := self._theirs.since(self._told):
-            note["strings"] = news
-            self._told += len(news)
         try:
-            self._channel.send(note or None)
+            self._channel.send(note)
         except OSError as error:
             raise self._lost() from error
 
     def _receive(self) -> Any:
         """The value in the answer to a request."""
-        longest = LONGEST_STATE if self._doing == "state" else LONGEST_NOTE
+        longest = LONGEST_STATE if self._call == "state" else LONGEST_NOTE
         try:
-            note = self._channel.receive(longest)
-            return None if note is None else self._read(**note)
+            return self._read(**self._channel.receive(longest))
         except (EOFError, OSError) as error:
             raise self._lost() from error
         except InputError:
             raise
         # Whatever an FMU has made its process send.
         except (ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
-            raise self._nonsense(error) from error
+            raise self._invalid(error) from error
 
     def _read(
         self,
@@ -333,60 +599,129 @@ class IsolatedInstance:
         fatal: bool = False,
         refused: str | None = None,
         ended: str | None = None,
-        until: float = -inf,
-        strings: Sequence[str] = (),
+        values: Sequence[Value] = (),
     ) -> Any:
-        for text in strings:
-            self._theirs.number(_text(text))
-        self._told = len(self._theirs)
         for status, text in messages:
             if status not in _STATUSES:
                 raise ValueError("it returned a status that FMI does not define")
             self._log.take(int(status), _line(text))
         if failed is not None:
             raise ComponentFailed(_line(failed), bool(fatal))
-        if refused is not None and self._doing == "instantiate":
+        if refused is not None and self._call == "instantiate":
             raise InputError(_line(refused))
-        if ended is not None and self._doing == "doStep":
-            raise Ended(_line(ended), self.name, float(until))
+        if ended is not None and self._call == _STEP:
+            raise Ended(_line(ended))
         if refused is not None or ended is not None:
-            raise ValueError(f"it cannot end a run in {self._doing}")
+            raise ValueError(f"it cannot end a run in {self._call}")
+        if self._call in (_STEP, _EXCHANGE):
+            self._outputs.check(self._channel.incoming, values)
+            self._outputs.take(self._channel.incoming, values)
         return value
 
     def _waited(self, seconds: float) -> None:
+        # What it has started may hold the connection open.
+        self._status(0.0)
         if self._interrupts and seconds >= _PATIENCE:
             self._hangs = True
             raise KeyboardInterrupt
-        limit = _START if self._doing == "start" else self._timeout
+        limit = _START if self._call == "start" else self._timeout
         if seconds >= limit:
             self._hangs = True
             raise ComponentFailed(
-                f"{self.name}: {self._doing} has not ended within {limit:g} s", fatal=True
+                f"{self.name}: {self._call} has not ended within {limit:g} s", fatal=True
             )
 
-    def _nonsense(self, error: BaseException | None = None) -> ComponentFailed:
+    def _check(self, fits: Any) -> None:
+        if not fits:
+            raise self._invalid()
+
+    def _invalid(self, error: BaseException | None = None) -> ComponentFailed:
         why = "" if error is None else f": {reason(error)}"
-        text = f"{self.name}: its process sent an invalid answer in {self._doing}{why}"
+        text = f"{self.name}: its process sent an invalid answer in {self._call}{why}"
         return ComponentFailed(text, fatal=True)
 
     def _lost(self) -> ComponentFailed:
-        status = self._status(FAREWELL)
-        return ComponentFailed(
-            f"{self.name}: its process {_how_it_ended(status)} in {self._doing}", fatal=True
-        )
+        status = self._status(_FAREWELL)
+        text = f"{self.name}: its process {_end_in_words(status)} in {self._call}"
+        return ComponentFailed(text, fatal=True)
 
 
-def _text(value: str) -> str:
-    """A text that has come, if it is one that can be written."""
-    value.encode()
-    return value
+def sizes(component: Component) -> tuple[int, int]:
+    """Count the numbers in an answer of a component, its outputs, and in a request.
+
+    A request has time, step size and inputs.
+    """
+    return len(component.having("output")), 2 + len(component.having("input"))
 
 
-def _line(value: str) -> str:
-    return "; ".join(_text(value).splitlines())
+class _Ports:
+    """The inputs or the outputs of a component in its row, and in messages.
+
+    Most values are numbers. The texts and the integers that some numbers stand for go in the note.
+
+    Attributes:
+        numbers: in the row.
+
+    """
+
+    def __init__(
+        self, component: Component, causality: str, values: np.ndarray, strings: StringTable
+    ) -> None:
+        """Tie them to a row.
+
+        Args:
+            component: whose ports they are.
+            causality: `input` or `output`.
+            values: of the row, from their first on.
+            strings: that numbers in it stand for.
+
+        """
+        self._typed: list[tuple[str, slice]] = []
+        self._standing: list[tuple[int, ModelVariable, Standing]] = []
+        n = 0
+        for name, of in TYPES.items():
+            ports = ports_of_type(component, causality, name)
+            if ports and of.family != "Real":
+                self._typed.append((name, slice(n, n + len(ports))))
+            if of.stands:
+                standing = Standing(name, strings)
+                self._standing += [(i, port, standing) for i, port in enumerate(ports, n)]
+            n += len(ports)
+        self.numbers = values[:n]
+
+    def put(self, numbers: np.ndarray) -> dict[str, Any]:
+        """Put all into a message, and return the note."""
+        numbers[:] = self.numbers
+        values = [standing.value(numbers[i]) for i, _, standing in self._standing]
+        return {"values": values} if values else {}
+
+    def take(self, numbers: np.ndarray, values: Sequence[Value]) -> None:
+        """Take all from a message and from its note."""
+        for (i, _, standing), value in zip(self._standing, values, strict=True):
+            numbers[i] = standing.number(value)
+        self.numbers[:] = numbers
+
+    def check(self, numbers: np.ndarray, values: Sequence[Value]) -> None:
+        """Check what has come in a message.
+
+        Raises:
+            ValueError: a port cannot have its value.
+
+        """
+        held = zip(self._standing, values, strict=True)
+        if not all(port.holds(value) for (_, port, _), value in held):
+            raise ValueError("an output cannot have its value")
+        if not all(are_of(of, numbers[place]).all() for of, place in self._typed):
+            raise ValueError("an output cannot have its value")
 
 
-def _how_it_ended(status: int | None) -> str:
+def _line(text: str) -> str:
+    # Half of a UTF-16 pair is not text.
+    text.encode()
+    return "; ".join(text.splitlines())
+
+
+def _end_in_words(status: int | None) -> str:
     if status is None:
         return "no longer answers"
     if status >= 0:
@@ -395,3 +730,111 @@ def _how_it_ended(status: int | None) -> str:
     name = names.get(-status, f"signal {-status}")
     memory = ", perhaps for lack of memory" if -status == signal.SIGKILL else ""
     return f"was ended by {name} ({signal.strsignal(-status)}{memory})"
+
+
+@np.errstate(all="ignore")
+def serve(name: str, fmu: str, digest: str, folder: str, connection: int, parent: int) -> None:
+    """Instantiate an FMU, and answer requests until there are no more: all that a process does.
+
+    Args:
+        name: of the component.
+        fmu: the file, for messages.
+        digest: of it.
+        folder: into which it is unpacked.
+        connection: descriptor of the socket to the process that simulates it.
+        parent: number of that process.
+
+    """
+    # Whether to stop is for the parent to decide.
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    end_first_without_memory()
+    os.set_inheritable(connection, False)
+    Thread(target=_end_with, args=(parent, Path(folder).parent), daemon=True).start()
+    component = Component(name, Path(fmu), read_description(Path(folder)).description, digest)
+    channel = Channel(socket.socket(fileno=connection), *sizes(component))
+    Served(component, channel).answer_all(Path(folder))
+
+
+def _end_with(parent: int, temporary: Path) -> None:
+    """End this process with its parent, whatever the FMU does, and remove what the parent left."""
+    while os.getppid() == parent:
+        sleep(_GLANCE)
+    rmtree(temporary, ignore_errors=True)
+    os.killpg(0, signal.SIGKILL)
+
+
+class Served:
+    """An FMU that answers requests.
+
+    A request without a call is a step; in one of no length, values are exchanged only. An answer
+    without a note says that all is well; else the note has messages of the FMU, the value that a
+    call has given, or why it has failed. Either has the values that numbers stand for.
+    """
+
+    def __init__(self, component: Component, channel: Channel) -> None:
+        """Answer for a component through a channel."""
+        self._component, self._channel = component, channel
+        self._messages: list[tuple[int, str]] = []
+        self._surroundings = Surroundings()
+
+    def take(self, status: int, text: str) -> None:
+        """Take a message of the FMU; the log of the run would keep no more than this."""
+        if status >= fmi2Warning and len(self._messages) < MOST_MESSAGES:
+            self._messages.append((status, shortened(text, _LONGEST_MESSAGE)))
+
+    def answer_all(self, folder: Path) -> None:
+        """Say that it begins, instantiate the FMU, and answer until the other end closes.
+
+        Args:
+            folder: into which the FMU is unpacked.
+
+        """
+        with suppress(EOFError, OSError):
+            self._channel.send()
+            try:
+                with load_instance(self._component, self, folder) as instance:
+                    self._begin(instance)
+                    # A call that was fatal is the last.
+                    going_on = self._answer(lambda: None)
+                    while going_on:
+                        going_on = self._answer(self._asked())
+            except InputError as error:
+                self._channel.send({"refused": str(error)})
+
+    def _begin(self, instance: Instance) -> None:
+        name = self._component.name
+        row = Row(System(name, {name: self._component}, ()), {name: instance})
+        self._instance, self._member = instance, member(instance)
+        self._inputs = _Ports(self._component, "input", row.values, row.strings)
+        first = len(self._inputs.numbers)
+        self._outputs = _Ports(self._component, "output", row.values[first:], row.strings)
+
+    def _asked(self) -> Callable[[], Any]:
+        """What the next request asks for."""
+        request = self._channel.receive()
+        if "call" in request:
+            return partial(getattr(self._instance, request["call"]), *request["arguments"])
+        self._inputs.take(self._channel.incoming[2:], request.get("values", ()))
+        t, h = self._channel.incoming[:2]
+        if h:
+            return partial(step_members, [self._member], c_double(t), c_double(h))
+        return self._instance.exchange
+
+    def _answer(self, call: Callable[[], Any]) -> bool:
+        note: dict[str, Any] = {}
+        try:
+            value = call()
+            if value is not None:
+                note["value"] = value
+        except Ended as end:
+            note["ended"] = str(end)
+        except ComponentFailed as error:
+            note |= {"failed": str(error), "fatal": error.fatal}
+        except Exception as error:
+            note |= {"failed": f"{self._component.name}: {reason(error)}", "fatal": True}
+        self._surroundings.end_copy()
+        if self._messages:
+            note["messages"], self._messages = self._messages, []
+        self._channel.send(note | self._outputs.put(self._channel.outgoing))
+        return not note.get("fatal")

@@ -297,8 +297,7 @@ class LoadedInstance:
         if (function, status) == (DO_STEP, fmi2Discard) and not self._library.runs_python:
             with suppress(FMICallException):
                 if (time := self._fmu.ended_at()) is not None:
-                    text = f"{self.name} has ended the simulation, at {time:.12g} s"
-                    return Ended(text, self.name, time)
+                    return Ended(f"{self.name} has ended the simulation, at {time:.12g} s")
         if (function, status) == (DO_STEP, fmi2Discard) and (
             time := self._fmu.returned_at()
         ) is not None:

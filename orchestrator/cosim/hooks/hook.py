@@ -15,7 +15,7 @@ from orchestrator.cosim.experiment import MOST_STEPS, Experiment
 from orchestrator.cosim.fmi.instance import Instance, Log
 from orchestrator.cosim.observers.observer import Blocks, Occurrence
 from orchestrator.cosim.row import Overrides, Row
-from orchestrator.cosim.schedule import Stage, make_stages
+from orchestrator.cosim.stages import LinkedStage, make_stages
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.interrupts import Interrupts
 
@@ -49,8 +49,8 @@ class Run:
     experiment: Experiment
     instances: Mapping[str, Instance]
     row: Row
-    stages: Sequence[Stage]
-    passing: Sequence[Stage] | None
+    stages: Sequence[LinkedStage]
+    passing: Sequence[LinkedStage] | None
     overrides: Overrides
     blocks: Blocks
     log: Log

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import MOST_STEPS, ROUNDING
+from orchestrator.cosim.experiment import MOST_STEPS, ROUNDING, Order
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection, can_feed, check_connection
 from orchestrator.cosim.system.graph import in_levels, opened, strongly_connected, without_rings
@@ -280,6 +281,27 @@ class System:
         """
         for problem in self.problems():
             raise InputError(problem)
+
+    def check_order(self, order: Order | None) -> None:
+        """Check that an order that is stated names each component once.
+
+        Raises:
+            InputError: it does not.
+
+        """
+        if order is None or isinstance(order, str):
+            return
+        for name in order:
+            self.component(name)
+        stated = Counter(order)
+        twice = [name for name, n in stated.items() if n > 1]
+        missing = [name for name in self.components if name not in stated]
+        for names, what in ((twice, "twice"), (missing, "not at all")):
+            if names:
+                raise InputError(
+                    f"order {','.join(order)}: names {', '.join(names)} {what}; it must name every "
+                    "component once"
+                )
 
     def problems(self) -> Iterator[str]:
         """All that is wrong with names, connections and parameters, a line each."""

@@ -12,8 +12,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.loop import PYTHON_LOOP, choose_loop, step_interpreted
 from orchestrator.cosim.row import Gathering
-from orchestrator.cosim.schedule import Stage, StageCall
-from orchestrator.cosim.stages import Decimation
+from orchestrator.cosim.stages import Decimation, LinkedStage, StageCall
 from orchestrator.machine.errors import InputError
 
 SHORT, LONG = Experiment(10.0, 1.0), Experiment(1e6, 1.0)
@@ -30,8 +29,8 @@ def made(limit: float, experiment: Experiment, width: int = 3) -> SimpleNamespac
         return Gathering(np.array([target]), np.array([source]))
 
     stages = [
-        Stage(moved(1, 0), [StageCall(act).member]),
-        Stage(moved(2, 1), [], Decimation(3, at_end=True)),
+        LinkedStage(moved(1, 0), [StageCall(act).member]),
+        LinkedStage(moved(2, 1), [], Decimation(3, at_end=True)),
     ]
     rows: list[list[float]] = []
     return SimpleNamespace(

@@ -20,7 +20,8 @@ from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.events import Event, Stop
 from orchestrator.cosim.hooks.timing import InputTable
 from orchestrator.cosim.loop import choose_loop
-from orchestrator.cosim.plan import delays, gathered_connections, make_plan, stages
+from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim.stages import arrange, gathered_connections
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
@@ -64,12 +65,12 @@ def relays(tmp_path_factory: pytest.TempPathFactory):
 )
 def test_no_component_waits_for_another_of_its_stage(relays, wires, order, expected):
     how = order if "-" in order or order == "jacobi" else tuple(order)
-    assert stages(relays(wires), how) == [list(names) for names in expected]
+    assert arrange(relays(wires), how).stages == [list(names) for names in expected]
 
 
 def test_a_ring_that_is_solved_is_a_stage_of_its_own(relays):
     for order in ("jacobi", "gauss-seidel"):
-        assert stages(relays(RING), order, [["a", "b"]]) == [["c"], ["a", "b"]]
+        assert arrange(relays(RING), order, [["a", "b"]]).stages == [["c"], ["a", "b"]]
 
 
 @pytest.mark.parametrize(
@@ -77,15 +78,15 @@ def test_a_ring_that_is_solved_is_a_stage_of_its_own(relays):
 )
 def test_an_order_names_every_component_once(relays, order, words):
     with pytest.raises(InputError) as error:
-        stages(relays(CHAIN), tuple(order))
+        make_plan(relays(CHAIN), replace(EXPERIMENT, order=tuple(order)))
     assert mentions(str(error.value), words)
 
 
 def test_what_opens_a_ring_is_said(relays):
-    [text] = delays(relays(RING), "gauss-seidel", reasons={"b": "b is a stranger"})
+    [text] = arrange(relays(RING), "gauss-seidel").delays({"b": "b is a stranger"})
     assert text.startswith("a ") and mentions(text, "b.g stranger")
-    assert delays(relays(RING), "gauss-seidel", [["a", "b"]]) == []
-    assert delays(relays(RING), "jacobi") == delays(relays(CHAIN), "gauss-seidel") == []
+    assert arrange(relays(RING), "gauss-seidel", [["a", "b"]]).delays() == []
+    assert arrange(relays(CHAIN), "gauss-seidel").delays() == []
 
 
 @pytest.mark.parametrize(
@@ -101,12 +102,15 @@ def test_what_opens_a_ring_is_said(relays):
 def test_inputs_are_gathered_before_the_stage_that_needs_them(
     relays, wires, order, latest, expected
 ):
-    found = gathered_connections(relays(wires), ["a", "b", "c"], order=order, latest=latest)
+    system = relays(wires)
+    arrangement = arrange(system, order)._replace(stages=["a", "b", "c"])
+    found = gathered_connections(system, arrangement, latest=latest)
     assert [[str(wire.target) for wire in wires] for wires in found] == expected
 
 
 def test_a_solved_ring_gathers_by_itself(relays):
-    assert gathered_connections(relays(RING), [["a", "b"], ["c"]], [["a", "b"]]) == [[], []]
+    system = relays(RING)
+    assert gathered_connections(system, arrange(system, "gauss-seidel", [["a", "b"]])) == [[], []]
 
 
 @pytest.mark.parametrize(

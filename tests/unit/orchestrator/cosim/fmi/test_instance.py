@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim.fmi.instance import ComponentFailed, Instance, Log
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.fmi.placement import place_instances
+from orchestrator.cosim.fmi.isolated import Isolation, place_instances
 from orchestrator.cosim.row import Row
-from orchestrator.cosim.schedule import member, step_members
+from orchestrator.cosim.stages import member, step_members
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System

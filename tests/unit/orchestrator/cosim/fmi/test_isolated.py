@@ -16,11 +16,16 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi import placement
-from orchestrator.cosim.fmi.instance import Log, MessageQueue
-from orchestrator.cosim.fmi.isolated import IsolatedInstance, Isolation
-from orchestrator.cosim.fmi.loaded import load_instance
-from orchestrator.cosim.fmi.worker import LONGEST_NOTE, Channel, _Served, sizes
+from orchestrator.cosim.fmi import isolated
+from orchestrator.cosim.fmi.instance import Log
+from orchestrator.cosim.fmi.isolated import (
+    LONGEST_NOTE,
+    Channel,
+    IsolatedInstance,
+    Isolation,
+    Served,
+    sizes,
+)
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
@@ -38,7 +43,7 @@ def _json(note: Any) -> bytes:
     return json.dumps(note).encode()
 
 
-WORDS = ("value", "messages", "failed", "fatal", "refused", "ended", "texts", "\0base64")
+WORDS = ("value", "messages", "failed", "fatal", "refused", "ended", "values", "\0base64")
 VALUES = st.recursive(
     st.none() | st.booleans() | st.integers() | st.floats() | st.text() | st.just(10**400),
     lambda inner: (
@@ -58,11 +63,10 @@ class Answering(Channel):
     """An end of a connection that sends what it should, but for one message, its last."""
 
     def __init__(self, connection: socket.socket, component: Component, n: int, other: bytes):
-        inputs, outputs = sizes(component)
-        super().__init__(connection, outputs, 2 + inputs)
+        super().__init__(connection, *sizes(component))
         self._left, self._other, self._end = n, other, connection
 
-    def send(self, note: Any = None) -> None:
+    def send(self, note: Any = ()) -> None:
         if self._left == 0:
             self._end.sendall(self._other)
             raise EOFError
@@ -75,11 +79,7 @@ def answering(component: Component, channel: Answering) -> Iterator[None]:
     """A thread that serves an FMU."""
 
     def serve() -> None:
-        letters = MessageQueue()
-        with suppress(EOFError, OSError):
-            channel.send()
-            with load_instance(component, letters) as instance:
-                _Served(component, instance, channel, letters).answer_all()
+        Served(component, channel).answer_all(component.folder)
         channel.close()
 
     thread = threading.Thread(target=serve)
@@ -96,7 +96,9 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
     [component] = system.components.values()
 
     @contextmanager
-    def isolated(_: Any, log: Log, isolation: Isolation, interrupts: Interrupts) -> Iterator[Any]:
+    def answering_here(
+        _: Any, log: Log, isolation: Isolation, interrupts: Interrupts
+    ) -> Iterator[Any]:
         here, there = socket.socketpair()
         other = np.array([length, *outputs]).tobytes() + note
         with here, answering(component, Answering(there, component, n, other)):
@@ -108,7 +110,7 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
                 instance.leave()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(placement, "isolate_instances", isolated)
+        patch.setattr(isolated, "isolate_instances", answering_here)
         simulate_plan(make_plan(system, Experiment(0.1 * STEPS, 0.1)), [table], Isolation())
     return table
 
@@ -134,7 +136,10 @@ def test_answers_are_counted_as_they_come(system: System):
 @example(n=BEFORE + 2, note=b'{"messages": 5}', change=0)
 @example(n=BEFORE + 2, note=b'{"refused": "two\\nlines"}', change=0)
 @example(n=BEFORE + 2, note=b'{"failed": "two\\nlines"}', change=0)
-@example(n=BEFORE + 2, note=b'{"texts": ["\\ud800"]}', change=0)
+@example(n=BEFORE + 2, note=b'{"values": ["\\ud800"]}', change=0)
+@example(n=BEFORE + 2, note=b'{"values": [1]}', change=0)
+@example(n=BEFORE + 2, note=b'{"values": ["a", "b"]}', change=0)
+@example(n=BEFORE + 2, note=b'{"values": 5}', change=0)
 @example(n=BEFORE + 2, note=b"[" * 100_000, change=0)
 @example(n=4, note=b'{"ended": "before it begins"}', change=0)
 @example(n=3, note=b'{"value": {"u": "text", "mode": 1, "on": 1, "said": 0}}', change=0)
@@ -156,24 +161,32 @@ def test_whatever_is_answered_ends_in_a_line_with_the_rows_before_it(system, n, 
     json.dumps([table.failure, *table.ending.messages]).encode()
 
 
+TEXT = b'{"values": ["text"]}'
+
+
 @pytest.mark.parametrize(
-    ("outputs", "length"),
+    ("outputs", "length", "note"),
     [
-        ([1.0, 1.5, 0.0, 0.0], 0),
-        ([1.0, 1.0, 2.0**31, 0.0], 0),
-        ([1.0, np.nan, 0.0, 0.0], 0),
-        ([1.0, 1.0, 0.0, 1e300], 0),
-        ([1.0, 1.0, 0.0, np.nan], 0),
-        ([1.0, 1.0, 0.0, 0.0], LONGEST_NOTE + 1),
-        ([1.0, 1.0, 0.0, 0.0], np.nan),
-        ([1.0, 1.0, 0.0, 0.0], np.inf),
+        ([1.0, 1.5, 0.0, 0.0], len(TEXT), TEXT),
+        ([1.0, 1.0, 2.0**31, 0.0], len(TEXT), TEXT),
+        ([1.0, np.nan, 0.0, 0.0], len(TEXT), TEXT),
+        ([1.0, 1.0, 0.0, 0.0], 0, b""),
+        ([1.0, 1.0, 0.0, 0.0], 15, b'{"values": [5]}'),
+        ([1.0, 1.0, 0.0, 0.0], LONGEST_NOTE + 1, TEXT),
+        ([1.0, 1.0, 0.0, 0.0], np.nan, TEXT),
+        ([1.0, 1.0, 0.0, 0.0], np.inf, TEXT),
     ],
 )
-def test_numbers_that_no_fmu_can_give_are_none(system: System, outputs, length):
-    table = run(system, BEFORE + 2, length, outputs, b"")
+def test_values_that_no_fmu_can_give_are_none(system: System, outputs, length, note):
+    table = run(system, BEFORE + 2, length, outputs, note)
     assert table.failure is not None
     assert "a: its process sent an invalid answer in doStep" in table.failure
     assert len(table) == 3
+
+
+def test_a_text_that_an_fmu_gives_is_taken(system: System):
+    table = run(system, BEFORE + 2, len(TEXT), [1.0, 1.0, 0.0, 0.0], TEXT)
+    assert table["a.heard"][3] == "text"
 
 
 def test_an_answer_that_comes_drop_by_drop_is_not_waited_for(tmp_path: Path):
