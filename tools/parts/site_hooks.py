@@ -87,8 +87,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     place = page.file.src_uri
     [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
     page.meta["search"] = {"boost": boost}
-    if "/" not in place:
-        # Nothing stands beside these pages in the tree.
+    if place == "index.md":
+        # Nothing stands beside it in the tree.
         page.meta["hide"] = ["navigation"]
     markdown = linked(markdown, place, files)
     up = posixpath.relpath(LIVE, posixpath.dirname(place) or ".")
