@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -22,14 +22,21 @@ from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_fil
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
 from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
-from orchestrator.runs.record import changed_files, read_record, read_result, table_in
+from orchestrator.runs.record import (
+    METRICS,
+    changed_files,
+    companion_tables,
+    read_metrics,
+    read_record,
+    read_result,
+    table_in,
+)
 from orchestrator.runs.request import Files, Request
-from orchestrator.vehicle.signals import loops_of
+from orchestrator.vehicle.signals import Loop, loops_of
 
 #: The scenario that a live page opens unless another is named.
 _OPENED = "fig4"
@@ -159,24 +166,40 @@ def _is_there(text: str) -> bool:
 
 
 def _view(options: argparse.Namespace) -> int:
+    # Only this command needs it.
+    from orchestrator.live.view import Stored, view_page  # noqa: PLC0415
+
     file = table_in(options.result)
     out = options.out or file.with_name(VIEW)
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
-    _warn(file)
-    run = read_result(file)
+    files = [file, *companion_tables(file)[:1]]
+    for one in files:
+        _warn(one)
+    runs = told_apart([read_result(one, _viewed) for one in files], files)
     record = read_record(file)
-    title = str(record.get("title") or run.label)
-    # A title may name all runs that a scenario compares; the page shows one.
-    if label := record.get("label"):
+    title = str(record.get("title") or runs[0].label)
+    # A title may name all runs that a scenario compares.
+    if (label := record.get("label")) and len(files) == 1:
         title += f" (shown: {label})"
+    indices = [one.with_name(METRICS) for one in files]
+    stored = [
+        Stored(run, read_metrics(path) if path.is_file() else {})
+        for run, path in zip(runs, indices, strict=True)
+    ]
     try:
-        text = view_page(title, run)
+        text = view_page(title, stored, say)
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
     with _written(out, options.force) as folder:
         (folder / out.name).write_text(text, encoding="utf-8")
     return OK
+
+
+def _viewed(columns: Sequence[str], loops: Sequence[Loop]) -> Collection[str]:
+    """The columns whose extremes are kept: of vehicles what is drawn, or all."""
+    drawn = {name for loop in loops for name in loop.drawn()}
+    return drawn if drawn.intersection(columns) else columns
 
 
 def _live(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ import numpy as np
 from orchestrator.figures.style import COLOURS, REFERENCE
 
 #: Distance behind the nose and radius of the rings of the hull, as shares of its length.
-_RINGS = (
+RINGS = (
     (0.0, 0.0),
     (0.02, 0.04),
     (0.08, 0.075),
@@ -23,7 +23,7 @@ _RINGS = (
 _SIDES = 12
 
 #: Corners of the upper fin, as shares of the length behind the nose and above the axis.
-_FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
+FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 
 #: Axes of the paper's words, whose z is up, in axes whose z is down; in the earth and in the body.
 Z_UP = np.array([1.0, -1.0, -1.0])
@@ -55,11 +55,11 @@ def body() -> Body:
     angles = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
     points = [
         (-behind, radius * np.cos(a), radius * np.sin(a))
-        for behind, radius in _RINGS
+        for behind, radius in RINGS
         for a in angles
     ]
     triangles = []
-    for ring in range(len(_RINGS) - 1):
+    for ring in range(len(RINGS) - 1):
         for side in range(_SIDES):
             a, b = ring * _SIDES + side, ring * _SIDES + (side + 1) % _SIDES
             triangles += [(a, b, a + _SIDES), (b, b + _SIDES, a + _SIDES)]
@@ -67,7 +67,7 @@ def body() -> Body:
     # Up, to starboard, down, to port.
     for i, (y, z) in enumerate(((0, -1), (1, 0), (0, 1), (-1, 0))):
         n = len(points)
-        points += [(-behind, height * y, height * z) for behind, height in _FIN]
+        points += [(-behind, height * y, height * z) for behind, height in FIN]
         triangles += [(n, n + 1, n + 2), (n, n + 2, n + 3)]
         parts += [2 if i else 1] * 2
     return Body(np.array(points), np.array(triangles), np.array(parts))

@@ -14,7 +14,6 @@ from functools import cache
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
 from orchestrator.cosim.experiment import LINEAR
 from orchestrator.cosim.hooks.events import (
@@ -43,8 +42,6 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
-from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
@@ -72,22 +69,11 @@ _CONTROLLERS = {
     "PdController": _Controller("PD", "path", "remus"),
 }
 
-#: Groups of signals that have charts, with the units of their members.
-_CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
-
 #: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
 _MOST_STEPS = 200_000
 
 #: Paths of more are hard to tell apart.
 _MOST_VEHICLES = 10
-
-#: What there is of several vehicles together.
-_TOGETHER: Plain = {
-    "name": SMALLEST_DISTANCE,
-    "label": SMALLEST_DISTANCE_LABEL,
-    "meaning": "smallest distance between the centres of mass of any two vehicles",
-    "units": {"": "m"},
-}
 
 
 def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
@@ -114,14 +100,7 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
-        "units": {group: _printed(units) for group, units in _CHARTS.items()},
         "presets": presets,
-        "indices": [
-            {"name": one.name, "label": one.label, "meaning": one.meaning}
-            | {"units": _printed(one.units)}
-            for one in metrics()
-        ]
-        + [_TOGETHER],
         "measured": measured,
     }
     return data, modules
@@ -136,10 +115,6 @@ def bundled() -> Programs:
 @cache
 def _bundled_runs() -> Mapping[str, list[Prepared]]:
     return {name: runs_of(name) for name in names()}
-
-
-def _printed(units: Mapping[Any, str]) -> dict[str, str]:
-    return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 
 def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
@@ -275,7 +250,7 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     module, number, text = program
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
-        "vehicles": list(map(_vehicle, prepared.loops)),
+        "vehicles": list(map(vehicle_data, prepared.loops)),
         "measured": [_measured(text, one) for one in prepared.loops],
         "components": {name: _type(part) for name, part in system.components.items()},
         "head": {
@@ -295,7 +270,8 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     }
 
 
-def _vehicle(loop: Loop) -> dict[str, str]:
+def vehicle_data(loop: Loop) -> dict[str, str]:
+    """The components of a vehicle by their roles."""
     return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 

@@ -77,7 +77,7 @@ class Chart {
     this.root = document.createElement("figure");
     this.root.className = "chart pending";
     const caption = document.createElement("figcaption");
-    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">[${panel.unit}]</span></span>`;
+    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">${panel.unit && `[${panel.unit}]`}</span></span>`;
     const readout = document.createElement("span");
     readout.className = "readout";
     readout.setAttribute("aria-hidden", "true");
@@ -333,11 +333,12 @@ export function rowAt(times: Float64Array, time: number): number {
 /** All sections of charts. */
 export class Charts {
   #charts: Chart[][] = [];
-  #from = 0;
+  #from: number;
   readonly #host: HTMLElement;
   readonly #scrub: (time: number) => void;
 
-  constructor(host: HTMLElement, scrub: (time: number) => void) {
+  constructor(host: HTMLElement, scrub: (time: number) => void, from: number) {
+    this.#from = from;
     this.#host = host;
     this.#scrub = scrub;
     addEventListener("beforeprint", () => {
@@ -389,8 +390,8 @@ export class Charts {
     input.value = String(this.#from);
     input.addEventListener("change", () => {
       const from = entered(input.value);
-      input.setAttribute("aria-invalid", String(!(from >= 0)));
-      if (!(from >= 0)) return;
+      input.setAttribute("aria-invalid", String(Number.isNaN(from)));
+      if (Number.isNaN(from)) return;
       this.#from = from;
       for (const chart of this.#charts.flat()) chart.begin(from);
     });
