@@ -18,8 +18,8 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.cosim.observers.observer import Observer, Progress
-from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
+from orchestrator.figures.film import Film, animate
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
@@ -107,15 +107,27 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
+    fps, (width, height), _ = film = Film()
     parser.add_argument(
-        "--fps",
-        type=int,
-        default=FRAMES_PER_SECOND,
-        metavar="N",
-        help=f"number of frames per second; default: {FRAMES_PER_SECOND}",
-    )
+        "--fps", type=int, default=fps, metavar="N",
+        help=f"number of frames per second; default: {fps}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--size", type=_size, default=film.size, metavar="WIDTHxHEIGHT",
+        help=f"size of the picture in pixels; default: {width}x{height}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--speed", type=float, metavar="X",
+        help="seconds of the run in a second of the film; default: the film lasts 10 s",
+    )  # fmt: skip
     _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
     parser.set_defaults(action=_animate)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Width and height, with an x between them."""
+    width, height = map(int, text.split("x"))
+    return width, height
 
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
@@ -218,7 +230,8 @@ def _live(options: argparse.Namespace) -> int:
 def _animate(options: argparse.Namespace) -> int:
     scenario, system = read_system(options)
     out = options.out or Path("results", f"{scenario.stem}.gif")
-    check_film(out, options.fps)
+    film = Film(options.fps, options.size, options.speed)
+    film.check(out)
     prepared = prepare(scenario, system, request(options))
     loops = loops_of(prepared.system)
     seen = VisibleRows({name for loop in loops for name in loop.drawn()})
@@ -229,7 +242,7 @@ def _animate(options: argparse.Namespace) -> int:
         for loop in loops:
             if missing := seen.missing(*loop.for_control_point()):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(scenario.title or scenario.name, run, folder / out.name, options.fps)
+        animate(scenario.title or scenario.name, run, folder / out.name, film)
     return status(scenario.name, ending)
 
 

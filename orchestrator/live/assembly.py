@@ -21,7 +21,7 @@ from typing import Any
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
-from orchestrator.figures.body import FIN, RINGS
+from orchestrator.figures.film import FIN, RINGS
 from orchestrator.figures.style import printed_unit
 from orchestrator.live.module import LICENCES as MODULE_LICENCES
 from orchestrator.live.module import MODULE, live_module
@@ -206,8 +206,7 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
     npm = shutil.which("npm")
     if npm is None or shutil.which("node") is None:
         raise InputError(
-            "the page needs Node.js 20 or later with npm to bundle its script: "
-            "https://nodejs.org"
+            "the page needs Node.js 20 or later with npm to bundle its script: https://nodejs.org"
         )
     hear("bundling the script of the page with npm (only once): this may take a minute")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
@@ -232,6 +231,4 @@ def _run(folder: Path, *command: str) -> None:
     if process.returncode != 0:
         complaints = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
         said = (complaints or [last_line(process.stderr)])[0]
-        raise InputError(
-            f"the script of the page cannot be built: {' '.join(command[:2])}: {said}"
-        )
+        raise InputError(f"the script of the page cannot be built: {' '.join(command[:2])}: {said}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import isfinite
+from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from orchestrator.figures.style import Drawn, printed_unit, reference_colours, v
 from orchestrator.live.assembly import assemble
 from orchestrator.live.presets import Plain, vehicle_data
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE
-from orchestrator.vehicle.indices import metrics, of_vehicles
+from orchestrator.vehicle.indices import VEHICLES, metrics
 from orchestrator.vehicle.signals import Loop, real_parameter
 
 #: A page holds so many numbers, of all runs together: of longer ones fewer rows.
@@ -82,7 +82,7 @@ def view_page(
     if not n:
         units = {k: v for one, _ in pairs for k, v in one.run.result.header.units.items()}
         every = dict.fromkeys(name for columns in names for name in columns)
-        data["columns"] = {name: printed_unit(units.get(name, "")) for name in every}
+        data["columns"] = {name: printed_unit(str(units.get(name, ""))) for name in every}
     notes = [*(_drawn(stored[0].run) if n else ()), *_endings([one.run for one in stored])]
     text = "".join(f"{note}. " for note in notes)
     return assemble("view", data, binary, {"title": title, "notes": text}, hear)
@@ -154,19 +154,13 @@ def _packed(table: Table, columns: Sequence[str], times: np.ndarray) -> tuple[Pl
     doubles = [name for name, column in values.items() if _needs_doubles(column)]
     singles = [name for name in columns if name not in doubles]
     header = table.header
-    # Text in JSON has nothing infinite.
-    parameters = {
-        str(name): value
-        for name, value in header.parameters.items()
-        if isinstance(value, int | float) and isfinite(value)
-    }
     data = {
         "actingRow": header.experiment.acting_row,
         "rows": len(time),
         "doubles": doubles,
         "singles": singles,
-        "parameters": parameters,
-        "happened": [occurrence._asdict() for occurrence in table.ending.events],
+        "parameters": {str(k): v for k, v in header.parameters.items() if _is_number(v)},
+        "happened": [one._asdict() for one in table.ending.events if _is_number(one.time)],
     }
     wide = b"".join(column.tobytes() for column in (time, *(values[name] for name in doubles)))
     return data, wide + b"".join(values[name].astype("<f4").tobytes() for name in singles)
@@ -179,8 +173,9 @@ def _needs_doubles(column: np.ndarray) -> bool:
 
 def _indices(content: Mapping[str, Any], loop: Loop) -> dict[str, list[float | None]]:
     """The indices of a vehicle in metrics.json, and what there is of all together."""
-    of_each = of_vehicles(content)
-    found = {**content, **of_each.get(loop.name, of_each.get("", {}))}
+    of_each = content.get(VEHICLES)
+    own = of_each.get(loop.name) if isinstance(of_each, Mapping) else None
+    found = {**content, **own} if isinstance(own, Mapping) else content
     names = (*(index.name for index in metrics()), SMALLEST_DISTANCE)
     return {name: _members(found[name]) for name in names if name in found}
 
@@ -188,4 +183,9 @@ def _indices(content: Mapping[str, Any], loop: Loop) -> dict[str, list[float | N
 def _members(value: Any) -> list[float | None]:
     """The members of an index, without what JSON has no words for."""
     members = value if isinstance(value, list) else [value]
-    return [one if isinstance(one, int | float) and isfinite(one) else None for one in members]
+    return [one if _is_number(one) else None for one in members]
+
+
+def _is_number(value: object) -> bool:
+    """Whether a value is a number that JSON has words for."""
+    return isinstance(value, int | float) and abs(value) < inf

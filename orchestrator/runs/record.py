@@ -319,7 +319,7 @@ def companion_tables(table: Path) -> list[Path]:
     names = (Path(str(name)) for name in read_record(table).get("files", ()))
     below = (name for name in names if len(name.parts) == 2 and name.name in TABLES)
     found = (table.parent / name for name in below if name.parent.name not in ("", ".."))
-    return [file for file in found if file.is_file()]
+    return [file for file in found if file.is_file() and not file.parent.is_symlink()]
 
 
 def changed_files(table: Path) -> list[Path]:

@@ -269,8 +269,7 @@ class Chart {
   #redraw(): void {
     this.#stale = false;
     this.root.classList.remove("pending");
-    const empty = new Float64Array(0);
-    this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
+    this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => withGaps(values))]);
     // uPlot takes on its new scales in a microtask, too.
     queueMicrotask(() => this.#point());
   }
@@ -303,6 +302,12 @@ class Chart {
         : "";
     });
   }
+}
+
+/** Values as uPlot takes them, to which null is a gap, and NaN is not. */
+function withGaps(values: Float64Array | undefined): Float64Array | (number | null)[] {
+  if (!values?.some(Number.isNaN)) return values ?? [];
+  return Array.from(values, (value) => (Number.isNaN(value) ? null : value));
 }
 
 /** uPlot follows the player, not the mouse by itself. */

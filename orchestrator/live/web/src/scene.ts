@@ -51,8 +51,8 @@ const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
 
-/** One for each vehicle, as many as a page has. */
-const MOST_TARGETS = 10;
+/** Of more vehicles not every reference has a mark. */
+const MOST_TARGETS = 1000;
 
 /** Half of the length of the lines of a waypoint's cross: a share of the scene. */
 const CROSS = 0.015;
