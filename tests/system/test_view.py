@@ -18,6 +18,7 @@ from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import port_name
 from orchestrator.figures.style import Drawn
 from orchestrator.live.view import Stored, view_page
+from orchestrator.runs.record import read_result
 from orchestrator.vehicle.signals import STANDARD
 from support.browser import BROWSER, Browser, browser
 from support.live import needs_npm
@@ -188,8 +189,8 @@ def test_result_is_beside_the_one_that_it_is_compared_with(results, tmp_path):
     data, runs = stored(view(results / "both", tmp_path / "page.html"))
     assert [loop["label"] for loop in data["loops"]] == ["<b>", "PD"]
     for columns, folder in zip(runs, ("", "fig5-pd"), strict=True):
-        table = np.genfromtxt(results / "both" / folder / "result.csv", delimiter=",", names=True)
-        np.testing.assert_allclose(columns["plant.eta.z"], table["planteta_z"], rtol=1e-6)
+        table = read_result(results / "both" / folder).result
+        np.testing.assert_allclose(columns["plant.eta.z"], table["plant.eta.z"], rtol=1e-6)
     data, _ = stored(view(results / "both" / "fig5-pd", tmp_path / "pd.html"))
     assert [loop["label"] for loop in data["loops"]] == ["PD"]
 
@@ -209,10 +210,11 @@ def test_parameter_of_a_wrong_kind_is_told(results, tmp_path, capsys):
 # In a browser
 
 
+in_browser = pytest.mark.skipif(BROWSER is None, reason="Chromium is not installed")
+
+
 @pytest.fixture(scope="module")
 def chromium(tmp_path_factory: pytest.TempPathFactory):
-    if BROWSER is None:
-        pytest.skip("Chromium is not installed")
     with browser(tmp_path_factory.mktemp("profile"), *SOFTWARE) as found:
         yield found
 
@@ -233,6 +235,7 @@ CHARTS = (
 )
 
 
+@in_browser
 @pytest.mark.slow
 def test_comparison_is_played_with_its_events(results, tmp_path, chromium):
     view(results / "both", tmp_path / "page.html")
@@ -256,6 +259,7 @@ def test_comparison_is_played_with_its_events(results, tmp_path, chromium):
     assert [address.split(":")[0] for address in chromium.requests] == ["file"]
 
 
+@in_browser
 @pytest.mark.slow
 def test_a_vehicle_is_chosen(results, tmp_path, chromium):
     view(results / "three", tmp_path / "page.html")
@@ -270,6 +274,7 @@ def test_a_vehicle_is_chosen(results, tmp_path, chromium):
     assert not chromium.said
 
 
+@in_browser
 @pytest.mark.slow
 def test_charts_stand_alone_where_there_is_no_vehicle(results, tmp_path, chromium):
     view(results / "alone", tmp_path / "page.html")
