@@ -126,8 +126,10 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
 
 def _size(text: str) -> tuple[int, int]:
     """Width and height, with an x between them."""
-    width, height = map(int, text.split("x"))
-    return width, height
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT")
+    return int(width), int(height)
 
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
@@ -216,7 +218,7 @@ def _viewed(columns: Sequence[str], loops: Sequence[Loop]) -> Collection[str]:
 
 def _live(options: argparse.Namespace) -> int:
     # Only this command needs them.
-    from orchestrator.live.assembly import live_page  # noqa: PLC0415
+    from orchestrator.live.presets import live_page  # noqa: PLC0415
 
     out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
     if out.suffix != ".html":

@@ -24,7 +24,9 @@ from orchestrator.figures.panels import COMMANDS, Cell, frame_path
 from orchestrator.figures.run_figures import ALL_ERRORS
 from orchestrator.figures.style import (
     COLOURS,
+    FIN,
     REFERENCE,
+    RINGS,
     Drawn,
     heading,
     reference_colours,
@@ -32,12 +34,6 @@ from orchestrator.figures.style import (
 )
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import real_parameter, true_control_point
-
-#: The hull of a vehicle, in shares of its length: distance behind the nose and radius of its rings.
-RINGS = ((0, 0), (0.02, 0.04), (0.08, 0.075), (0.18, 0.09), (0.7, 0.09), (0.9, 0.05), (1, 0.02))
-
-#: Corners of the upper fin: distance behind the nose, and height above the axis.
-FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 
 #: Sides of the hull.
 _SIDES = 12

@@ -13,6 +13,7 @@ import shutil
 import subprocess
 from base64 import b64encode
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,16 +22,15 @@ from typing import Any
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
-from orchestrator.figures.film import FIN, RINGS
-from orchestrator.figures.style import printed_unit
-from orchestrator.live.module import LICENCES as MODULE_LICENCES
-from orchestrator.live.module import MODULE, live_module
-from orchestrator.live.presets import page_data
+from orchestrator.figures.style import FIN, RINGS, printed_unit
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics
+from orchestrator.vehicle.signals import Loop
+
+Plain = dict[str, Any]
 
 #: Category in the cache.
 CATEGORY = "live-script"
@@ -65,26 +65,6 @@ _COMPLAINT = re.compile(
 
 #: How long npm or esbuild may take [s].
 _LIMIT = 600.0
-
-
-def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> str:
-    """The page.
-
-    Args:
-        opened: the scenario that it shows first.
-        hear: called with a line before a part is made, which may take minutes.
-
-    Raises:
-        InputError: there is no such scenario, the page cannot run it, or a part cannot be made.
-
-    """
-    data, programs = page_data(opened)
-    modules = [live_module(one.sources, hear) for one in programs]
-    linked = modules[0][MODULE_LICENCES].read_text(encoding="utf-8")
-    titles = {one["name"]: one["title"] for one in data["presets"]}
-    binary = [module[MODULE].read_bytes() for module in modules]
-    fields = {"title": titles[data["opened"]], "licences": linked, "wasm": " 'wasm-unsafe-eval'"}
-    return assemble("live", data, binary, fields, hear)
 
 
 def assemble(
@@ -132,7 +112,7 @@ def assemble(
     )
 
 
-def _common() -> dict[str, Any]:
+def _common() -> Plain:
     """What the script of every page reads, by the names of `web/src/types.ts`."""
     indices = [(one.name, one.label, one.meaning, one.units) for one in metrics()]
     meaning = "smallest distance between the centres of mass of any two vehicles"
@@ -145,6 +125,11 @@ def _common() -> dict[str, Any]:
         ],
         "hull": {"rings": RINGS, "fin": FIN},
     }
+
+
+def vehicle_data(loop: Loop) -> dict[str, str]:
+    """The components of a vehicle by their roles."""
+    return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
 def _printed(units: Mapping[Any, str]) -> dict[str, str]:

@@ -1,4 +1,4 @@
-"""What the page of a loop holds as plain data: scenarios beside their comparisons, and events.
+"""The page in which a loop runs: scenarios beside their comparisons, and events, as plain data.
 
 Names and meanings are the ones of `web/src/types.ts`. What a plan decides is decided here: which
 program makes its steps, which parameters a comparison shares, and to which inputs an event gets.
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from operator import itemgetter
 from typing import Any, NamedTuple
@@ -32,6 +32,8 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value, items_of, named
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
+from orchestrator.live.assembly import Plain, assemble, vehicle_data
+from orchestrator.live.module import LICENCES, MODULE, live_module
 from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
 from orchestrator.program.reducing import looking_at
@@ -61,8 +63,6 @@ class _Controller(NamedTuple):
     allocated: str
 
 
-Plain = dict[str, Any]
-
 #: In the order in which they are drawn.
 _CONTROLLERS = {
     "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
@@ -74,6 +74,26 @@ _MOST_STEPS = 200_000
 
 #: Paths of more are hard to tell apart.
 _MOST_VEHICLES = 10
+
+
+def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> str:
+    """The page.
+
+    Args:
+        opened: the scenario that it shows first.
+        hear: called with a line before a part is made, which may take minutes.
+
+    Raises:
+        InputError: there is no such scenario, the page cannot run it, or a part cannot be made.
+
+    """
+    data, programs = page_data(opened)
+    modules = [live_module(one.sources, hear) for one in programs]
+    linked = modules[0][LICENCES].read_text(encoding="utf-8")
+    titles = {one["name"]: one["title"] for one in data["presets"]}
+    binary = [module[MODULE].read_bytes() for module in modules]
+    fields = {"title": titles[data["opened"]], "licences": linked, "wasm": " 'wasm-unsafe-eval'"}
+    return assemble("live", data, binary, fields, hear)
 
 
 def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
@@ -268,11 +288,6 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
         **({"fixedStep": plan.experiment.step} if text.slow else {}),
         "events": _events(prepared, owner),
     }
-
-
-def vehicle_data(loop: Loop) -> dict[str, str]:
-    """The components of a vehicle by their roles."""
-    return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
 def _measured(text: Text, loop: Loop) -> list[Plain]:

@@ -10,8 +10,7 @@ import numpy as np
 
 from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.style import Drawn, printed_unit, reference_colours, vehicle_colours
-from orchestrator.live.assembly import assemble
-from orchestrator.live.presets import Plain, vehicle_data
+from orchestrator.live.assembly import Plain, assemble, vehicle_data
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE
 from orchestrator.vehicle.indices import VEHICLES, metrics
 from orchestrator.vehicle.signals import Loop, real_parameter
