@@ -93,8 +93,7 @@ def assemble(
     texts = (licences(NATIVE), fields.get("licences"), parts[LICENCES])
     filled = {
         "kind": kind,
-        "wasm": "",
-        **{name: html.escape(text, quote=name != "wasm") for name, text in fields.items()},
+        **{name: html.escape(text) for name, text in fields.items()},
         "licences": html.escape("\n\n".join(filter(None, texts))),
         "style": parts[STYLE],
         "style-hash": hash_source(parts[STYLE]),

@@ -92,8 +92,9 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
     linked = modules[0][LICENCES].read_text(encoding="utf-8")
     titles = {one["name"]: one["title"] for one in data["presets"]}
     binary = [module[MODULE].read_bytes() for module in modules]
-    fields = {"title": titles[data["opened"]], "licences": linked, "wasm": " 'wasm-unsafe-eval'"}
-    return assemble("live", data, binary, fields, hear)
+    return assemble(
+        "live", data, binary, {"title": titles[data["opened"]], "licences": linked}, hear
+    )
 
 
 def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
