@@ -25,7 +25,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from nbclient import NotebookClient
 
-from orchestrator.live import assembly
+from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -177,7 +177,7 @@ def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 def live_page() -> tuple[str, str]:
     """The live page and, where it cannot be made, why, as HTML."""
     try:
-        return assembly.live_page("fig4"), ""
+        return presets.live_page("fig4"), ""
     except InputError as error:
         log.info("no live page: %s", error)
         why = escape(str(error))
