@@ -143,6 +143,17 @@ def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: o
 
 
 @dataclass(frozen=True)
+class Difference:
+    """What a second run has that differs from its scenario; the entries of `[compare]`."""
+
+    name: str
+    label: str = ""
+    components: Mapping[str, str | bool] = field(default_factory=dict)
+    wires: Mapping[str, str | bool] = field(default_factory=dict)
+    parameters: Mapping[PortName, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """What to run and how to show it; :mod:`.scenario_file` says what each entry means.
 
@@ -157,7 +168,7 @@ class Scenario:
     label: str = ""
     figure: str = "tracking"
     z_up: bool = False
-    compare: str = ""
+    compare: Difference | None = None
     stop_time: float | None = None
     step: float | None = None
     steps: Mapping[str, float] = field(default_factory=dict)
@@ -228,13 +239,18 @@ def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
 def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
+    if isinstance(compared := content.get("compare"), str):
+        raise InputError(
+            f"{path}: compare = {compared!r}: write as a table what differs from this scenario, "
+            f'such as {{ name = "{path.stem}-pd", components.controller = "PdController", '
+            'wires."controller.dy" = "plant.dy" }'
+        )
     ScenarioFile.check(path, content)
-    content["parameters"] = {
-        port_name(key): value for key, value in flatten(content.get("parameters", {}), is_spread)
-    }
     vehicles = vehicle_names(content.get("vehicles"))
-    for key in content.keys() & {"components", "wires", "steps"}:
-        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
+    _read_system(content, path.parent, vehicles)
+    if "compare" in content:
+        _read_system(content["compare"], path.parent, vehicles)
+        content["compare"] = Difference(**content["compare"])
     for key in content.keys() & {"order", "only"}:
         if isinstance(content[key], list):
             listed = dict.fromkeys(content[key])
@@ -250,13 +266,20 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
         said = content["inputs"]
         content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
+    return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
+
+
+def _read_system(content: dict[str, Any], folder: Path, vehicles: Sequence[str]) -> None:
+    """Replace the entries about the system by what they mean, for each vehicle."""
+    content["parameters"] = {
+        port_name(key): value for key, value in flatten(content.get("parameters", {}), is_spread)
+    }
+    for key in content.keys() & {"components", "wires", "steps"}:
+        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
     content["components"] = {
-        component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else fmu
+        component: str(folder / fmu) if str(fmu).endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
     }
-    if content.get("compare", "").endswith(".toml"):
-        content["compare"] = str(path.parent / content["compare"])
-    return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
 def read_inputs(

@@ -66,13 +66,13 @@ def read_events(
 
 
 def shared_events(
-    tables: Sequence[Mapping[str, Any]], system: System, followed: Collection[PortName] = ()
+    tables: Sequence[Mapping[str, Any]], system: System
 ) -> tuple[Mapping[str, Any], ...]:
-    """The events that can happen to another system as well; arguments as of :func:`read_events`."""
+    """The events of a scenario that can happen to another system as well."""
 
     def can_happen(table: Mapping[str, Any]) -> bool:
         try:
-            _event(table, system, followed)
+            _event(table, system, ())
         except InputError:
             return False
         return True
