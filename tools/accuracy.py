@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+from orchestrator.paper.measures import total_variation_until
 from scipy.integrate import solve_ivp
 
 from auv_fmu.loop import closed_loop
@@ -26,7 +27,6 @@ from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName, port_name
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import typed
-from orchestrator.paper.measures import total_variation_until
 from orchestrator.paper.page import table
 from orchestrator.program.components import definitions_of
 from orchestrator.studies.batch_engine import BatchEngine

@@ -13,10 +13,10 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from orchestrator.paper.measures import errors, total_variation_until
 
 from orchestrator import load, simulate
 from orchestrator.cosim.observers.table import Table
-from orchestrator.paper.measures import errors, total_variation_until
 from orchestrator.paper.page import numbers, table
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.batch_engine import BatchEngine

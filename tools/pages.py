@@ -42,7 +42,13 @@ from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import printed_unit
 from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
-from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
+from orchestrator.runs.scenario_file import (
+    CompareTable,
+    EventTable,
+    InputsTable,
+    PathTable,
+    ScenarioFile,
+)
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import FigureTable, StudyFile, read_study
@@ -115,6 +121,7 @@ def scenarios() -> dict[str, str]:
     figures = ((f"`{key}`", ", ".join(used)) for key, used in drawn.items())
     return {
         "entries": _entries(ScenarioFile),
+        "compare": _entries(CompareTable),
         "path": _entries(PathTable),
         "events": _entries(EventTable),
         "inputs": _entries(InputsTable),

@@ -106,7 +106,7 @@ class CompareTable(TomlTable):
     components: dict[str, Name] = entry("Other FMUs, as in the scenario.", "the same")
     wires: dict[str, Name | Literal[False]] = entry("Other wires, as in the scenario.", "the same")
     parameters: dict[str, Any] = entry(
-        "Other parameters, as in the scenario. They do not win over those of the command line.",
+        "Other parameters, as in the scenario; those of the command line win over them.",
         "the same, where its components have them",
     )
 
