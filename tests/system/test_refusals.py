@@ -222,7 +222,6 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
         ("sweep nothing", "'nothing'"),
         ("sweep attraction --workers 0", "--workers 0"),
         ("report --out file.csv/below", "--out"),
-        ("table --out file.csv/below", "--out"),
         ("hosts nobody", "nobody"),
         ("new controller 3x", "'3x'"),
         ("new controller a-b", "'a-b'"),

@@ -1,17 +1,17 @@
-"""The page of benchmarks: its commands, and how a new measurement comes into it."""
+"""Numbers of pages: how a new measurement comes into the page of benchmarks."""
 
 from __future__ import annotations
 
 import re
 import shlex
 
-import benchmarks_page
-from benchmarks_page import PAGE, ROOT, is_written
+import page_numbers
+from page_numbers import BENCHMARKS, PLACE, ROOT, benchmarks, is_written
 
 
 def test_every_part_of_the_page_has_a_command_that_is_there():
-    text = PAGE.read_text(encoding="utf-8")
-    places = benchmarks_page._PLACE.findall(text)
+    text = BENCHMARKS.read_text(encoding="utf-8")
+    places = PLACE.findall(text)
     assert len(places) == text.count("<!-- filled:") > 10
     for name, command in places:
         assert (ROOT / shlex.split(command)[0]).is_file(), name
@@ -25,7 +25,7 @@ def test_a_measurement_takes_its_place(tmp_path, monkeypatch):
         for name in ("first", "second")
     ]
     page.write_text("\n\n".join(parts))
-    monkeypatch.setattr(benchmarks_page, "PAGE", page)
+    monkeypatch.setattr(page_numbers, "BENCHMARKS", page)
     assert is_written("second", f"{script} --n 3")
     first, second = page.read_text().split("\n\n<!--")
     assert first == parts[0]
@@ -44,8 +44,7 @@ def test_a_script_that_fails_changes_nothing_and_others_run(tmp_path, monkeypatc
         for script in (bad, good)
     ]
     page.write_text("".join(parts))
-    monkeypatch.setattr(benchmarks_page, "PAGE", page)
-    monkeypatch.setattr("sys.argv", ["benchmarks_page.py"])
-    assert benchmarks_page.main() == 1
+    monkeypatch.setattr(page_numbers, "BENCHMARKS", page)
+    assert benchmarks() == 1
     assert page.read_text().startswith(parts[0]) and "2.5 us" in page.read_text()
     assert capsys.readouterr().err == f"bad stays as it is: {bad}: exit status 3\n"
