@@ -225,14 +225,12 @@ def _other(scenario: Scenario, system: System) -> Difference | None:
     if not scenario.digest or controller is None or not is_standard:
         return None
     label, velocity = _CONTROLLERS[controller.other].label, f"{STANDARD.controller}.dy"
-    return Difference(
-        label,
-        label,
-        components={STANDARD.controller: controller.other},
-        wires=dict.fromkeys((name for name in scenario.wires if name.startswith(velocity)), False)
-        if controller.measures_velocity
-        else {velocity: f"{STANDARD.vehicle}.dy"},
-    )
+    if controller.measures_velocity:
+        measured = (name for name in scenario.wires if f"{name}.".startswith(f"{velocity}."))
+        wires: dict[str, str | bool] = dict.fromkeys(measured, False)
+    else:
+        wires = {velocity: f"{STANDARD.vehicle}.dy"}
+    return Difference(label, label, {STANDARD.controller: controller.other}, wires)
 
 
 def _controller(system: System) -> _Controller | None:

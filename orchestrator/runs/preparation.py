@@ -32,7 +32,7 @@ from orchestrator.runs.loading import doubts_of, first_given, load_scenario
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Inputs, Scenario, check_events, read_inputs, read_scenario
 from orchestrator.runs.scenario_events import read_events, shared_events
-from orchestrator.runs.wiring import closed_loop
+from orchestrator.runs.wiring import closed_loop, read_wiring
 from orchestrator.vehicle.signals import Loop, loops_of
 
 #: Communication step of the paper [s], for systems that name none.
@@ -188,6 +188,13 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     scenario, difference = prepared.scenario, prepared.scenario.compare
     if difference is None:
         return [prepared]
+    standard = read_wiring(scenario.vehicles)["wires"]
+    wires = {
+        target: source
+        for target, source in {**scenario.wires, **difference.wires}.items()
+        # A wire of the scenario's own is removed by not being there.
+        if source is not False or target in standard or target not in scenario.wires
+    }
     companion = replace(
         scenario,
         name=difference.name,
@@ -195,7 +202,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         title=f"{scenario.title or scenario.name} ({difference.label or difference.name})",
         compare=None,
         components={**scenario.components, **difference.components},
-        wires={**scenario.wires, **difference.wires},
+        wires=wires,
         only=scenario.only and [*scenario.only, *difference.components],
         parameters={},
     )

@@ -102,6 +102,18 @@ def test_a_table_of_inputs_goes_for_both(workplace):
         assert set(table["plant.water.x"]) == {0.25, 0.3}
 
 
+def test_wires_are_removed_whoever_has_stated_them(workplace):
+    own = '[components]\ncontroller = "PdController"\n[wires]\n"controller.dy" = "plant.dy"\n'
+    other = '[compare]\nname = "proposed"\ncomponents.controller = "ObserverController"\n'
+    wires = 'wires."controller.dy" = false\nwires."plant.tau_w" = false\n'
+    ours, theirs = pair_of(own + other + wires)
+    lost = {str(c.target) for c in {*ours.system.connections} - {*theirs.system.connections}}
+    assert lost == {
+        *(f"controller.dy.{axis}" for axis in "xyz"),
+        *(f"plant.tau_w.{axis}" for axis in "uvwpqr"),
+    }
+
+
 def test_what_is_compared_may_be_anything(workplace):
     heavy, light = runs_of('compare = { name = "light", parameters.plant.m11 = 20.0 }\n')
     assert abs(heavy["plant.nu.u"][-1]) < abs(light["plant.nu.u"][-1])
