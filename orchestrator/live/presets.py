@@ -45,7 +45,7 @@ from orchestrator.runs.scenario_events import read_events, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
+from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
 class _Controller(NamedTuple):
@@ -219,17 +219,19 @@ def runs_of(name: str) -> list[Prepared]:
 
 
 def _other(scenario: Scenario, system: System) -> Difference | None:
-    """The comparison of a single vehicle with the controller that it lacks."""
-    controller, loops = _controller(system), loops_of(system)
-    is_standard = len(loops) == 1 and loops[0].controller == STANDARD.controller
-    if not scenario.digest or controller is None or not is_standard:
+    """The comparison of a vehicle of the paper's loop with the controller that it lacks."""
+    controller, [loop, *others] = _controller(system), loops_of(system)
+    if not scenario.digest or controller is None or others:
+        return None
+    # The controllers' own gains are not for a vehicle whose actuators are allocated.
+    if loop.controller != STANDARD.controller or isinstance(loop, AllocatedLoop):
         return None
     label, velocity = _CONTROLLERS[controller.other].label, f"{STANDARD.controller}.dy"
     if controller.measures_velocity:
         measured = (name for name in scenario.wires if f"{name}.".startswith(f"{velocity}."))
         wires: dict[str, str | bool] = dict.fromkeys(measured, False)
     else:
-        wires = {velocity: f"{STANDARD.vehicle}.dy"}
+        wires = {velocity: f"{loop.vehicle}.dy"}
     return Difference(label, label, {STANDARD.controller: controller.other}, wires)
 
 
