@@ -11,8 +11,8 @@
 `benchmarks`   runs the commands on docs/reference/benchmarks.md, and writes their output there
 =============  ====================================================================================
 
-Numbers of several draws are a median, with what 5 and 95 % of the draws stay below. What runs from
-several starts is a band from the least to the largest.
+Numbers of several draws are medians, with the quantiles of 5 and 95 % of the draws. Numbers of runs
+from several starts are bands from the smallest to the largest.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ class Runs:
         self._ends = {name: read_scenario(name.removesuffix("-pd")).stop_time for name in scenarios}
 
     def point(self, name: str, values: Values, step: float, stop_time: float | None) -> Point:
-        """What the engine is asked for."""
+        """The engine's description of a run."""
         end = stop_time or self._ends[name] or self.systems[name].stop_time
         assert end is not None
         return Point(0, name, values, end, step)
@@ -129,7 +129,7 @@ class Runs:
 
 
 def size_of(made: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """|e| of all rows [m]."""
+    """Norms of the tracking error, |e|, in all rows [m]."""
     return np.asarray(np.linalg.norm(tracking_error(made, loop), axis=1))
 
 
@@ -173,7 +173,7 @@ MUCH = 0.05
 
 
 def accuracy() -> None:
-    """Without noise; the batch engine makes all but the run of a free body."""
+    """Print how paths and indices depend on the step, all without noise."""
     runs = Runs(*SCENARIOS)
 
     def path(name: str, values: Values = QUIET, step: float = STEP) -> np.ndarray:
@@ -318,9 +318,12 @@ def setting_of(system: System) -> Setting:
         }
         for name, component in system.components.items()
     }
-    of = {name: one.parameters.of(given[name]) for name, one in definitions_of(system).items()}
+    parameters: dict[str, Any] = {
+        name: definition.parameters.of(given[name])
+        for name, definition in definitions_of(system).items()
+    }
     longest = LongestSteps(*(given[name][H_MAX] for name in LongestSteps._fields))
-    return Setting(of["plant"], of["controller"], of["disturbance"], of["planner"], longest)
+    return Setting(**parameters, h_max=longest)
 
 
 def flat(state: Any) -> list[float]:
@@ -348,19 +351,19 @@ def distances(path: np.ndarray, other: np.ndarray) -> str:
 
 
 def length(x: float) -> str:
-    """In a unit that needs neither exponent nor zeros."""
+    """A length [m] in a unit that needs neither exponent nor zeros."""
     units = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
     unit = next((unit for unit, size in units.items() if x >= 0.995 * size), "nm")
     return f"{number(x / units[unit], 2)} {unit}"
 
 
 def number(x: float, digits: int = 3) -> str:
-    """With so many digits, and no exponent."""
+    """A number with so many digits and no exponent."""
     return f"{float(f'{x:.{digits}g}'):,.9g}"
 
 
 def between(values: Sequence[float] | np.ndarray) -> str:
-    """From the smallest to the largest."""
+    """The smallest and the largest of some values."""
     return " to ".join(dict.fromkeys(number(end) for end in (min(values), max(values))))
 
 
@@ -378,7 +381,7 @@ def draws(n: int, values: Values | None = None) -> list[Values]:
 
 
 def noise() -> None:
-    """Of commands and of all indices, until when the limits hold, and of scenarios with events."""
+    """Print commands, all indices, the times until commands saturate, and scenarios with events."""
     runs = Runs(*FIGURES, "path", "path-pd")
     rows = []
     for name, values in [*((name, {}) for name in FIGURES), ("fig5", {"controller.eps_t": 1.0})]:
@@ -446,7 +449,7 @@ def noise() -> None:
 
 
 def fault_measures(made: Table) -> dict[str, float]:
-    """What a run with an event at 50 s comes to."""
+    """Measure a run with an event at 50 s."""
     time, size = made.time, size_of(made)
     command = np.abs(made.step_values("controller.tau.u"))
     late, outside = time >= 50.0, time[size > 0.5][-1]
@@ -527,7 +530,7 @@ def over_seeds(
 
 
 def seeds(*scenarios: str, n: int = 60) -> None:
-    """Of both controllers: the run with the scenario's own seeds, and n others."""
+    """Print the run with the scenario's own seeds and n others, with either controller."""
     for scenario, pd in product(scenarios or SPANS, (False, True)):
         print(f"\n{scenario}, {'PD' if pd else 'proposed'}: own seeds; median (5 % to 95 %)")
         for name, (own, *others) in over_seeds(scenario, pd, n).items():
@@ -579,9 +582,9 @@ CHANGES: Mapping[str, Values] = {
 
 
 def remus() -> None:
-    """For both controllers, for each change.
+    """Print a line for each change, for both controllers.
 
-    The columns have the largest error in the first 40 s and from 120 s on [m], the largest part of
+    Its columns are the largest error in the first 40 s and from 120 s on [m], the largest part of
     the latter across the path [m], the share of steps with a fin at its limit, in pitch and yaw
     [%], the largest command in yaw [N.m], and the mean rate of the rudder [degrees/s].
     """
@@ -670,7 +673,7 @@ FUNCTIONS: dict[str, Callable[[Any], Any]] = {"Tanh": np.tanh, "Relu": lambda z:
 
 
 def networks() -> None:
-    """With weights as PyTorch draws them, and inputs with a standard deviation of 1."""
+    """Compare networks with weights as PyTorch draws them, at inputs of standard deviation 1."""
     rows = []
     with TemporaryDirectory() as folder:
         for sizes, activation in product(SHAPES, FUNCTIONS):
@@ -682,7 +685,7 @@ def networks() -> None:
 
 
 def differences(path: Path, sizes: tuple[int, ...], activation: str, seed: int) -> Any:
-    """How far a component is from onnxruntime and from numpy, over the largest output."""
+    """Distances of a component from onnxruntime and numpy, in parts of its largest output."""
     import onnx  # noqa: PLC0415
     import onnxruntime  # noqa: PLC0415
 
@@ -766,7 +769,7 @@ COMPONENT = re.compile(r"^(auv\*\.)?(plant|controller|disturbance|link)\.")
 
 
 def share(column: Any) -> str:
-    """Of the runs of which a column is true, with its exact interval of 95 %, as if independent."""
+    """Share of runs whose column is true, with its exact interval of 95 %, as if independent."""
     from scipy.stats import binomtest  # noqa: PLC0415
 
     hits, n = int(column.sum()), len(column)
@@ -775,7 +778,7 @@ def share(column: Any) -> str:
 
 
 def bound(column: Any) -> str:
-    """What the share stays below, at 95 %, where of no run the column is true: (1 - share)^n."""
+    """Upper bound of the share at 95 % if the column of no run is true: (1 - share)^n = 0.05."""
     return f"{column.sum()} of {len(column)}, {100 * (1 - 0.05 ** (1 / len(column))):.2g} %"
 
 
@@ -799,14 +802,14 @@ STATISTICS: Mapping[str, Callable[..., str]] = {
 
 
 def queries(study: str) -> dict[str, Any]:
-    """What page_numbers.toml says of a study."""
+    """The part of page_numbers.toml about a study."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     found: dict[str, Any] = tomllib.loads(text)[study]
     return found
 
 
 def lines_of(study: str) -> list[str]:
-    """What is asked of a study, a line each."""
+    """The lines for a study, with each alternative written out."""
     found: list[str] = []
     for line in queries(study)["lines"].strip().splitlines():
         parts = re.split(r"\{(.*?)\}", line)
@@ -869,7 +872,7 @@ def answer(line: str, runs: Any) -> str:
 
 
 def studies(*folders: str) -> None:
-    """Columns are those of study-files.md without the component, with _ for what is no letter."""
+    """Print the numbers of the studies in some folders."""
     for folder in folders:
         result = StudyResult(Path(folder))
         study = result.record["study"]
@@ -894,7 +897,7 @@ def benchmarks(*chosen: str) -> int:
 
 
 def is_written(name: str, command: str) -> bool:
-    """Whether a command runs to its end, and the page has what it prints."""
+    """Run a command and put its output into its place on the page; False: it failed."""
     where, arguments = machine(), [sys.executable, *shlex.split(command)]
     done = subprocess.run(
         arguments, cwd=ROOT, check=False, stdout=subprocess.PIPE, encoding="utf-8"

@@ -217,7 +217,7 @@ class Variants:
         self.consistent = np.where(allowed[:, np.newaxis, np.newaxis], self.scores, np.inf)
 
     def arrived(self, name: str, is_consistent: bool) -> np.ndarray:
-        """What has come to the reference by T_f."""
+        """Flags of the combinations that have come to the reference by T_f."""
         arrived = (self.twelve[..., SIX[name]][..., 3:] <= REACHED).all(axis=-1)
         return np.asarray(
             arrived & self.flags[:, np.newaxis, np.newaxis] if is_consistent else arrived
@@ -235,12 +235,12 @@ class Variants:
         return np.array([np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]])
 
     def near(self, tolerance: float) -> int:
-        """How many of the twelve numbers are at once no farther away, at most."""
+        """The largest number of the twelve that are within a tolerance at once."""
         away = (np.abs(as_read(self.twelve, *reading) / PRINTED - 1.0) for reading in READINGS)
         return max(int((one <= tolerance).sum(axis=-1).max()) for one in away)
 
     def efforts_within(self, formula: int) -> float:
-        """How near all six efforts are at once, of what contradicts nothing and has arrived."""
+        """The least distance of all six efforts at once, of what is consistent and has arrived."""
         away = np.abs(as_read(self.twelve, 0, formula) / PRINTED - 1.0)
         farthest = away[..., [0, 1, 2, 6, 7, 8]].max(axis=-1)
         arrived = np.logical_and(*(self.arrived(name, True) for name in SCENARIOS))

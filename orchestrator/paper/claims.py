@@ -1,7 +1,7 @@
 """Every printed number and claim of section 4 that a simulation can check, and its measures.
 
-A claim is a function of the kept runs that are named beside it. The report makes these
-runs, calls every claim, and prints what it finds in the order of this file.
+A claim is a function of the runs that are named beside it. The report makes these runs, calls every
+claim, and prints the findings in the order of this file.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ def noisy(request: Request) -> tuple[Request, ...]:
 
 
 class Finding(NamedTuple):
-    """What our runs say to a claim.
+    """The answer of our runs to a claim.
 
     Attributes:
-        ours: what they give.
-        verdict: whether that is what the paper says.
+        ours: their numbers.
+        verdict: agreement with the paper, in words.
 
     """
 
@@ -71,13 +71,13 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that the paper says.
+    """A number or statement of the paper.
 
     Attributes:
-        title: where it says it, and of what.
-        published: what it says.
-        runs: that it is judged by.
-        judge: finds what these say.
+        title: its place in the paper and its subject.
+        published: the number or statement in the paper.
+        runs: the runs that judge it.
+        judge: a function of these runs.
 
     """
 
@@ -87,7 +87,7 @@ class Claim:
     judge: Callable[..., Finding]
 
     def finding(self, kept_runs: Sequence[KeptRun]) -> Finding:
-        """What the kept runs say."""
+        """Judge the claim by its runs."""
         for kept_run in kept_runs:
             if kept_run.failure is not None:
                 return Finding(f"a run ended early: {kept_run.failure}", "none")

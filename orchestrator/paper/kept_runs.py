@@ -31,7 +31,7 @@ class Companion(Request):
 
 @dataclass(frozen=True)
 class KeptRun:
-    """What is kept of a run.
+    """The part of a run that the report needs.
 
     Attributes:
         metrics: as in metrics.json; only `failure` for a run that could not be made.
@@ -51,7 +51,7 @@ class KeptRun:
 
 
 class KeptRuns:
-    """What is kept of runs, by what was asked for."""
+    """Runs by their requests."""
 
     def __init__(
         self,
@@ -93,7 +93,7 @@ class KeptRuns:
         self._kept_runs.update(workers.results(tasks, "run"))
 
     def __getitem__(self, request: Request) -> KeptRun:
-        """What is kept of a run."""
+        """The run of a request."""
         return self._kept_runs[self._keys[request]]
 
     def label(self, request: Request) -> str:
@@ -102,7 +102,7 @@ class KeptRuns:
 
     @property
     def labels(self) -> list[str]:
-        """Of all runs."""
+        """The labels of all runs."""
         return list(self._labels.values())
 
 

@@ -149,7 +149,7 @@ def without_pictures(text: str) -> str:
 
 
 def errata() -> str:
-    """What is wrong in the paper, in Markdown, with headings of the third and fourth level."""
+    """The errors of the paper, in Markdown, with headings of the third and fourth level."""
     _, _, text = _page_of_docs("paper.md").partition("\n")
     points, _, _ = text.partition("\n## The theorem in numbers\n")
     return _deeper(points, 1)

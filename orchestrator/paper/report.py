@@ -179,13 +179,13 @@ def section_text(
         if kept_run.failure is not None:
             why = escape_markdown(kept_run.failure)
             yield f"**The run {escape_markdown(label)} ended early:** {why}"
-    of = {
+    by_vehicle = {
         ", ".join(filter(None, (label, vehicle))): found
         for label, kept_run in made.items()
         for vehicle, found in of_vehicles(kept_run.metrics).items()
     }
-    if rows := list(_indices(list(of.values()))):
-        yield table(["index", *map(escape_markdown, of)], rows)
+    if rows := list(_indices(list(by_vehicle.values()))):
+        yield table(["index", *map(escape_markdown, by_vehicle)], rows)
     reaching = own.metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
@@ -347,7 +347,7 @@ def _claims(kept_runs: KeptRuns) -> str:
 
 
 def counted(verdicts: Sequence[str]) -> str:
-    """How many verdicts there are of each kind, in a sentence."""
+    """Count the verdicts of each kind, in a sentence."""
     agree, differ = (sum(v.startswith(kind) for v in verdicts) for kind in ("agrees", "**"))
     text = f"Of {len(verdicts)} printed numbers and claims, {agree} agree and {differ} do not"
     rest = len(verdicts) - agree - differ

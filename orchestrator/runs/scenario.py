@@ -144,7 +144,7 @@ def _stand_in(name: str, variable: ModelVariable, strings: StringTable, value: o
 
 @dataclass(frozen=True)
 class Difference:
-    """What a second run has that differs from its scenario; the entries of `[compare]`."""
+    """The entries of `[compare]`: how a second run differs from its scenario."""
 
     name: str
     label: str = ""
@@ -256,15 +256,15 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
             listed = dict.fromkeys(content[key])
             content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
     if "path" in content:
-        said, others = content.pop("path"), content["parameters"]
-        component = said.get("component", STANDARD.planner)
-        found = path_parameters(path.parent / said["file"], component)
-        for name in found.keys() & others.keys():
-            raise InputError(f"{path}: {name} is already given by {said['file']}")
-        content["parameters"] |= found
+        waypoints = content.pop("path")
+        component = waypoints.get("component", STANDARD.planner)
+        parameters = path_parameters(path.parent / waypoints["file"], component)
+        for name in parameters.keys() & content["parameters"].keys():
+            raise InputError(f"{path}: {name} is already given by {waypoints['file']}")
+        content["parameters"] |= parameters
     if "inputs" in content:
-        said = content["inputs"]
-        content["inputs"] = Inputs(**said | {"file": path.parent / said["file"]})
+        table = content["inputs"]
+        content["inputs"] = Inputs(**table | {"file": path.parent / table["file"]})
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
