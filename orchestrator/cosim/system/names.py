@@ -100,11 +100,6 @@ def flatten(
             yield name, value
 
 
-def role_of(component: str) -> str:
-    """What a component is called in its innermost system."""
-    return component.rpartition(".")[2]
-
-
 def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
     """A table with an entry for each name in the place of one with a star; others win.
 
