@@ -49,7 +49,7 @@ from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.indices import metrics, of_vehicles
 from orchestrator.vehicle.proof import gain_check
 
-#: The folder of its figures.
+#: The folder of the figures.
 _FIGURES = "figures"
 
 #: The files.
@@ -80,7 +80,6 @@ _NO_VARIANTS = """\
 No choice of the points that the paper leaves open gives all printed numbers together: \
 `python tools/printed_table.py`, in the repository, tries every combination, and the page \
 *The printed table against every reading* of the documentation has what comes of it."""
-
 
 #: The parameter that decides whether a run has a twin without noise.
 _NOISE = "plant.noise.std"
