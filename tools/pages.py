@@ -4,14 +4,9 @@
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
 `<!-- / -->`, which this replaces. The pages of the components and `docs/schemas` are written whole.
 
-`parts` has the long texts. The other tools compute what takes minutes:
-`accuracy.py` prints the tables of docs/explanation/accuracy.md, `study_numbers.py` and
-`best_gains.py` the numbers below the figures of docs/explanation/ready-studies.md,
-`network_numbers.py` those of docs/tutorials/your-own-component.md on neural networks,
-`noise_numbers.py` those of README and docs/explanation/reproduction.md that depend on noise, and
-`remus_numbers.py` those of docs/explanation/remus.md. `pictures.py` draws the figures of studies
-and scenarios, `benchmarks_page.py` measures again what docs/reference/benchmarks.md quotes, and
-`reference.py` writes `reference`.
+`parts` has the long texts. The other tools compute what takes minutes: `page_numbers.py` prints the
+numbers of many pages, and `printed_table.py` those of docs/explanation/table.md. `pictures.py`
+draws the figures of studies and scenarios, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
@@ -42,7 +37,13 @@ from orchestrator.figures.style import printed_unit
 from orchestrator.machine.schema import TomlTable, entries
 from orchestrator.paper.page import table
 from orchestrator.runs.scenario import names, read_scenario
-from orchestrator.runs.scenario_file import EventTable, InputsTable, PathTable, ScenarioFile
+from orchestrator.runs.scenario_file import (
+    CompareTable,
+    EventTable,
+    InputsTable,
+    PathTable,
+    ScenarioFile,
+)
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import FigureTable, StudyFile, read_study
@@ -115,6 +116,7 @@ def scenarios() -> dict[str, str]:
     wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
     return {
         "entries": _entries(ScenarioFile),
+        "compare": _entries(CompareTable),
         "path": _entries(PathTable),
         "events": _entries(EventTable),
         "inputs": _entries(InputsTable),

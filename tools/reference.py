@@ -73,7 +73,7 @@ EVERY, TOLERANCE = 10, 1e-9
 SETS = {
     "fig4": (("fig4",), "Parameters of Fig. 4 of the paper"),
     "fig5": (("fig5", "fig5-pd"), "Parameters of Fig. 5 of the paper"),
-    "survey": (("path", "path-pd"), "Path of the survey through waypoints"),
+    "survey": (("path",), "Path of the survey through waypoints"),
 }
 
 #: MIME types of files, by their endings.

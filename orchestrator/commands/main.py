@@ -35,9 +35,6 @@ COMMANDS = {
     "animate": ("look", "write a film of a scenario"),
     "new": ("build", "create a component or a controller from a template"),
     "report": ("many_runs", "run all scenarios and compare them with the paper"),
-    "table": (
-        "many_runs", "try every interpretation of the paper's open points"
-    ),
     "export": ("exchange", "write a scenario for other tools"),
     "release": ("exchange", "write the archives of a release"),
     "hosts": ("exchange", "run a scenario in other co-simulation tools"),

@@ -1,4 +1,4 @@
-"""`auv-fmu sweep`, `report` and `table`: many runs, of a study or for the paper."""
+"""`auv-fmu sweep` and `report`: many runs, of a study or for the paper."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from pathlib import Path
 
 from orchestrator.commands.options import add_options, add_out, from_options
 from orchestrator.commands.streams import INTERRUPTED, OK, describe, say, show
-from orchestrator.paper.printed_table import write_table
 from orchestrator.paper.report import write_report
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
@@ -38,8 +37,7 @@ def add_report(parser: argparse.ArgumentParser) -> None:
     """Declare the options of `auv-fmu report`."""
     describe(
         parser,
-        "Run all scenarios, compare them with the paper, and write report.html and "
-        "report.md. Finished runs are kept for the next report.",
+        "Run all scenarios, compare them with the paper, and write report.html and report.md.",
         "report --out results/report",
     )
     parser.add_argument(
@@ -48,28 +46,10 @@ def add_report(parser: argparse.ArgumentParser) -> None:
         metavar="FILE.toml",
         help="scenario file to add to the scenarios of `auv-fmu list`",
     )
-    parser.add_argument(
-        "--studies",
-        action="store_true",
-        help="also run the comparison of `auv-fmu table` and the missing runs of the ready studies",
-    )
     add_options(parser, Request, "kind")
     add_out(parser, Path("results", "report"))
     add_options(parser, Files, "force")
     parser.set_defaults(action=_report)
-
-
-def add_table(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu table`."""
-    describe(
-        parser,
-        "Try every interpretation of the paper's open points, and compare each with the printed "
-        "table of section 4.2.",
-        "table --out results/table",
-    )
-    add_out(parser, Path("results", "table"))
-    add_options(parser, Files, "force")
-    parser.set_defaults(action=_table)
 
 
 def _sweep(options: argparse.Namespace) -> int:
@@ -93,21 +73,12 @@ def _report(options: argparse.Namespace) -> int:
     # The paper's figures come first, in its order.
     scenarios = sorted(names(), key=lambda name: not name.startswith("fig"))
     scenarios += options.scenarios
-    ready = ready_studies() if options.studies else ()
     for path in write_report(
         options.out,
         scenarios,
         options.command,
         kind=options.kind,
-        ready=ready,
-        variants=options.studies,
         force=options.force,
     ):
-        show(path)
-    return OK
-
-
-def _table(options: argparse.Namespace) -> int:
-    for path in write_table(options.out, options.command, options.force):
         show(path)
     return OK

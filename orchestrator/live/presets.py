@@ -39,31 +39,37 @@ from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import Scenario, names, read_events, read_scenario, shared_events
+from orchestrator.runs.scenario import (
+    Difference,
+    Scenario,
+    names,
+    read_events,
+    read_scenario,
+    shared_events,
+)
 from orchestrator.runs.scenario_file import AT_ONCE
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
 class _Controller(NamedTuple):
-    """What a comparison needs to know of a controller.
+    """A controller that the page knows.
 
     Attributes:
-        label: where a scenario names none.
-        other: a scenario with the other controller and nothing else of its own, for scenarios that
-            name no comparison.
-        allocated: the same for a vehicle whose actuators are allocated.
+        label: of its lines, where a scenario has none.
+        other: the FMU of the controller that it is compared with, where a scenario names none.
+        measures_velocity: whether it takes `dy` of the vehicle.
 
     """
 
     label: str
     other: str
-    allocated: str
+    measures_velocity: bool
 
 
 #: In the order in which they are drawn.
 _CONTROLLERS = {
-    "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
-    "PdController": _Controller("PD", "path", "remus"),
+    "ObserverController": _Controller("proposed", "PdController", measures_velocity=False),
+    "PdController": _Controller("PD", "ObserverController", measures_velocity=True),
 }
 
 #: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
@@ -200,7 +206,7 @@ def runs_of(name: str) -> list[Prepared]:
     request = Request(name, kind=NATIVE)
     scenario, system = load_scenario(name, NATIVE)
     own = prepare(scenario, system, request)
-    compare = scenario.compare or _other(system)
+    compare = scenario.compare or _other(scenario, system)
     both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
     for one in both:
         _check(one)
@@ -212,13 +218,21 @@ def runs_of(name: str) -> list[Prepared]:
     return both
 
 
-def _other(system: System) -> str:
-    """The scenario with the controller that a single vehicle lacks; empty: it has neither."""
-    controller, loops = _controller(system), loops_of(system)
-    if controller is None or len(loops) > 1 or loops[0].controller != STANDARD.controller:
-        return ""
-    is_allocated = isinstance(loops[0], AllocatedLoop)
-    return controller.allocated if is_allocated else controller.other
+def _other(scenario: Scenario, system: System) -> Difference | None:
+    """The comparison of a vehicle of the paper's loop with the controller that it lacks."""
+    controller, [loop, *others] = _controller(system), loops_of(system)
+    if not scenario.digest or controller is None or others:
+        return None
+    # The controllers' own gains are not for a vehicle whose actuators are allocated.
+    if loop.controller != STANDARD.controller or isinstance(loop, AllocatedLoop):
+        return None
+    label, velocity = _CONTROLLERS[controller.other].label, f"{STANDARD.controller}.dy"
+    if controller.measures_velocity:
+        measured = (name for name in scenario.wires if f"{name}.".startswith(f"{velocity}."))
+        wires: dict[str, str | bool] = dict.fromkeys(measured, False)
+    else:
+        wires = {velocity: f"{loop.vehicle}.dy"}
+    return Difference(label, label, {STANDARD.controller: controller.other}, wires)
 
 
 def _controller(system: System) -> _Controller | None:
@@ -344,17 +358,12 @@ def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
 
     Args:
         prepared: run of the system.
-        owner: the scenario of the preset: its events may be the comparison's own.
+        owner: the scenario of the preset.
 
     """
     system = replace(prepared.system, step=prepared.experiment.step)
     tables = {name: [*enumerate(events)] for name, events in _bundled_events().items()}
-    # A comparison lacks some of the scenario's events, or has its own, which the page cannot edit.
-    places = {id(table): number for number, table in enumerate(owner.events)}
-    tables[owner.name] = [
-        (places.get(id(table), len(places) + number), table)
-        for number, table in enumerate(prepared.scenario.events)
-    ]
+    tables[owner.name] = [*enumerate(owner.events)]
     return {
         name: [
             _event(number, event) | {"canEnd": not any(action in table for action in AT_ONCE)}

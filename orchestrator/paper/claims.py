@@ -1,14 +1,15 @@
-"""Every printed number and claim of section 4 that a simulation can check.
+"""Every printed number and claim of section 4 that a simulation can check, and its measures.
 
-A claim is a function of the kept runs that are named beside it. The report makes these
-runs, calls every claim, and prints what it finds in the order of this file.
+A claim is a function of the runs that are named beside it. The report makes these runs, calls every
+claim, and prints the findings in the order of this file.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from math import sqrt
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,23 +18,21 @@ from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import theorem
+from orchestrator.cosim.observers.table import Table
 from orchestrator.paper.kept_runs import KeptRun
-from orchestrator.paper.measures import (
-    EFFORT_PD,
-    EFFORT_PROPOSED,
-    FINAL_ERROR_PD,
-    FINAL_ERROR_PROPOSED,
-    TURNING_RADIUS,
-    approach_of,
-    largest_error_after,
-    largest_estimate,
-    sum_without_step,
-    total_variation_until,
-    turning_radius,
-)
 from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.index.tracking import REACHED
+from orchestrator.vehicle.signals import STANDARD, applied, real_parameter
+
+#: Control efforts of section 4.2, in the order u, q, r.
+EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
+
+#: e_f of section 4.2, in the order x, y, z [m].
+FINAL_ERROR_PROPOSED, FINAL_ERROR_PD = (0.01, 0.02, 0.06), (0.004, 0.001, 0.001)
+
+#: Turning radius of section 4.1 [m].
+TURNING_RADIUS = 0.6
 
 #: The runs of the figures, and what the claims change in them.
 FIVE, FIVE_PD = Request("fig5"), Request("fig5-pd")
@@ -53,25 +52,16 @@ _SQUARED = "·√s"
 
 def noisy(request: Request) -> tuple[Request, ...]:
     """A run with noise, once for each seed."""
-    return tuple(
-        replace(
-            request,
-            parameters={
-                **request.parameters,
-                "plant.noise.std": _NOISE,
-                "plant.noise.seed": seed,
-            },
-        )
-        for seed in _SEEDS
-    )
+    noise = ({"plant.noise.std": _NOISE, "plant.noise.seed": seed} for seed in _SEEDS)
+    return tuple(replace(request, parameters={**request.parameters, **one}) for one in noise)
 
 
 class Finding(NamedTuple):
-    """What our runs say to a claim.
+    """The answer of our runs to a claim.
 
     Attributes:
-        ours: what they give.
-        verdict: whether that is what the paper says.
+        ours: their numbers.
+        verdict: agreement with the paper, in words.
 
     """
 
@@ -81,13 +71,13 @@ class Finding(NamedTuple):
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that the paper says.
+    """A number or statement of the paper.
 
     Attributes:
-        title: where it says it, and of what.
-        published: what it says.
-        runs: that it is judged by.
-        judge: finds what these say.
+        title: its place in the paper and its subject.
+        published: the number or statement in the paper.
+        runs: the runs that judge it.
+        judge: a function of these runs.
 
     """
 
@@ -97,7 +87,7 @@ class Claim:
     judge: Callable[..., Finding]
 
     def finding(self, kept_runs: Sequence[KeptRun]) -> Finding:
-        """What the kept runs say."""
+        """Judge the claim by its runs."""
         for kept_run in kept_runs:
             if kept_run.failure is not None:
                 return Finding(f"a run ended early: {kept_run.failure}", "none")
@@ -111,7 +101,7 @@ CLAIMS: list[Claim] = []
 def claim(
     title: str, published: str, *runs: Request
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
-    """Register a function of some kept runs as the judge of a claim."""
+    """Register the judge of a claim; of several above a function, the lowest comes first."""
 
     def register(judge: Callable[..., Finding]) -> Callable[..., Finding]:
         CLAIMS.append(Claim(title, published, runs, judge))
@@ -120,8 +110,8 @@ def claim(
     return register
 
 
-def said(holds: bool) -> str:
-    """Whether it is what the paper says."""
+def said(holds: object) -> str:
+    """The verdict for a claim that holds, or does not."""
     return "agrees" if holds else "**differs**"
 
 
@@ -130,13 +120,90 @@ def ratio(ours: Sequence[float], published: Sequence[float]) -> str:
     return f"ratio {numbers(np.divide(ours, published).tolist())}"
 
 
+def sum_without_step(l2: Any, duration: Any, h: float) -> Any:
+    """(59) coded as sqrt(sum of tau_k^2 / T_f), from the L2 norm sqrt(sum of h tau_k^2)."""
+    return l2 / np.sqrt(h * duration)
+
+
+class Approach(NamedTuple):
+    """The vehicle's way to the reference.
+
+    Attributes:
+        duration: until |e| is at most :data:`REACHED` [s].
+        impulse: of the surge force, as applied in that time [N.s].
+
+    """
+
+    duration: float
+    impulse: float
+
+    @property
+    def least_effort(self) -> float:
+        """The least L2 norm that a force with this impulse can have in this time [N.s^0.5].
+
+        (integral of tau)^2 <= T * integral of tau^2 by Cauchy and Schwarz, whatever its course.
+        """
+        return abs(self.impulse) / sqrt(self.duration)
+
+    def contradicts_until(self, effort: float, h: float) -> float:
+        """The T_f before which :func:`sum_without_step` cannot be as small as an effort [s]."""
+        return (self.least_effort / effort) ** 2 / h
+
+    def soonest(self, effort: float) -> float:
+        """The least time in which a force of an L2 norm [N.s^0.5] can have this impulse [s]."""
+        return (self.impulse / effort) ** 2
+
+
+def errors(table: Table) -> np.ndarray:
+    """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
+    _, theta, psi = table.group(*STANDARD.attitude).T
+    ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
+    y = table.group(*STANDARD.position) + real_parameter(table, STANDARD.ell) * np.column_stack(
+        ahead
+    )
+    error: np.ndarray = y - table.group(*STANDARD.y_d)
+    return error
+
+
+def approach_of(table: Table) -> Approach | None:
+    """The way of a run to its reference; None if it does not come there, or is there already."""
+    near = np.linalg.norm(errors(table), axis=1) <= REACHED
+    first = int(near.argmax())
+    if not near[first] or not first:
+        return None
+    force = applied(table)[:first, 0]
+    return Approach(float(table.time[first]), float(force @ np.diff(table.time[: first + 1])))
+
+
+def turning_radius(table: Table) -> float:
+    """Radius of the level circle that the centre of mass ends on [m]."""
+    u, v, r = (table[f"plant.nu.{k}"][-1] for k in "uvr")
+    return float(np.hypot(u, v) / abs(r))
+
+
+def total_variation_until(table: Table, stop_time: float) -> np.ndarray:
+    """Sum of |difference| of each applied signal up to a time, in the order u, q, r."""
+    signal = applied(table)[table.time[1:] <= stop_time]
+    variation: np.ndarray = np.abs(np.diff(signal, axis=0)).sum(axis=0)
+    return variation
+
+
+def largest_error_after(table: Table, start: float) -> float:
+    """Largest tracking error of any axis after a time [m]; zero for a shorter run."""
+    return float(np.abs(errors(table)[table.time > start]).max(initial=0.0))
+
+
+def largest_estimate(table: Table) -> float:
+    """Largest component of theta_hat in a run."""
+    return float(table.step_values(*STANDARD.theta_hat).max())
+
+
 @claim(
     "4.1: minimum turning radius under the largest surge force and yaw moment",
     f"{TURNING_RADIUS:g} m",
     TURNING,
 )
 def turning(run: KeptRun) -> Finding:
-    """The radius of the circle, and its diameter, which is what may have been printed."""
     radius = turning_radius(run.table)
     return Finding(
         f"{radius:.2f} m; its diameter {2 * radius:.3f} m",
@@ -148,13 +215,13 @@ def turning(run: KeptRun) -> Finding:
 
 @claim("Fig. 4: the vehicle tracks the reference without saturation", "no saturation", QUIET)
 def no_saturation(quiet: KeptRun) -> Finding:
-    """No step whose command is outside the limits of (3)."""
     return Finding(
         f"peaks {actuator_values(quiet.metrics['peak_command'])} of 80",
         said(not any(quiet.metrics["saturated_fraction"])),
     )
 
 
+@claim(f"Fig. 5: the same with eps_t = 1, {_WITH_NOISE}", "no saturation", *noisy(SHARP))
 @claim(
     f"Figs. 4 and 5: the proposed controller does not saturate, {_WITH_NOISE} (eps_t = 1, and 10)",
     "no saturation",
@@ -162,7 +229,6 @@ def no_saturation(quiet: KeptRun) -> Finding:
     *noisy(FIVE),
 )
 def no_saturation_with_noise(*runs: KeptRun) -> Finding:
-    """The largest of all draws, and their largest share of steps."""
     each = [runs[i : i + len(_SEEDS)] for i in range(0, len(runs), len(_SEEDS))]
     peaks = ", and ".join(
         actuator_values(np.max([run.metrics["peak_command"] for run in draws], axis=0).tolist())
@@ -176,19 +242,8 @@ def no_saturation_with_noise(*runs: KeptRun) -> Finding:
     )
 
 
-@claim(
-    f"Fig. 5: the same with eps_t = 1, {_WITH_NOISE}",
-    "no saturation",
-    *noisy(SHARP),
-)
-def no_saturation_with_noise_and_sharp(*runs: KeptRun) -> Finding:
-    """The paper may mean 10 for the PD controller only."""
-    return no_saturation_with_noise(*runs)
-
-
 @claim("Fig. 4: the tracking errors converge to a neighbourhood of the origin", "no numbers", QUIET)
 def convergence(quiet: KeptRun) -> Finding:
-    """e_f within 0.1 m."""
     error = quiet.metrics["final_error"]
     return Finding(f"e_f {numbers(error)} m", said(max(error) < 0.1))
 
@@ -200,7 +255,7 @@ def bounded_estimates(quiet: KeptRun) -> Finding:
     return Finding(
         f"largest {largest:.3g}, still growing at {quiet.table.time[-1]:g} s; (22) cannot exceed "
         "max(G |r|) / sigma",
-        said(bool(np.isfinite(largest))),
+        said(np.isfinite(largest)),
     )
 
 
@@ -210,7 +265,6 @@ def bounded_estimates(quiet: KeptRun) -> Finding:
     FIVE,
 )
 def effort_proposed(five: KeptRun) -> Finding:
-    """The L2 norms beside the printed numbers."""
     effort = five.metrics["l2_effort"]
     return Finding(actuator_values(effort, _SQUARED), ratio(effort, EFFORT_PROPOSED))
 
@@ -221,7 +275,6 @@ def effort_proposed(five: KeptRun) -> Finding:
     FIVE_PD,
 )
 def effort_pd(pd: KeptRun) -> Finding:
-    """The L2 norms beside the printed numbers."""
     effort = pd.metrics["l2_effort"]
     return Finding(actuator_values(effort, _SQUARED), ratio(effort, EFFORT_PD))
 
@@ -233,12 +286,11 @@ def effort_pd(pd: KeptRun) -> Finding:
     FIVE_PD,
 )
 def effort_as_printed(five: KeptRun, pd: KeptRun) -> Finding:
-    """(59) itself."""
     proposed, baseline = five.metrics["rms_effort"], pd.metrics["rms_effort"]
     holds = np.allclose(proposed, EFFORT_PROPOSED, rtol=0.5)
     return Finding(
         f"{actuator_values(proposed)}, and {actuator_values(baseline)}",
-        f"{said(bool(holds))}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
+        f"{said(holds)}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
     )
 
 
@@ -292,22 +344,15 @@ def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
     )
 
 
-@claim("4.2: e_f of the proposed controller (x, y, z)", f"{numbers(FINAL_ERROR_PROPOSED)} m", FIVE)
-def final_error_proposed(five: KeptRun) -> Finding:
-    """e_f beside the printed numbers."""
-    error = five.metrics["final_error"]
-    return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PROPOSED))
-
-
 @claim("4.2: the same with eps_t = 1 instead of 10", f"{numbers(FINAL_ERROR_PROPOSED)} m", SHARP)
-def final_error_sharp(sharp: KeptRun) -> Finding:
-    """The paper may mean 10 for the PD controller only."""
-    return final_error_proposed(sharp)
+@claim("4.2: e_f of the proposed controller (x, y, z)", f"{numbers(FINAL_ERROR_PROPOSED)} m", FIVE)
+def final_error_proposed(run: KeptRun) -> Finding:
+    error = run.metrics["final_error"]
+    return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PROPOSED))
 
 
 @claim("4.2: e_f of the PD controller (x, y, z)", f"{numbers(FINAL_ERROR_PD)} m", FIVE_PD)
 def final_error_pd(pd: KeptRun) -> Finding:
-    """e_f beside the printed numbers."""
     error = pd.metrics["final_error"]
     return Finding(f"{numbers(error)} m", ratio(error, FINAL_ERROR_PD))
 
@@ -319,7 +364,6 @@ def final_error_pd(pd: KeptRun) -> Finding:
     SHARP,
 )
 def proposed_does_not_saturate(five: KeptRun, sharp: KeptRun) -> Finding:
-    """With both values that the paper may mean."""
     runs = (five.metrics, sharp.metrics)
     return Finding(
         "peaks " + ", and ".join(actuator_values(run["peak_command"]) for run in runs),
@@ -329,7 +373,6 @@ def proposed_does_not_saturate(five: KeptRun, sharp: KeptRun) -> Finding:
 
 @claim("Fig. 5: the PD controller saturates", "saturation", FIVE_PD)
 def pd_saturates(pd: KeptRun) -> Finding:
-    """All three actuators do."""
     shares = [100 * share for share in pd.metrics["saturated_fraction"]]
     return Finding(
         f"{numbers(shares)} % of the steps, peaks {actuator_values(pd.metrics['peak_command'])}",
@@ -344,7 +387,6 @@ def pd_saturates(pd: KeptRun) -> Finding:
     FIVE_PD,
 )
 def pd_chatters(five: KeptRun, pd: KeptRun) -> Finding:
-    """By the total variation of the applied signals."""
     return _rougher(pd.metrics["total_variation"], five.metrics["total_variation"])
 
 
@@ -355,7 +397,6 @@ def pd_chatters(five: KeptRun, pd: KeptRun) -> Finding:
     *noisy(FIVE_PD),
 )
 def pd_chatters_with_noise(*runs: KeptRun) -> Finding:
-    """By the medians of all draws."""
     variations = np.array([run.metrics["total_variation"] for run in runs])
     proposed, baseline = np.median(variations.reshape(2, len(_SEEDS), -1), axis=1).tolist()
     found = _rougher(baseline, proposed)
@@ -363,10 +404,9 @@ def pd_chatters_with_noise(*runs: KeptRun) -> Finding:
 
 
 def _rougher(rough: Sequence[float], smooth: Sequence[float]) -> Finding:
-    """Whether the first of two signals of each actuator has the larger total variation."""
     return Finding(
         f"total variation {actuator_values(rough)} against {actuator_values(smooth)}",
-        f"{said(bool(np.greater(rough, smooth).all()))}, {ratio(rough, smooth)}",
+        f"{said(np.greater(rough, smooth).all())}, {ratio(rough, smooth)}",
     )
 
 
@@ -377,14 +417,12 @@ def _rougher(rough: Sequence[float], smooth: Sequence[float]) -> Finding:
     FIVE_PD,
 )
 def pd_is_accurate(five: KeptRun, pd: KeptRun) -> Finding:
-    """Along every axis."""
     times = np.divide(five.metrics["final_error"], pd.metrics["final_error"])
-    return Finding(f"{numbers(times.tolist())} times", said(bool((times > 1.0).all())))
+    return Finding(f"{numbers(times.tolist())} times", said((times > 1.0).all()))
 
 
 @claim("Fig. 6: from 100 m the PD controller chatters severely", "severe chattering", SIX, SIX_PD)
 def pd_chatters_severely(six: KeptRun, pd: KeptRun) -> Finding:
-    """While both are on their way."""
     proposed, baseline = (total_variation_until(run.table, 60.0).tolist() for run in (six, pd))
     found = _rougher(baseline, proposed)
     return found._replace(ours=f"{found.ours} in the first 60 s")
@@ -397,14 +435,13 @@ def pd_chatters_severely(six: KeptRun, pd: KeptRun) -> Finding:
     FIVE,
 )
 def smoother_and_less_accurate(sharp: KeptRun, five: KeptRun) -> Finding:
-    """Total variation falls, e_f grows."""
     runs = (sharp.metrics, five.metrics)
     rough, smooth = (run["total_variation"] for run in runs)
     exact, inexact = (max(run["final_error"]) for run in runs)
     return Finding(
         f"total variation from {actuator_values(rough)} to {actuator_values(smooth)}, largest e_f "
         f"from {exact:.3g} to {inexact:.3g} m",
-        said(bool(np.greater(rough, smooth).all()) and exact < inexact),
+        said(np.greater(rough, smooth).all() and exact < inexact),
     )
 
 
@@ -414,7 +451,6 @@ def smoother_and_less_accurate(sharp: KeptRun, five: KeptRun) -> Finding:
     *SEVEN,
 )
 def more_effort(*sevens: KeptRun) -> Finding:
-    """Effort, adaptive gain and total variation grow from (a) to (c)."""
     efforts, variations = (
         [run.metrics[index] for run in sevens] for index in ("l2_effort", "total_variation")
     )
@@ -424,7 +460,7 @@ def more_effort(*sevens: KeptRun) -> Finding:
         f"L2 effort {', then '.join(actuator_values(effort, _SQUARED) for effort in efforts)}; "
         f"largest estimate {numbers(estimates)}; total variation "
         f"{', then '.join(map(actuator_values, variations))}",
-        said(bool((grown >= 0.0).all())),
+        said((grown >= 0.0).all()),
     )
 
 
@@ -434,7 +470,6 @@ def more_effort(*sevens: KeptRun) -> Finding:
     SEVEN[-1],
 )
 def intolerable_chattering(largest: KeptRun) -> Finding:
-    """The largest disturbance that the paper shows."""
     saturates = any(largest.metrics["saturated_fraction"])
     return Finding(
         f"peaks of (c) {actuator_values(largest.metrics['peak_command'])} of 80",
@@ -447,9 +482,8 @@ def intolerable_chattering(largest: KeptRun) -> Finding:
 
 @claim("Fig. 7: the performance degrades gradually", "errors grow from (a) to (c)", *SEVEN)
 def gradual_degradation(*sevens: KeptRun) -> Finding:
-    """By e_f."""
     errors = [max(run.metrics["final_error"]) for run in sevens]
-    return Finding(f"largest e_f {numbers(errors)} m", said(bool((np.diff(errors) > 0).all())))
+    return Finding(f"largest e_f {numbers(errors)} m", said((np.diff(errors) > 0).all()))
 
 
 @claim(
@@ -458,7 +492,6 @@ def gradual_degradation(*sevens: KeptRun) -> Finding:
     *SEVEN,
 )
 def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
-    """By the largest error once the start is forgotten."""
     errors = [largest_error_after(run.table, 40.0) for run in sevens]
     return Finding(
         f"{numbers(errors)} m, when the waves turn at 72 s; 0.2 m holds for e_f, and in (a) "
@@ -469,7 +502,6 @@ def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
 
 @claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not stated")
 def gains_meet_the_conditions() -> Finding:
-    """With the gains as printed, which needs no run."""
     found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
     verdicts = [condition.verdict for condition in found.conditions]
     first, second, _ = found.conditions
@@ -485,7 +517,6 @@ def gains_meet_the_conditions() -> Finding:
     "arbitrarily large",
 )
 def region_is_arbitrarily_large() -> Finding:
-    """What (42) can hold for, with any gains."""
     found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
     least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
     return Finding(

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -18,9 +17,8 @@ from auv_fmu.paper.output_feedback import Gains
 from orchestrator.figures.drawing import name_runs, overlay, save, styled
 from orchestrator.figures.panels import draw_commands
 from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn
-from orchestrator.paper.claims import FIVE, FIVE_PD, QUIET, SEVEN
+from orchestrator.paper.claims import EFFORT_PD, EFFORT_PROPOSED, FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
-from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED
 from orchestrator.paper.page import actuator_values, escape_markdown, numbers, picture
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates
@@ -58,11 +56,8 @@ _STEPPED = (
 _ALGEBRAIC = replace(QUIET, parameters={**QUIET.parameters, "controller.saturation": "algebraic"})
 
 
-class Shown(NamedTuple):
-    """An effect in words and in a figure."""
-
-    text: str
-    figure: Figure
+#: An effect in words and in a figure.
+Shown = tuple[str, Figure]
 
 
 @dataclass(frozen=True)
@@ -113,9 +108,9 @@ def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
             return f"A run ended early: {escape_markdown(kept_run.failure)}"
     [found] = [effect for effect in EFFECTS if effect.name == name]
     with styled():
-        shown = found.show(*kept_runs)
-        save(shown.figure, folder / f"{name}.png")
-    return f"{shown.text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"
+        text, figure = found.show(*kept_runs)
+        save(figure, folder / f"{name}.png")
+    return f"{text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"
 
 
 def _draw_lines(
@@ -133,12 +128,11 @@ def _draw_limit(axes: Axes, run: KeptRun) -> None:
 
 @effect("effect-disturbance", "Fig. 7 in one figure", *SEVEN)
 def disturbance(*sevens: KeptRun) -> Shown:
-    """The three levels of Fig. 7 over each other."""
     labels = ("(a)", "(b)", "(c)")
     runs = [Drawn(label, run.table) for label, run in zip(labels, sevens, strict=True)]
     errors = [max(run.metrics["final_error"]) for run in sevens]
     peaks = [max(run.metrics["peak_command"]) for run in sevens]
-    return Shown(
+    return (
         "Errors and commands of (a), (b) and (c) in the same scale. The largest e_f grows as "
         f"{numbers(errors)} m; the largest command is {numbers(peaks)} N, soon after the start.",
         overlay("", runs),
@@ -147,9 +141,8 @@ def disturbance(*sevens: KeptRun) -> Shown:
 
 @effect("effect-jacobian", "(11) as printed against the full attitude", FIVE, _PRINTED)
 def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
-    """What reading 3 changes."""
     saturated, rest = (100 * max(run.metrics["saturated_fraction"]) for run in (printed, full))
-    return Shown(
+    return (
         f"With (11) as printed, {saturated:.3g} % of the steps of Fig. 5 saturate and e_f is "
         f"{numbers(printed.metrics['final_error'])} m; with the full attitude {rest:.3g} % and "
         f"{numbers(full.metrics['final_error'])} m (reading 3). The vehicle tumbles on its way "
@@ -161,7 +154,6 @@ def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
 
 @effect("effect-order", "Jacobi against Gauss-Seidel", FIVE, _JACOBI, FIVE_PD, _JACOBI_PD)
 def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Shown:
-    """What a delay of one step does to the two controllers."""
     variation = [
         actuator_values(run.metrics["total_variation"]) for run in (full, jacobi, pd, jacobi_pd)
     ]
@@ -177,7 +169,7 @@ def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Sh
         drawn = [Drawn(label, run.table) for label, run in zip(labels, runs, strict=True)]
         draw_commands(panels[:, column], drawn, title)
     name_runs(figure, drawn)
-    return Shown(
+    return (
         "A Jacobi master adds a delay of 20 ms to the loop (reading 5). Total variation of the "
         f"signals of Fig. 5: proposed {variation[0]} in Gauss-Seidel order and {variation[1]} in "
         f"Jacobi order; PD {variation[2]} and {variation[3]}.",
@@ -187,7 +179,6 @@ def order(full: KeptRun, jacobi: KeptRun, pd: KeptRun, jacobi_pd: KeptRun) -> Sh
 
 @effect("effect-step", "The step of 20 ms", *_STEPPED)
 def step(*runs: KeptRun) -> Shown:
-    """What of the efforts is the scheme's doing, and not the controller's."""
     *stepped, exact = (run.metrics["l2_effort"] for run in runs)
     proposed, pd = np.reshape(stepped, (2, len(STEPS), len(ACTUATORS)))
     figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
@@ -209,7 +200,7 @@ def step(*runs: KeptRun) -> Shown:
         axes.legend()
     spread = 100.0 * float(np.abs(proposed / proposed[0] - 1.0).max())
     steps = numbers([1e3 * step for step in STEPS])
-    return Shown(
+    return (
         f"Steps of {steps} ms; dotted lines are the printed values. The PD controller's L2 effort "
         f"in tau_q is {numbers(pd[:, 1].tolist())} N·m·√s, in tau_u "
         f"{numbers(pd[:, 0].tolist())} N·√s and in tau_r {numbers(pd[:, 2].tolist())} N·m·√s. That "
@@ -225,7 +216,6 @@ def step(*runs: KeptRun) -> Shown:
 
 @effect("effect-noise", "Measurement noise against effort", *_NOISY)
 def noise(*runs: KeptRun) -> Shown:
-    """Why the level of the noise, which is not given, matters."""
     one_mm, one_cm = (runs[NOISE_LEVELS.index(level)].metrics for level in (1e-3, 1e-2))
     figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
     effort, peak = figure.subplots(1, 2)
@@ -246,7 +236,7 @@ def noise(*runs: KeptRun) -> Shown:
         axes.yaxis.set_minor_locator(NullLocator())
     _draw_limit(peak, runs[0])
     peak.legend()
-    return Shown(
+    return (
         "The observer multiplies the noise by k_d = 50 (reading 7). In one draw of 100 s, white "
         "noise of 1 mm leaves the peaks of Fig. 4 at "
         f"{actuator_values(one_mm['peak_command'])}; 1 cm drives them to "
@@ -258,7 +248,6 @@ def noise(*runs: KeptRun) -> Shown:
 
 @effect("effect-lambda", "Condition (30) against the limits of (3)", *_QUICK)
 def condition_30(*runs: KeptRun) -> Shown:
-    """What the gains that Theorem 1 asks for command."""
     figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
     peak, error = figure.subplots(1, 2)
     for axes, key, names, title, unit in (
@@ -272,7 +261,7 @@ def condition_30(*runs: KeptRun) -> Shown:
     for axes in (peak, error):
         axes.legend()
     paper, met = (runs[LAMBDAS.index(value)].metrics for value in (1.0, 2.1))
-    return Shown(
+    return (
         "With equal entries in K_2, (30) as printed asks for lambda > 2 m/s. From the start of "
         f"Fig. 4, without noise, the peaks are {actuator_values(paper['peak_command'])} at the "
         f"paper's lambda = 1 and {actuator_values(met['peak_command'])} at 2.1, where "
@@ -285,10 +274,9 @@ def condition_30(*runs: KeptRun) -> Shown:
 
 @effect("effect-saturation", "tanh against algebraic saturation", QUIET, _ALGEBRAIC)
 def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
-    """Theorem 2 with another saturation function."""
     efforts = [actuator_values(run.metrics["l2_effort"], "·√s") for run in (tanh, algebraic)]
     errors = [numbers(run.metrics["final_error"]) for run in (tanh, algebraic)]
-    return Shown(
+    return (
         f"Fig. 4 without noise. L2 effort {' against '.join(efforts)}; "
         f"e_f {errors[0]} m against {errors[1]} m.",
         overlay("", [Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
@@ -297,7 +285,6 @@ def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
 
 @effect("certificates", "Certificates along a run", QUIET)
 def certificates_along_a_run(quiet: KeptRun) -> Shown:
-    """What the proof speaks of, along Fig. 4."""
     column = dict(zip(CERTIFICATE_COLUMNS, certificates(quiet.table).T, strict=True))
     figure = Figure(figsize=(FIGURE_WIDTH, 5.5))
     panels = figure.subplots(3, 1, sharex=True)
@@ -314,7 +301,7 @@ def certificates_along_a_run(quiet: KeptRun) -> Shown:
     panels[2].legend(ncols=3)
     for axes in panels:
         axes.margins(x=0)
-    return Shown(
+    return (
         "For Fig. 4 without noise, from the true state of the plant: the Lyapunov function (34) "
         "without its term in the unknown theta, the composite errors r_1 (17) and r_2 (19), and "
         "the distance of each command from its nearer limit. V falls by some orders of "

@@ -1,34 +1,37 @@
-"""Runs of the report: each made once, and kept from one report to the next."""
+"""Runs of the report: equal ones, of whatever name, are made once."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from fmus.kinds import AUTO, KindName
 from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.identity import code_of, digest_of
-from orchestrator.machine.ledger import Ledger
+from orchestrator.machine.identity import digest_of
 from orchestrator.machine.workers import Workers
-from orchestrator.runs.folder import open_ledger
-from orchestrator.runs.preparation import Prepared, prepare_request
+from orchestrator.runs.preparation import Prepared, prepare_request, with_companion
 from orchestrator.runs.request import Request
-from orchestrator.runs.result import content_of, ending_in, header_in, loops_in
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 
 @dataclass(frozen=True)
+class Companion(Request):
+    """The run that a scenario is compared with, by the request of the scenario."""
+
+    @property
+    def label(self) -> str:
+        """The command that makes both runs."""
+        return f"{super().label} (its companion)"
+
+
+@dataclass(frozen=True)
 class KeptRun:
-    """What is kept of a run.
+    """The part of a run that the report needs.
 
     Attributes:
         metrics: as in metrics.json; only `failure` for a run that could not be made.
@@ -48,32 +51,49 @@ class KeptRun:
 
 
 class KeptRuns:
-    """What is kept of runs; equal ones, of whatever name, are made once."""
+    """Runs by their requests."""
 
     def __init__(
         self,
-        folder: Path,
+        requests: Iterable[Request],
+        workers: Workers,
         stop_time: float | None = None,
         kind: KindName = AUTO,
-        force: bool = False,
     ) -> None:
-        """Start without any.
+        """Make the runs, the longest first.
 
         Args:
-            folder: in which they are kept.
+            requests: of the runs.
+            workers: that make them.
             stop_time: of all runs [s]; None: their own.
             kind: of the bundle's FMUs in all runs.
-            force: move aside what was changed there.
+
+        Raises:
+            KeyboardInterrupt: the user does not want to wait.
 
         """
-        self._folder, self._stop_time, self._kind = folder, stop_time, kind
-        self._force = force
         self._keys: dict[Request, str] = {}
         self._labels: dict[str, str] = {}
         self._kept_runs: dict[str, KeptRun] = {}
+        wanted: dict[str, tuple[int, Request]] = {}
+        for request in dict.fromkeys(requests):
+            asked = replace(request, stop_time=stop_time or request.stop_time, kind=kind)
+            try:
+                prepared = _prepared(asked)
+            except InputError as error:
+                key, label = repr(request), request.label
+                self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
+            else:
+                key, label = digest_of(prepared.identity), asked.label
+                wanted.setdefault(key, (prepared.experiment.rows, asked))
+            self._keys[request] = key
+            self._labels[key] = min(label, self._labels.get(key, label), key=len)
+        longest_first = sorted(wanted.items(), key=lambda item: -item[1][0])
+        tasks = {key: partial(_make, asked) for key, (_, asked) in longest_first}
+        self._kept_runs.update(workers.results(tasks, "run"))
 
     def __getitem__(self, request: Request) -> KeptRun:
-        """What is kept of a run that was made."""
+        """The run of a request."""
         return self._kept_runs[self._keys[request]]
 
     def label(self, request: Request) -> str:
@@ -82,73 +102,19 @@ class KeptRuns:
 
     @property
     def labels(self) -> list[str]:
-        """Of all runs."""
+        """The labels of all runs."""
         return list(self._labels.values())
 
-    def make(self, requests: Iterable[Request], workers: Workers) -> None:
-        """Make what is not kept in the folder, the longest first.
 
-        Raises:
-            InputError: what is kept was changed.
-            KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
-
-        """
-        with open_ledger(self._folder, self._force) as ledger:
-            self._make(requests, workers, ledger)
-
-    def _make(self, requests: Iterable[Request], workers: Workers, ledger: Ledger) -> None:
-        missing: dict[str, tuple[int, Request]] = {}
-        for request in dict.fromkeys(requests):
-            stop_time = self._stop_time or request.stop_time
-            wanted = replace(request, stop_time=stop_time, kind=self._kind)
-            try:
-                prepared = prepare_request(wanted)
-            except InputError as error:
-                self._keys[request] = key = repr(request)
-                self._labels[key] = request.label
-                self._kept_runs[key] = KeptRun({"failure": str(error)}, Table())
-                continue
-            self._keys[request] = key = key_of(prepared)
-            label = wanted.label
-            self._labels[key] = min(label, self._labels.get(key, label), key=len)
-            ledger.check([_file(key)])
-            if ledger.owns(_file(key)):
-                self._kept_runs[key] = _read(self._folder / _file(key))
-            else:
-                missing.setdefault(key, (prepared.experiment.rows, wanted))
-        longest_first = sorted(missing.items(), key=lambda item: -item[1][0])
-        tasks = {key: partial(_make, request, key) for key, (_, request) in longest_first}
-        for key, kept_run in workers.results(tasks, "run"):
-            self._kept_runs[key] = kept_run
-            if kept_run.failure is None:
-                with ledger.changing() as unfinished:
-                    _write(unfinished / _file(key), kept_run)
-
-    def forget_others(self) -> None:
-        """Remove from the folder what belongs to no run of this report."""
-        with open_ledger(self._folder) as ledger:
-            ledger.remove(set(ledger.files) - set(map(_file, self._keys.values())))
+def _prepared(request: Request) -> Prepared:
+    own = prepare_request(request)
+    return with_companion(own, request)[1] if isinstance(request, Companion) else own
 
 
-def _file(key: str) -> str:
-    """The name of the file of a kept run."""
-    return f"{key}.npz"
-
-
-def key_of(prepared: Prepared) -> str:
-    """Digest of all that a kept run depends on."""
-    kept = {
-        "what is kept": code_of("orchestrator.vehicle", "orchestrator.figures", "orchestrator.runs")
-    }
-    return digest_of(prepared.identity, kept)[:32]
-
-
-def _make(request: Request, key: str) -> KeptRun:
+def _make(request: Request) -> KeptRun:
     """Make a run; a task for a worker."""
     try:
-        prepared = prepare_request(request)
-        if key_of(prepared) != key:
-            raise InputError("FMUs have changed while the report was made; run the command again")
+        prepared = _prepared(request)
         metrics = Metrics(prepared.loops)
         seen = VisibleRows({name for loop in prepared.loops for name in loop.drawn()})
         prepared.run([metrics, seen])
@@ -156,21 +122,3 @@ def _make(request: Request, key: str) -> KeptRun:
         return KeptRun({"failure": str(error)}, Table())
     values = metrics.content(prepared.scenario.name, prepared.system)
     return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), prepared.loops)
-
-
-def _write(file: Path, kept_run: KeptRun) -> None:
-    table = kept_run.table
-    text = {
-        "metrics": kept_run.metrics,
-        "columns": table.columns,
-        **content_of(table.header, table.ending, kept_run.loops),
-    }
-    # A column together: one that is constant then takes no room.
-    np.savez_compressed(file, text=json.dumps(text), columns=table.rows.T)
-
-
-def _read(file: Path) -> KeptRun:
-    with np.load(file) as content:
-        text, rows = json.loads(str(content["text"])), content["columns"].T
-    table = Table.of(header_in(text, tuple(text["columns"])), rows, ending_in(text))
-    return KeptRun(text["metrics"], table, loops_in(text))

@@ -126,26 +126,9 @@ def html(text: str, folder: Path) -> str:
     """A text in Markdown as a page, with the pictures of a folder within it."""
     tokens = _MARKDOWN.parse(text)
     [title, *_] = _headings(tokens)
-    _name_cells(tokens)
     _embed_pictures(tokens, folder)
     body = _MARKDOWN.renderer.render(tokens, _MARKDOWN.options, {})
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(title=title.title, body=body)
-
-
-def _name_cells(tokens: Sequence[Token]) -> None:
-    """Give each cell of a table the name of its column: narrow screens show it beside the cell."""
-    names: list[str] = []
-    column = 0
-    for token, inline in pairwise(tokens):
-        if token.type == "thead_open":
-            names = []
-        elif token.type == "th_open":
-            names.append(inline.content)
-        elif token.type == "tr_open":
-            column = 0
-        elif token.type == "td_open":
-            token.attrSet("data-name", names[column])
-            column += 1
 
 
 def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
@@ -166,7 +149,7 @@ def without_pictures(text: str) -> str:
 
 
 def errata() -> str:
-    """What is wrong in the paper, in Markdown, with headings of the third and fourth level."""
+    """The errors of the paper, in Markdown, with headings of the third and fourth level."""
     _, _, text = _page_of_docs("paper.md").partition("\n")
     points, _, _ = text.partition("\n## The theorem in numbers\n")
     return _deeper(points, 1)

@@ -2,39 +2,55 @@
 
 from __future__ import annotations
 
+import json
 import platform
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
+from itertools import chain, count
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from fmus.kinds import AUTO, KindName
+from orchestrator.cosim.system.names import PortName
+from orchestrator.figures.drawing import draw
+from orchestrator.figures.run_figures import FIGURES
+from orchestrator.figures.style import Drawn, printed_unit
+from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
-from orchestrator.paper import printed_table
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
-from orchestrator.paper.kept_runs import KeptRuns
-from orchestrator.paper.page import contents, errata, html, linked, readings, table
-from orchestrator.paper.sections import (
-    Section,
-    draw_section,
-    make_studies,
-    section_text,
-    sections,
-    study_sections,
+from orchestrator.paper.kept_runs import Companion, KeptRun, KeptRuns
+from orchestrator.paper.page import (
+    contents,
+    errata,
+    escape_markdown,
+    html,
+    linked,
+    picture,
+    readings,
+    table,
+    values_with_units,
+    without_pictures,
 )
-from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import inner_folder, replace_files
+from orchestrator.runs.folder import replace_files
+from orchestrator.runs.preparation import prepare_request
+from orchestrator.runs.request import Request
 from orchestrator.runs.result import RECORDED_PACKAGES, Stopwatch, write_content
+from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.runs.wiring import closed_loop
+from orchestrator.vehicle.indices import metrics, of_vehicles
 from orchestrator.vehicle.proof import gain_check
 
-#: Folders within the report's: figures, and runs that the next report can use again.
-_FIGURES, _RUNS, _STUDIES = "figures", "runs", "studies"
+#: The folder of the figures.
+_FIGURES = "figures"
 
 #: The files.
 _NAMES = _PAGE, _MARKDOWN = "report.html", "report.md"
@@ -61,8 +77,150 @@ end of the run, and shrinks with eps_t, as Remark 6 says. The PD controller's e_
 millimetres, up to a centimetre, for the same reason."""
 
 _NO_VARIANTS = """\
-No choice of the open points gives all printed numbers together: `auv-fmu table` tries every \
-combination. `auv-fmu report --studies` does so for this section."""
+No choice of the points that the paper leaves open gives all printed numbers together: \
+`python tools/printed_table.py`, in the repository, tries every combination, and the page \
+*The printed table against every reading* of the documentation has what comes of it."""
+
+#: The parameter that decides whether a run has a twin without noise.
+_NOISE = "plant.noise.std"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A scenario in the report.
+
+    Attributes:
+        name: of its figures' folder.
+        scenario: what its file says.
+        runs: what is drawn, by the labels that tell them apart; its own comes first.
+
+    """
+
+    name: str
+    scenario: Scenario
+    runs: Mapping[str, Request]
+
+    @property
+    def title(self) -> str:
+        """Heading."""
+        return escape_markdown(self.scenario.title or self.scenario.name)
+
+
+def sections(references: Sequence[str], kind: KindName = AUTO) -> list[Section]:
+    """The sections of some scenarios, by their names or the paths of their files.
+
+    Raises:
+        InputError: there is no such scenario, or its file has a mistake.
+
+    """
+    found: list[Section] = []
+    for reference in references:
+        scenario = read_scenario(reference)
+        taken = {section.name for section in found}
+        stem = scenario.stem
+        names = chain([stem], (f"{stem}-{n}" for n in count(2)))
+        name = next(name for name in names if name not in taken)
+        found.append(Section(name, scenario, _runs(reference, scenario, kind)))
+    return found
+
+
+def _runs(reference: str, scenario: Scenario, kind: KindName) -> dict[str, Request]:
+    """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
+    request = Request(reference, kind=kind)
+    try:
+        prepared = prepare_request(request)
+    except InputError:
+        # The report says why it cannot be made.
+        return {scenario.legend: request}
+    if scenario.compare:
+        label = scenario.compare.label or scenario.compare.name
+        label += " (2)" * (label == scenario.legend)
+        return {scenario.legend: request, label: Companion(reference, kind=kind)}
+    noise, system = PortName.read(_NOISE), prepared.system
+    if scenario.figure == "tracking" and system.has(noise) and system.value(noise):
+        quiet = replace(request, parameters={_NOISE: 0.0})
+        return {"with noise": request, "without noise": quiet}
+    return {scenario.legend: request}
+
+
+def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -> list[str]:
+    """Draw the figures of a section and give notes on what is left out; a task for a worker."""
+    key = section.scenario.figure
+    if key not in FIGURES:
+        return [f"no figure: there is none of the name {key!r}{did_you_mean(key, FIGURES)}"]
+    runs = [
+        Drawn(label, kept_run.table, section.scenario.z_up, kept_run.loops)
+        for label, kept_run in zip(section.runs, kept_runs, strict=True)
+        if len(kept_run.table)
+    ]
+    if not runs:
+        return []
+    folder.mkdir(parents=True)
+    # The heading of the section stands above the figure already.
+    return draw(key, "", runs, folder, section.name)
+
+
+def section_text(
+    section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
+) -> Iterator[str]:
+    """A section in Markdown, with notes on what its figures in the folder leave out."""
+    scenario, own = section.scenario, kept_runs[next(iter(section.runs.values()))]
+    yield f"### {section.title}"
+    # By their stems: `fig4` comes before `fig4-velocity`.
+    files = Path(folder, "figures", section.name).glob("*.png")
+    for file in sorted(files, key=attrgetter("stem")):
+        yield picture(section.title, file.relative_to(folder).as_posix())
+    yield from (f"Note: {escape_markdown(note)}." for note in notes)
+    if scenario.remark:
+        yield without_pictures(scenario.remark)
+    made = {label: kept_runs[request] for label, request in section.runs.items()}
+    for label, kept_run in made.items():
+        if kept_run.failure is not None:
+            why = escape_markdown(kept_run.failure)
+            yield f"**The run {escape_markdown(label)} ended early:** {why}"
+    by_vehicle = {
+        ", ".join(filter(None, (label, vehicle))): found
+        for label, kept_run in made.items()
+        for vehicle, found in of_vehicles(kept_run.metrics).items()
+    }
+    if rows := list(_indices(list(by_vehicle.values()))):
+        yield table(["index", *map(escape_markdown, by_vehicle)], rows)
+    reaching = own.metrics.get("velocities_reaching_controller")
+    if reaching is not None:
+        names = ", ".join(f"`{name}`" for name in reaching) or "none"
+        yield f"Velocities of the vehicle that reach the controller: {names}."
+    yield "\n".join(
+        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(request)}`"
+        + (f", until {time:g} s" if (time := kept_runs[request].metrics.get("stop_time")) else "")
+        for label, request in section.runs.items()
+    )
+    if scenario.ours:
+        yield "Ours, not the paper's:"
+        yield "\n".join(_ours(scenario))
+
+
+def _indices(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+    for index in metrics():
+        if any(index.name in values for values in runs):
+            units = [printed_unit(unit) for unit in index.units.values()]
+            cells = (
+                values_with_units(np.atleast_1d(values[index.name]).tolist(), units)
+                if index.name in values
+                else ""
+                for values in runs
+            )
+            members = f" ({index.members})" * (len(index.units) > 1)
+            yield [f"{index.label}{members}", *cells]
+
+
+def _ours(scenario: Scenario) -> Iterator[str]:
+    """The values that are not the paper's, and why."""
+    values = {str(name): value for name, value in scenario.parameters.items()}
+    for name, why in scenario.ours.items():
+        value = values.get(name, vars(scenario).get(name))
+        is_short = value is not None and not isinstance(value, Mapping)
+        stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
+        yield f"- `{stated}`: {escape_markdown(why)}"
 
 
 def write_report(
@@ -71,11 +229,9 @@ def write_report(
     command: Sequence[str],
     stop_time: float | None = None,
     kind: KindName = AUTO,
-    ready: Sequence[str] = (),
-    variants: bool = False,
     force: bool = False,
 ) -> tuple[Path, Path]:
-    """Run what was not run before, and write `report.html`, `report.md` and their figures.
+    """Make all runs, and write `report.html`, `report.md` and their figures.
 
     Args:
         folder: to write into.
@@ -83,8 +239,6 @@ def write_report(
         command: for the record.
         stop_time: of all runs [s]; None: their own. For a look at the report, not at the paper.
         kind: of the bundle's FMUs in all runs.
-        ready: studies that have a section: names, or paths of files.
-        variants: compare the printed table with every reading of the paper.
         force: move aside files of the user's that have names of these.
 
     Returns:
@@ -92,29 +246,21 @@ def write_report(
 
     Raises:
         InputError: a scenario file has a mistake, or the folder cannot be written.
-        KeyboardInterrupt: the user does not want to wait; runs that are finished are kept.
+        KeyboardInterrupt: the user does not want to wait.
 
     """
     clock = Stopwatch()
     # Built before there are processes that would each build them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
-    kept_runs = KeptRuns(inner_folder(folder, _RUNS), stop_time, kind, force)
-    made = make_studies(ready, inner_folder(folder, _STUDIES), kind, command, force)
+    requests = [request for section in chapters for request in section.runs.values()]
+    requests += [request for claim in CLAIMS for request in claim.runs]
+    requests += [request for effect in EFFECTS for request in effect.runs]
     with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
         with workers() as crew:
-            kept_runs.make(
-                [
-                    *(request for section in chapters for request in section.runs.values()),
-                    *(request for claim in CLAIMS for request in claim.runs),
-                    *(request for effect in EFFECTS for request in effect.runs),
-                ],
-                crew,
-            )
+            kept_runs = KeptRuns(requests, crew, stop_time, kind)
             notes, effects = _draw(chapters, kept_runs, unfinished, crew)
-            held = printed_table.section(all_variants(crew)) if variants else _NO_VARIANTS
-        shown = list(study_sections(made, folder / _STUDIES, unfinished))
-        parts = _text(chapters, kept_runs, notes, effects, command, unfinished, fmus, shown, held)
+        parts = _text(chapters, kept_runs, notes, effects, command, unfinished, fmus)
         body = linked("\n\n".join(parts))
         text = f"{_TITLE}\n\n{linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / _MARKDOWN).write_text(text, encoding="utf-8")
@@ -126,7 +272,6 @@ def write_report(
             "runs": [f"auv-fmu run {label}" for label in kept_runs.labels],
         }
         write_content(unfinished, record)
-    kept_runs.forget_others()
     return folder / _PAGE, folder / _MARKDOWN
 
 
@@ -158,14 +303,12 @@ def _text(
     command: Sequence[str],
     folder: Path,
     fmus: Path,
-    shown: Sequence[str],
-    held: str,
 ) -> Iterator[str]:
     yield "## Every printed number and claim"
     yield _claims(kept_runs)
     yield _WHY_NUMBERS_DIFFER
     yield "## The printed table against every reading"
-    yield held
+    yield _NO_VARIANTS
     yield "## Figures"
     for section in chapters:
         yield from section_text(section, kept_runs, notes[section.name], folder)
@@ -174,8 +317,6 @@ def _text(
         yield f"### {effect.title}"
         yield effects[effect.name]
         yield "\n".join(f"- `auv-fmu run {kept_runs.label(request)}`" for request in effect.runs)
-    yield "## Studies of many vehicles"
-    yield from shown
     yield "## Gain conditions"
     yield f"`auv-fmu gains`:\n\n```\n{gain_check(closed_loop(fmus))}\n```"
     yield "## What is wrong in the paper"
@@ -205,7 +346,7 @@ def _claims(kept_runs: KeptRuns) -> str:
 
 
 def counted(verdicts: Sequence[str]) -> str:
-    """How many verdicts there are of each kind, in a sentence."""
+    """Count the verdicts of each kind, in a sentence."""
     agree, differ = (sum(v.startswith(kind) for v in verdicts) for kind in ("agrees", "**"))
     text = f"Of {len(verdicts)} printed numbers and claims, {agree} agree and {differ} do not"
     rest = len(verdicts) - agree - differ

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from auv_fmu.paper.euler import STEP
 from orchestrator.cosim.experiment import (
@@ -33,14 +34,10 @@ from orchestrator.runs.scenario import (
     read_events,
     read_inputs,
     read_scenario,
-    role_of,
     shared_events,
 )
-from orchestrator.runs.wiring import closed_loop, component_of, read_wiring
-from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
-
-#: The components that a comparison exchanges, and keeps.
-CONTROLLER, PLANNER = STANDARD.controller, STANDARD.planner
+from orchestrator.runs.wiring import closed_loop, read_wiring
+from orchestrator.vehicle.signals import Loop, loops_of
 
 #: Communication step of the paper [s], for systems that name none.
 DEFAULT_STEP = STEP
@@ -179,123 +176,48 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
-    """A scenario, and the one it is compared with, if there is one.
+    """Prepare the run that a scenario is compared with, too, if there is one.
 
-    Settings of the scenario and of the user apply to both, where both have them. The companion
-    keeps its controller, and follows the reference of the scenario.
+    It is the scenario but for the entries of `[compare]`. All other settings of the scenario and of
+    the user apply to both runs, where both have such a port.
 
     Raises:
         InputError: something about the request cannot be done for the companion.
 
     """
-    scenario = prepared.scenario
-    if not scenario.compare:
+    scenario, difference = prepared.scenario, prepared.scenario.compare
+    if difference is None:
         return [prepared]
-    companion, system = load_scenario(scenario.compare, request.kind)
-    if scenario.digest and companion.digest:
-        companion, system = _beside(scenario, prepared.system, companion, system, request.kind)
-    inputs = scenario.inputs or companion.inputs
-    followed = {system.named(PortName.read(name)) for name in inputs.names} if inputs else ()
-    given = prepared.system.expanded(request.parameters)
-    shared = {
-        target: value
-        for target, value in {**scenario.parameters, **given}.items()
-        if system.has(target) and system.named(target) not in followed
-    }
-    steps = {
-        name: step
-        for name, step in {**scenario.steps, **request.steps}.items()
-        if name in system.components
-    }
-    own = companion.events if request.events is None else ()
-    same = replace(
-        companion,
-        stop_time=scenario.stop_time,
-        step=scenario.step,
-        order=scenario.order,
-        coupling=scenario.coupling,
-        events=shared_events(own or scenario.events, system, followed),
-        inputs=inputs,
-    )
-    wanted = replace(request, parameters=shared, steps=steps, events=None, inputs=None)
-    return [prepared, prepare(same, system, wanted)]
-
-
-def _beside(
-    scenario: Scenario, system: System, companion: Scenario, other: System, kind: str
-) -> tuple[Scenario, System]:
-    """A companion in the surroundings of a scenario, whose controllers are compared.
-
-    Where both have the same controller, something else is compared, and only the reference is
-    the scenario's.
-
-    Args:
-        scenario: that it is compared with.
-        system: of the scenario.
-        companion: as its file has it.
-        other: of the companion.
-        kind: of the bundle's FMUs.
-
-    """
-    if scenario.vehicles != companion.vehicles:
-        raise InputError(
-            f"{scenario.name}: compare = {companion.name!r}: write the same number of vehicles in "
-            f"both, not {scenario.vehicles or 'none'} and {companion.vehicles or 'none'}"
-        )
-    standard = read_wiring(scenario.vehicles)["components"]
-    ours, theirs = ({**standard, **one.components} for one in (scenario, companion))
-    controllers = {name for name in (*ours, *theirs) if role_of(name) == CONTROLLER}
-    # What is outside of all vehicles leads them.
-    planners = {
-        name
-        for name in (*ours, *theirs)
-        if role_of(name) == PLANNER or (scenario.vehicles and role_of(name) == name)
-    }
-    is_compared = any(ours.get(name) != theirs.get(name) for name in controllers)
-    shared = ours.keys() - controllers if is_compared else ours.keys() & planners
-
-    def is_taken(target: str, source: str | bool) -> bool:
-        if component_of(target, ours) not in shared:
-            return False
-        start = component_of(source, ours) if isinstance(source, str) else None
-        if start is None or start in shared:
-            return True
-        there = other.components.get(start)
-        group = f"{str(source)[len(start) + 1 :]}."
-        return there is not None and any(v.startswith(group) for v in there.variables)
-
+    standard = read_wiring(scenario.vehicles)["wires"]
     wires = {
         target: source
-        for target, source in companion.wires.items()
-        if component_of(target, theirs) not in planners
+        for target, source in {**scenario.wires, **difference.wires}.items()
+        # A wire of the scenario's own is removed by not being there.
+        if source is not False or target in standard or target not in scenario.wires
     }
-    wires |= {
-        target: source for target, source in scenario.wires.items() if is_taken(target, source)
-    }
-    only, given = companion.only, companion.parameters
-    if is_compared and not controllers.isdisjoint(scenario.only):
-        only = [*scenario.only, *(name for name in theirs if name not in ours)]
     companion = replace(
-        companion,
-        components={
-            **{name: fmu for name, fmu in theirs.items() if name in ours or name not in planners},
-            **{name: ours[name] for name in shared},
-        },
+        scenario,
+        name=difference.name,
+        label=difference.label,
+        title=f"{scenario.title or scenario.name} ({difference.label or difference.name})",
+        compare=None,
+        components={**scenario.components, **difference.components},
         wires=wires,
-        only=only,
+        only=scenario.only and [*scenario.only, *difference.components],
         parameters={},
     )
-    new = closed_loop(current_fmus(kind), companion)
-    fed = {connection.target for connection in new.connections}
-    values = {
-        name: system.value(name) if is_planned else value
-        for name, value in given.items()
-        for is_planned in [new.named(name).component in planners]
-        if new.has(name) and (system.has(name) or not is_planned) and new.named(name) not in fed
-    }
-    steps = {
-        name: step
-        for name, step in companion.steps.items()
-        if name in new.components and name not in planners
-    }
-    return replace(companion, parameters=values), replace(new.with_parameters(values), steps=steps)
+    system = closed_loop(current_fmus(request.kind), companion)
+    fed = {connection.target for connection in system.connections}
+
+    def shared(values: Mapping[PortName, Any]) -> dict[PortName, Any]:
+        return {
+            name: value
+            for name, value in values.items()
+            if system.has(name) and system.named(name) not in fed
+        }
+
+    values = {**shared(scenario.parameters), **system.expanded(difference.parameters)}
+    companion = replace(companion, parameters=values, events=shared_events(scenario.events, system))
+    given = shared(prepared.system.expanded(request.parameters))
+    wanted = replace(request, parameters=given, events=None, inputs=None)
+    return [prepared, prepare(companion, system.with_parameters(values), wanted)]

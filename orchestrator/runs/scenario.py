@@ -159,6 +159,17 @@ def _stand_in(name: str, variable: Variable, strings: StringTable, value: object
 
 
 @dataclass(frozen=True)
+class Difference:
+    """The entries of `[compare]`: how a second run differs from its scenario."""
+
+    name: str
+    label: str = ""
+    components: Mapping[str, str | bool] = field(default_factory=dict)
+    wires: Mapping[str, str | bool] = field(default_factory=dict)
+    parameters: Mapping[PortName, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
 class Scenario:
     """A system to run and how to show it; :mod:`.scenario_file` explains each entry.
 
@@ -173,7 +184,7 @@ class Scenario:
     label: str = ""
     figure: str = "tracking"
     z_up: bool = False
-    compare: str = ""
+    compare: Difference | None = None
     stop_time: float | None = None
     step: float | None = None
     steps: Mapping[str, float] = field(default_factory=dict)
@@ -244,36 +255,48 @@ def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
 def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
+    if isinstance(compared := content.get("compare"), str):
+        raise InputError(
+            f"{path}: compare = {compared!r}: write as a table what differs from this scenario, "
+            f'such as {{ name = "{path.stem}-pd", components.controller = "PdController", '
+            'wires."controller.dy" = "plant.dy" }'
+        )
     ScenarioFile.check(path, content)
-    content["parameters"] = {
-        PortName.read(key): value
-        for key, value in flatten(content.get("parameters", {}), System.is_spread)
-    }
     vehicles = vehicle_names(content.get("vehicles"))
-    for key in content.keys() & {"components", "wires", "steps"}:
-        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
+    _read_system(content, path.parent, vehicles)
+    if "compare" in content:
+        _read_system(content["compare"], path.parent, vehicles)
+        content["compare"] = Difference(**content["compare"])
     for key in content.keys() & {"order", "only"}:
         if isinstance(content[key], list):
             listed = dict.fromkeys(content[key])
             content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
     if "path" in content:
-        table = content.pop("path")
-        component = table.get("component", STANDARD.planner)
-        waypoints = path_parameters(path.parent / table["file"], component)
-        for name in waypoints.keys() & content["parameters"].keys():
-            raise InputError(f"{path}: {name} is already given by {table['file']}")
-        content["parameters"] |= waypoints
+        waypoints = content.pop("path")
+        component = waypoints.get("component", STANDARD.planner)
+        parameters = path_parameters(path.parent / waypoints["file"], component)
+        for name in parameters.keys() & content["parameters"].keys():
+            raise InputError(f"{path}: {name} is already given by {waypoints['file']}")
+        content["parameters"] |= parameters
     if "inputs" in content:
         table = content["inputs"]
         content["inputs"] = Inputs(**table | {"file": path.parent / table["file"]})
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
+    return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
+
+
+def _read_system(content: dict[str, Any], folder: Path, vehicles: Sequence[str]) -> None:
+    """Replace the entries about the system by what they mean, for each vehicle."""
+    content["parameters"] = {
+        PortName.read(key): value
+        for key, value in flatten(content.get("parameters", {}), System.is_spread)
+    }
+    for key in content.keys() & {"components", "wires", "steps"}:
+        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
     content["components"] = {
-        component: str(path.parent / fmu) if str(fmu).endswith(".fmu") else fmu
+        component: str(folder / fmu) if str(fmu).endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
     }
-    if content.get("compare", "").endswith(".toml"):
-        content["compare"] = str(path.parent / content["compare"])
-    return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
 def read_inputs(
@@ -488,13 +511,13 @@ def read_events(
 
 
 def shared_events(
-    tables: Sequence[Mapping[str, Any]], system: System, followed: Collection[PortName] = ()
+    tables: Sequence[Mapping[str, Any]], system: System
 ) -> tuple[Mapping[str, Any], ...]:
-    """The events that can happen to another system as well; arguments as of :func:`read_events`."""
+    """The events of a scenario that can happen to another system as well."""
 
     def can_happen(table: Mapping[str, Any]) -> bool:
         try:
-            _event(table, system, followed)
+            _event(table, system, ())
         except InputError:
             return False
         return True

@@ -102,6 +102,19 @@ class EventTable(TomlTable):
         return self
 
 
+class CompareTable(TomlTable):
+    """A second run, which differs from the scenario in what is written here: `[compare]`."""
+
+    name: str = needed("Name of the second run, and of its folder.", '"mine-pd"')
+    label: str = entry("Name of its lines.", "its name")
+    components: dict[str, Name] = entry("Other FMUs, as in the scenario.", "the same")
+    wires: dict[str, Name | Literal[False]] = entry("Other wires, as in the scenario.", "the same")
+    parameters: dict[str, Any] = entry(
+        "Other parameters, as in the scenario; those of the command line win over them.",
+        "the same, where its components have them",
+    )
+
+
 class ScenarioFile(TomlTable):
     """A scenario of auv-fmu."""
 
@@ -116,14 +129,8 @@ class ScenarioFile(TomlTable):
         "Whether the path is drawn with z up and y west, as in the paper's words (reading 16).",
         "`false`: z is down and y east",
     )
-    compare: str = entry(
-        "A scenario that is run and drawn together with this one: a name, or the path of a .toml "
-        "file, relative to this one. It keeps its controller. Other components, the wires between "
-        "them, `[path]` and the parameters of the planner are this scenario's, so that both follow "
-        "one reference. Other settings of this scenario and of the command line apply to both "
-        "runs, where both have such a parameter. If both have the same controller, it keeps all "
-        "components except the planner.",
-        "none",
+    compare: CompareTable = entry(
+        "A second run that is drawn together with this one: [see below](#compare).", "none"
     )
     stop_time: float = entry("End of the run [s].", "100 s")
     step: float = entry("Communication step [s].", "the default of the FMUs; 0.02 s in the bundle")

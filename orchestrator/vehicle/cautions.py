@@ -21,8 +21,6 @@ from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
-from orchestrator.machine.errors import listed
-from orchestrator.machine.texts import literal
 from orchestrator.vehicle.index import largest_bound, vertical_passed
 from orchestrator.vehicle.reduction import Reduction, reductions_of
 from orchestrator.vehicle.signals import (
@@ -226,7 +224,7 @@ def cautions_seen(
 def cautions_beside(
     table: Table, name: str, other: Table, loops: Sequence[Loop] = (STANDARD,)
 ) -> list[str]:
-    """What a run has shown beside the one that it is compared with, in lines for the user.
+    """Lines for the user about references that differ from those of the compared run.
 
     Args:
         table: of the run.
@@ -235,31 +233,7 @@ def cautions_beside(
         loops: that both have.
 
     """
-    references = (line for loop in loops for line in _of_the_reference(table, name, other, loop))
-    return [*references, *_of_the_surroundings(table, name, other, loops)]
-
-
-def _of_the_surroundings(
-    table: Table, name: str, other: Table, loops: Sequence[Loop]
-) -> Iterator[str]:
-    """Which parameters differ, besides those of the controllers that are compared."""
-    controllers = {loop.controller for loop in loops}
-    ours, theirs = (
-        {port for port in one.parameters if port.component in controllers} for one in (table, other)
-    )
-    if ours == theirs:
-        # Something else is compared.
-        return
-    differing = [
-        f"{port} = {literal(value)}, not {literal(other.parameters[port])}"
-        for port, value in table.parameters.items()
-        if port not in ours and other.parameters.get(port, value) != value
-    ]
-    if differing:
-        yield (
-            f"its parameters are not {name}'s: {listed(differing, '; ')}; a value that {name} sets "
-            "applies to both"
-        )
+    return [line for loop in loops for line in _of_the_reference(table, name, other, loop)]
 
 
 def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list[str]:

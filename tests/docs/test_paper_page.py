@@ -17,7 +17,7 @@ from auv_fmu.paper.output_feedback import Gains, Measurement
 from auv_fmu.paper.pd import PdGains
 from auv_fmu.paper.vehicle import Vehicle, accelerations
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from orchestrator.paper.measures import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
+from orchestrator.paper.claims import EFFORT_PD, EFFORT_PROPOSED, TURNING_RADIUS, sum_without_step
 from orchestrator.paper.page import errata, readings
 from orchestrator.runs.wiring import closed_loop as loop_of
 from orchestrator.vehicle.proof import gain_check, stated, theorem_of

@@ -19,7 +19,7 @@ from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import theorem
 from orchestrator import simulate
-from orchestrator.paper.measures import (
+from orchestrator.paper.claims import (
     EFFORT_PD,
     EFFORT_PROPOSED,
     FINAL_ERROR_PD,

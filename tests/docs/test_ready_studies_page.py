@@ -40,7 +40,7 @@ def test_every_scenario_has_a_picture_and_nothing_else_has():
 def test_numbers_are_read_off_columns_that_runs_have(name):
     pandas = pytest.importorskip("pandas", reason="needs the extra `docs`")
     pytest.importorskip("scipy", reason="needs the extra `studies`")
-    tool = import_module("study_numbers")
+    tool = import_module("page_numbers")
     study = read_study(name)
     _, system = load_scenario(study.scenario[0])
     row = dict.fromkeys((*study.varied, *index_columns(loops_of(system))), 1.0) | {

@@ -18,11 +18,26 @@ from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system.structure import System
 from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.preparation import Prepared, prepare, prepare_request, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.indices import metrics_of
+
+#: The second run of a scenario with the paper's controller, as its file has it.
+PD = """
+[compare]
+name = "pd"
+label = "PD"
+components.controller = "PdController"
+wires."controller.dy" = "plant.dy"
+"""
+
+
+def companion(scenario: str) -> Prepared:
+    """The run that a scenario is compared with, of native FMUs."""
+    request = Request(scenario, kind="native")
+    return with_companion(prepare_request(request), request)[1]
 
 
 class InThisProcess:

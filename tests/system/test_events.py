@@ -26,6 +26,7 @@ from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import tracking_error
+from support.runs import PD
 from support.texts import mentions
 
 H = 0.02
@@ -239,10 +240,10 @@ def test_friction_acts_against_the_velocity_through_the_water(tmp_path):
 
 def test_what_happens_is_said_recorded_and_kept(workplace: Path, capsys):
     Path("mine.toml").write_text(
-        'compare = "fig5-pd"\nfigure = "overlay"\nstop_time = 1.0\n'
+        'figure = "overlay"\nstop_time = 1.0\n'
         '[[events]]\nat = 0.3\nfor = 0.2\nlose = "controller.tau.r"\nlabel = "no yaw"\n'
         "[[events]]\nat = 0.4\nset = { controller.k_d = 60.0 }\n"
-        '[[events]]\nwhen = "plant.eta.z > 100"\nstop = true\n'
+        '[[events]]\nwhen = "plant.eta.z > 100"\nstop = true\n' + PD
     )
     assert main(["run", "mine.toml", "--kind", "native", "--out", "out"]) == 0
     said = capsys.readouterr().err.splitlines()
@@ -253,7 +254,7 @@ def test_what_happens_is_said_recorded_and_kept(workplace: Path, capsys):
     assert [line for line in said if "t = 0.4 s" in line] == [
         "auv-fmu: mine: t = 0.4 s: set controller.k_d = 60"
     ]
-    assert "auv-fmu: fig5-pd: t = 0.3 s: lose controller.tau.r (no yaw)" in said
+    assert "auv-fmu: pd: t = 0.3 s: lose controller.tau.r (no yaw)" in said
     events = json.loads(Path("out/run.json").read_text())["events"]
     assert [(e["time"], e["label"]) for e in events] == [
         (0.3, "no yaw"), (0.4, "set controller.k_d = 60"), (0.5, ""),

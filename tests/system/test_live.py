@@ -356,7 +356,7 @@ def test_refusal_is_the_line_of_the_fmu_and_changes_nothing(parts: Parts):
     ("preset", "events", "changes"),
     [
         ("fig4", [], {"controller.k_d": 25.0, "plant.noise.seed": 3}),
-        ("path-pd", [], {"plant.ell": 0.4}),
+        ("fig5-pd", [], {"plant.ell": 0.4}),
         ("fault-thruster", ["--events", "fault-thruster"], {"controller.eps_t": 5.0}),
     ],
 )
@@ -415,7 +415,7 @@ def test_page_opens_a_file_of_the_users(tmp_path, opened: Browser):
 
 
 def test_loops_with_the_same_controller_are_told_apart_by_their_scenarios(tmp_path):
-    (tmp_path / "mine.toml").write_text('compare = "fig4"\n')
+    (tmp_path / "mine.toml").write_text('compare = { name = "fig4" }\n')
     assert [one["label"] for one in preset(str(tmp_path / "mine.toml"))[0]["loops"]] == [
         "mine",
         "fig4",
@@ -446,7 +446,7 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ("stop_time = 1e6\n", "more than 200,000 steps"),
         ('coupling = "linear"\n', "linear"),
         ("[parameters]\nplant.m11 = -1.0\n", "m11 = -1"),
-        ('compare = "fig4"\n[components]\ntow = "AuvPlant"\n', "another number of vehicles"),
+        ('compare = { name = "two", components.tow = "AuvPlant" }\n', "another number of vehicles"),
         ("vehicles = 11\n", "more than 10 vehicles"),
         ("vehicles = 2\nstop_time = 2001.0\n", "more than 100,000 steps"),
     ],

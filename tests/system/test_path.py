@@ -10,6 +10,7 @@ import pytest
 
 from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import Waypoints
+from orchestrator import load
 from orchestrator.commands.main import main
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.names import PortName
@@ -19,7 +20,7 @@ from orchestrator.runs.scenario import impossible_paths, read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.signals import tracking_error
 from support.archives import fmu, variable
-from support.runs import run
+from support.runs import companion, run
 from support.texts import mentions
 
 #: Near the default path, at times: straight ahead, a rest, and a turn to starboard.
@@ -29,13 +30,13 @@ TABLE = "t,x,y,z\n3,3,6,0\n23,13,6,2\n33,13,6,2\n60,13,16,2\n"
 @pytest.mark.parametrize("seed", [1, 2, 3, 4])
 @pytest.mark.parametrize(
     ("name", "distances", "peaks"),
-    [("path", (0.65, 0.32), (43.0, 56.0)), ("path-pd", (0.84, 0.41), (28.9, 29.1))],
+    [("path", (0.65, 0.32), (43.0, 56.0)), ("companion", (0.84, 0.41), (28.9, 29.1))],
 )
 def test_controllers_follow_the_survey_as_its_remark_says(
     native: Path, name: str, distances, peaks, seed: int
 ):
     """In the first pair of corners, and in the second; peaks of all of 1,000 draws."""
-    system = closed_loop(native, read_scenario(name))
+    system = companion("path").system if name == "companion" else load("path", "native")
     noise = {PortName("plant", "noise.seed"): seed}
     result = run(system.with_parameters(noise), 100.0, 0.02, loop="compiled")
     assert result.failure is None

@@ -15,11 +15,8 @@ from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.page import errata
 from orchestrator.paper.report import write_report
-from orchestrator.paper.sections import make_studies, study_sections
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.studies.study import ready_studies
 from orchestrator.vehicle.proof import gain_check
-from support.variants import found, planted
 
 pytestmark = pytest.mark.slow
 
@@ -40,26 +37,6 @@ controller.k_d = "all of it"
 
 SCENARIOS = ("fig3a", "fig4")
 
-STUDY = """\
-title = "Many | of mine"
-scenario = "fig4"
-stop_time = 0.1
-remark = "What they **show**."
-
-[vary]
-controller.k_d = [10.0, 20.0]
-
-[figures.gain]
-kind = "bands"
-x = "controller.k_d"
-show = "peak_command.u"
-
-[figures.nothing]
-kind = "bands"
-x = "controller.k_d"
-show = "time_to_reach"
-"""
-
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory, dist: Path) -> Path:
@@ -70,11 +47,7 @@ def folder(tmp_path_factory, dist: Path) -> Path:
     (theirs / "lost.toml").write_text(STRANGER.replace("mine.fmu", "lost.fmu"))
     report = tmp_path_factory.mktemp("report")
     files = [str(theirs / f"{name}.toml") for name in ("stranger", "lost")]
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("orchestrator.paper.report.all_variants", lambda crew: found(planted()))
-        write_report(
-            report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0, variants=True
-        )
+    write_report(report, [*SCENARIOS, *files], ["auv-fmu", "report"], stop_time=1.0)
     return report
 
 
@@ -107,12 +80,6 @@ def test_the_verdicts_are_counted(text):
     agree = [verdict for verdict in verdicts if verdict.startswith("agrees")]
     found = len(verdicts), len(agree), sum(verdict.startswith("**") for verdict in verdicts)
     assert tuple(map(int, line)) == found
-
-
-def test_the_printed_table_stands_beside_every_reading(text):
-    """Ours is twice what is printed."""
-    assert "\n## The printed table against every reading\n" in text
-    assert "\n| proposed effort u | 130 | 260 |" in text
 
 
 def test_the_stranger_is_in_the_report(folder, text, page):
@@ -158,45 +125,17 @@ def test_the_record_names_runs_and_files(folder, text):
     assert record["versions"].keys() >= {"python", "auv-fmu", "numpy"}
 
 
-def test_runs_are_kept_for_the_next_report(folder):
-    """As many as differ: of the scenarios and of what claims and effects name."""
-    runs = {run.label for each in (*CLAIMS, *EFFECTS) for run in each.runs}
-    # Fig. 4 with 1 mm of noise is Fig. 4 itself, under two labels; Fig. 3(a) and the stranger are
-    # further runs.
-    assert len(list((folder / "runs").glob("*.npz"))) == len(runs) - 1 + 2
-    assert not list(folder.glob(".auv-fmu-*"))
-
-
-def test_studies_are_in_the_report_and_kept_for_the_next(folder, tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    (tmp_path / "many.toml").write_text(STUDY)
-    [study] = make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
-    text = "\n\n".join(study_sections([study], tmp_path / "kept", tmp_path))
-    assert "### Many \\| of mine\n" in text
-    assert "What they **show**." in text
-    [picture] = re.findall(r"\]\((figures/[^)]+)\)\]", text)
-    assert (tmp_path / picture).is_file()
-    before = (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns
-    make_studies([str(tmp_path / "many.toml")], tmp_path / "kept", "python", ["me"])
-    assert (tmp_path / "kept/many/runs.parquet").stat().st_mtime_ns == before
-
-
-def test_a_report_without_studies_says_how_they_are_made(text):
-    [line] = [line for line in text.splitlines() if "report --studies" in line]
-    assert all(name in line for name in ready_studies())
-
-
 def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
     asked = []
 
     def write_report(*arguments: object, **options: object) -> tuple[Path, Path]:
-        assert options == {"kind": "auto", "ready": (), "variants": False, "force": False}
+        assert options == {"kind": "auto", "force": False}
         asked.append(arguments)
         return Path("a"), Path("b")
 
     monkeypatch.setattr(many_runs, "write_report", write_report)
     assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
     [(folder, scenarios, command)] = asked
-    assert (folder, scenarios[-2:]) == (tmp_path, ["sea-pd", "mine.toml"])
+    assert (folder, scenarios[-2:]) == (tmp_path, ["sea", "mine.toml"])
     assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
     assert capsys.readouterr().out == "a\nb\n"

@@ -11,7 +11,7 @@ import pytest
 
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName
-from orchestrator.paper.measures import (
+from orchestrator.paper.claims import (
     EFFORT_PD,
     EFFORT_PROPOSED,
     TURNING_RADIUS,
@@ -62,9 +62,7 @@ def test_all_figures_are_there():
     figures = ["3a", "3b", "4", "5", "5-pd", "6", "6-pd", "7a", "7b", "7c"]
     others = [
         "current-step", "fault-sensor", "fault-thruster", "formation-change",
-        "formation-lost-link", "formation-lost-link-pd", "formation-pd", "formation-v", "path",
-        "path-pd", "remus",
-        "remus-pd", "sea", "sea-pd",
+        "formation-lost-link", "formation-v", "path", "remus", "remus-pd", "sea",
     ]  # fmt: skip
     assert names() == sorted([*(f"fig{name}" for name in figures), *others])
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.runs.scenario import read_scenario
-from seed_numbers import over_seeds
+from page_numbers import over_seeds
 from support.tiers import slow
 
 #: Medians over seeds, and what 5 % and 95 % are below, by scenario, controller (PD or not) and

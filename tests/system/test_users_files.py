@@ -55,8 +55,9 @@ def test_a_file_with_the_name_of_a_checkpoints_is_refused_before_the_first_step(
 @pytest.mark.parametrize("stem", ["..", ".", "incomplete", ".whole", "checkpoint", "result.csv"])
 def test_a_companion_of_any_name_has_a_folder_of_its_own(stem):
     mine = put("r/data.csv", "r/thesis/a.tex", "r/.git/HEAD", "letter")
-    Path(f"{stem}.toml").write_text("[parameters]\nplant.m11 = 26.0\n")
-    Path("both.toml").write_text(f'compare = "{stem}.toml"\nstop_time = 0.2\n')
+    Path("both.toml").write_text(
+        f'stop_time = 0.2\n[compare]\nname = "{stem}"\nparameters.plant.m11 = 26.0\n'
+    )
     options = ["--set", "plant.noise.std=0", "--checkpoint-every", "0.1"]
     assert main(["run", "both.toml", "--no-figures", "--out", "r", *options]) == 0
     found = contents(Path())
@@ -123,14 +124,13 @@ def test_what_the_user_changed_is_the_users(capsys):
     ("name", "command"),
     [
         ("checkpoint", [*RUN, "--checkpoint-every", "0.1"]),
-        ("runs", ["report", "--out", "r"]),
         ("fig3b", ["run", "both.toml", "--no-figures", "--out", "r"]),
     ],
 )
 def test_a_folder_that_is_a_link_is_refused(name, command, capsys):
     """It may lead out of the folder."""
     mine = put("home/letter", "r/notes")
-    Path("both.toml").write_text('compare = "fig3b"\nstop_time = 0.2\n')
+    Path("both.toml").write_text('compare = { name = "fig3b" }\nstop_time = 0.2\n')
     Path("r", name).symlink_to("../home")
     assert main(command) == 2
     assert f"r/{name}" in capsys.readouterr().err

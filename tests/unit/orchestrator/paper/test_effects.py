@@ -14,10 +14,10 @@ from support.texts import tells
 
 
 @pytest.fixture(scope="module")
-def tables(tmp_path_factory) -> dict[str, list[Table]]:
+def tables() -> dict[str, list[Table]]:
     """Of some steps of the runs of each effect."""
-    kept_runs = KeptRuns(tmp_path_factory.mktemp("runs"), stop_time=0.2)
-    kept_runs.make([run for effect in EFFECTS for run in effect.runs], InThisProcess())
+    runs = [run for effect in EFFECTS for run in effect.runs]
+    kept_runs = KeptRuns(runs, InThisProcess(), stop_time=0.2)
     return {effect.name: [kept_runs[run].table for run in effect.runs] for effect in EFFECTS}
 
 
@@ -63,7 +63,7 @@ def test_names_are_apart():
 )
 def test_the_text_tells_the_numbers(tables, name, metrics, told):
     [effect] = [effect for effect in EFFECTS if effect.name == name]
-    assert tells(effect.show(*made(tables[name], *metrics)).text, *told)
+    assert tells(effect.show(*made(tables[name], *metrics))[0], *told)
 
 
 def test_step(tables):
@@ -71,9 +71,9 @@ def test_step(tables):
     proposed = [{"l2_effort": (100.0 - 5.0 * (i > 0), 1.0, 2.0)} for i in range(len(STEPS))]
     pd = [{"l2_effort": (9.0, 8.0 - i, 7.0)} for i in range(len(STEPS))]
     exact = {"l2_effort": (9.0, 4.25, 7.0)}
-    shown = effects.step(*made(tables["effect-step"], *proposed, *pd, exact))
-    assert tells(shown.text, (4.25, 20), (8, 7, 6, 5), (5,))
-    [line, *_] = shown.figure.axes[0].lines
+    text, figure = effects.step(*made(tables["effect-step"], *proposed, *pd, exact))
+    assert tells(text, (4.25, 20), (8, 7, 6, 5), (5,))
+    [line, *_] = figure.axes[0].lines
     assert dict(zip(*line.get_data(), strict=True)) == {
         0.02: 100.0,
         0.01: 95.0,
@@ -88,9 +88,9 @@ def test_noise(tables):
         values = tuple(level * 1e3 * np.ones(3) + 1e-9)
         return {"l2_effort": values, "peak_command": values, "saturated_fraction": (0.0, level, 0)}
 
-    shown = effects.noise(*made(tables["effect-noise"], *map(metrics, NOISE_LEVELS)))
-    assert tells(shown.text, (1, 1, 1, 1, 10, 10, 10, 1)), "1 cm, and 1 % of the steps"
-    [line, *_] = shown.figure.axes[0].lines
+    text, figure = effects.noise(*made(tables["effect-noise"], *map(metrics, NOISE_LEVELS)))
+    assert tells(text, (1, 1, 1, 1, 10, 10, 10, 1)), "1 cm, and 1 % of the steps"
+    [line, *_] = figure.axes[0].lines
     np.testing.assert_allclose(line.get_xdata(), line.get_ydata(), atol=1e-8)
 
 
@@ -104,15 +104,15 @@ def test_condition_30(tables):
         }
         for value in LAMBDAS
     ]
-    shown = effects.condition_30(*made(tables["effect-lambda"], *runs))
-    assert tells(shown.text, (10, 1, 1, 1, 21, 2.1), (2.1, 1, 1, 1, 0.476))
-    [line, *_] = shown.figure.axes[0].lines
+    text, figure = effects.condition_30(*made(tables["effect-lambda"], *runs))
+    assert tells(text, (10, 1, 1, 1, 21, 2.1), (2.1, 1, 1, 1, 0.476))
+    [line, *_] = figure.axes[0].lines
     np.testing.assert_allclose(line.get_ydata(), 10.0 * line.get_xdata())
 
 
 def test_certificates(tables):
     [table] = tables["certificates"]
-    figure = effects.certificates_along_a_run(KeptRun({}, table)).figure
+    figure = effects.certificates_along_a_run(KeptRun({}, table))[1]
     # An instant a step: at t = 0 the command is away from its limit by 80 less what it is.
     u, *_ = figure.axes[2].lines
     assert len(u.get_xdata()) == len(table) - 1

@@ -45,12 +45,6 @@ def test_contents_link_to_what_is_there(tmp_path):
     assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
 
 
-def test_cells_know_their_columns(tmp_path):
-    text = "# T\n\n" + table(["a", "b `c`"], [["1", "2"], ["3", "4"]])
-    found = re.findall(r'<td data-name="([^"]*)">(\d)</td>', html(text, tmp_path))
-    assert found == [("a", "1"), ("b `c`", "2"), ("a", "3"), ("b `c`", "4")]
-
-
 def test_pictures_are_within_the_page_and_lead_to_their_files(tmp_path):
     (tmp_path / "a.png").write_bytes(b"pixels")
     page = html("# T\n\n" + picture("one", "a.png"), tmp_path)

@@ -21,6 +21,7 @@ from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
+    Difference,
     Inputs,
     Scenario,
     check_events,
@@ -38,7 +39,6 @@ TEXT = """
 title = "Mine"
 stop_time = 3
 only = ["plant"]
-compare = "other.toml"
 [components]
 controller = "own/mine.fmu"
 plant = "AuvPlant"
@@ -49,6 +49,10 @@ plant.noise.std = 0.0
 "controller.K1[1]" = 12.0
 [ours]
 plant.noise.std = "no sensor"
+[compare]
+name = "heavy"
+components.plant = "own/heavy.fmu"
+parameters.plant.m11 = 30.0
 """
 
 U = PortName.read("plant.tau.u")
@@ -62,7 +66,11 @@ def read(folder: Path, text: str) -> Scenario:
 def test_entries_are_read_and_paths_are_relative_to_the_file(tmp_path: Path):
     found = read(tmp_path, TEXT)
     assert (found.name, found.stem, found.title, found.stop_time) == ("mine", "mine", "Mine", 3)
-    assert found.compare == str(tmp_path / "other.toml")
+    assert found.compare == Difference(
+        "heavy",
+        components={"plant": str(tmp_path / "own/heavy.fmu")},
+        parameters={PortName.read("plant.m11"): 30.0},
+    )
     assert found.components == {
         "controller": str(tmp_path / "own/mine.fmu"), "plant": "AuvPlant",
     }  # fmt: skip

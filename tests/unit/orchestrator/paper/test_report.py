@@ -8,8 +8,8 @@ import pytest
 
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.names import PortName
-from orchestrator.paper.kept_runs import KeptRun
-from orchestrator.paper.sections import draw_section, section_text, sections
+from orchestrator.paper.kept_runs import Companion, KeptRun
+from orchestrator.paper.report import draw_section, section_text, sections
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 
@@ -50,7 +50,7 @@ def test_a_scenario_is_drawn_with_its_companion_or_its_twin_without_noise():
         "with noise": Request("fig4"),
         "without noise": Request("fig4", {"plant.noise.std": 0.0}),
     }
-    assert runs["fig5"] == {"proposed": Request("fig5"), "PD": Request("fig5-pd")}
+    assert runs["fig5"] == {"proposed": Request("fig5"), "PD": Companion("fig5")}
     assert runs["fig7a"] == {"fig7a": Request("fig7a")}
 
 
@@ -65,7 +65,8 @@ def test_names_of_strangers_do_not_collide(tmp_path):
 
 
 def test_labels_of_a_comparison_are_apart(tmp_path):
-    [section] = sections([stranger(tmp_path, label='"proposed"', compare='"fig5"')])
+    compare = '{ name = "x", label = "proposed" }'
+    [section] = sections([stranger(tmp_path, label='"proposed"', compare=compare)])
     assert list(section.runs) == ["proposed", "proposed (2)"]
 
 

@@ -7,8 +7,8 @@ import shlex
 
 import pytest
 
-import benchmarks_page
-from benchmarks_page import RESULTS, ROOT, command_of, is_written
+import page_numbers
+from page_numbers import RESULTS, ROOT, benchmarks, command_of, is_written
 from support.markdown import DOCS
 
 PAGE = (DOCS / "reference" / "benchmarks.md").read_text(encoding="utf-8")
@@ -51,9 +51,8 @@ def test_a_script_that_fails_changes_nothing_and_others_run(tmp_path, monkeypatc
     good.write_text("print('2.5 us')\n")
     for script in (bad, good):
         script.with_suffix(".txt").write_text(f"$ python {script}\nonce\n\n0\n")
-    monkeypatch.setattr(benchmarks_page, "RESULTS", tmp_path)
-    monkeypatch.setattr("sys.argv", ["benchmarks_page.py"])
-    assert benchmarks_page.main() == 1
+    monkeypatch.setattr(page_numbers, "RESULTS", tmp_path)
+    assert benchmarks() == 1
     assert bad.with_suffix(".txt").read_text().endswith("once\n\n0\n")
     assert "2.5 us" in good.with_suffix(".txt").read_text()
     assert capsys.readouterr().err == f"bad stays as it is: {bad}: exit status 3\n"

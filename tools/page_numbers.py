@@ -1,0 +1,951 @@
+"""The numbers of pages that take minutes to compute: `python tools/page_numbers.py NAME`.
+
+=============  ====================================================================================
+`accuracy`     the tables of docs/explanation/accuracy.md: what the step does to the scenarios
+`noise`        what 1 mm of noise does: README, reproduction.md, and remarks of scenarios
+`seeds`        what random seas, links and noise do: remarks of scenarios, and the pages on them
+`remus`        docs/explanation/remus.md: changes of `remus` and `remus-pd`, and steady turns
+`networks`     docs/tutorials/your-own-component.md: how far networks are from onnxruntime
+`gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
+`studies`      the numbers below the figures of that page, of studies that were made in FOLDER
+`benchmarks`   runs the commands of the files in benchmarks/results, and writes their output there
+=============  ====================================================================================
+
+Numbers of several draws are medians, with the quantiles of 5 and 95 % of the draws. Numbers of runs
+from several starts are bands from the smallest to the largest.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import date
+from itertools import pairwise, product
+from math import exp, log
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from auv_fmu.loop import closed_loop
+from auv_fmu.loop.closed_loop import LongestSteps, Setting, Vehicles
+from auv_fmu.paper import motion_planner, plant
+from auv_fmu.paper.attitude import normalised, rotation_from_quaternion
+from auv_fmu.paper.euler import STEP
+from auv_fmu.paper.output_feedback import ControllerState
+from auv_fmu.remus.hull import inertia
+from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_forces
+from fmus.ports.port import H_MAX
+from orchestrator import simulate
+from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim.system.structure import System
+from orchestrator.paper.claims import total_variation_until
+from orchestrator.paper.page import numbers, table
+from orchestrator.program.components import definitions_of
+from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.networks import component_text, read_network
+from orchestrator.runs.preparation import prepare_request, with_companion
+from orchestrator.runs.request import Request
+from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.studies.batch_engine import BatchEngine
+from orchestrator.studies.engine import Point
+from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study_result import StudyResult
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE_LABEL, smallest_distances
+from orchestrator.vehicle.signals import (
+    ACTUATORS,
+    AXES,
+    STANDARD,
+    AllocatedLoop,
+    Loop,
+    limits,
+    loops_of,
+    tracking_error,
+    true_control_point,
+)
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "benchmarks" / "results"
+
+Values = Mapping[str, Any]
+STD, SEED = "plant.noise.std", "plant.noise.seed"
+QUIET: Values = {STD: 0.0}
+
+
+# Runs
+
+
+def system_of(name: str) -> System:
+    """The system of a scenario, or of the PD controller beside it: `path-pd` is that of `path`."""
+    if name in names():
+        return load_scenario(name)[1]
+    request = Request(name.removesuffix("-pd"))
+    return with_companion(prepare_request(request), request)[1].system
+
+
+class Runs:
+    """Runs by the batch engine, in steps of 20 ms, until the scenarios' own ends."""
+
+    def __init__(self, *scenarios: str) -> None:
+        """Load the systems."""
+        self.systems = {name: system_of(name) for name in scenarios}
+        self._engine = BatchEngine(self.systems)
+        self._ends = {name: read_scenario(name.removesuffix("-pd")).stop_time for name in scenarios}
+
+    def point(self, name: str, values: Values, step: float, stop_time: float | None) -> Point:
+        """The engine's description of a run."""
+        end = stop_time or self._ends[name] or self.systems[name].stop_time
+        assert end is not None
+        return Point(0, name, values, end, step)
+
+    def table(
+        self, name: str, values: Values, step: float = STEP, stop_time: float | None = None
+    ) -> Table:
+        """All rows of a run."""
+        return self._engine.table(self.point(name, values, step, stop_time))
+
+    def indices(
+        self, name: str, draws: Iterable[Values], step: float = STEP, stop_time: float | None = None
+    ) -> dict[str, np.ndarray]:
+        """The indices of several runs."""
+        points = (self.point(name, values, step, stop_time) for values in draws)
+        found = [outcome.indices for outcome in self._engine.outcomes(points)]
+        return {key: np.array([one[key] for one in found]) for key in found[0]}
+
+    def variation_ratio(self, name: str, until: float, values: Values, step: float = STEP) -> Any:
+        """Total variation of each signal up to a time, PD over proposed."""
+        both = (self.table(one, values, step) for one in (f"{name}-pd", name))
+        return np.divide(*(total_variation_until(made, until) for made in both))
+
+
+def size_of(made: Table, loop: Loop = STANDARD) -> np.ndarray:
+    """Norms of the tracking error, |e|, in all rows [m]."""
+    return np.asarray(np.linalg.norm(tracking_error(made, loop), axis=1))
+
+
+def band(values: Iterable[float], digits: int = 3) -> str:
+    """Median, and what 5 and 95 % stay below."""
+    low, median, high = np.quantile([*values], (0.05, 0.5, 0.95))
+    return f"{median:,.{digits}g} ({low:,.{digits}g} to {high:,.{digits}g})"
+
+
+def show(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table in Markdown."""
+    print(f"\n{table(head, rows)}", flush=True)
+
+
+# What the step does to the scenarios
+
+#: Scenarios; the path of one depends on the last bits of its start, so its numbers are bands.
+SCENARIOS = ("fig4", "fig5", "fig5-pd", "fig6", "fig6-pd", "fig7a", "fig7b", "fig7c")
+CHAOTIC = "fig6-pd"
+REGULAR = [name for name in SCENARIOS if name != CHAOTIC]
+
+#: Smaller steps than the paper's, and one that stands for their limit [s].
+SMALLER, LIMIT = (0.01, 0.005, 0.002), 0.0002
+RK4: Values = {**QUIET, "plant.integrator": "rk4"}
+NO_FRICTION: Values = {**QUIET, "disturbance.A_f": 0.0}
+WAYS: Sequence[tuple[Values, float]] = [*((QUIET, h) for h in (STEP, *SMALLER)), (RK4, STEP)]
+HEADS = [*(f"{1e3 * h:g} ms" for h in (STEP, *SMALLER)), "20 ms, `rk4`"]
+
+#: Indices by the names of the tables: their names in metrics.json, and their parts.
+INDICES = {
+    f"{short} {part}": f"{name}.{part}"
+    for short, name, parts in (
+        ("L2", "l2_effort", ACTUATORS), ("peak", "peak_command", ACTUATORS),
+        ("TV", "total_variation", ACTUATORS), ("e_f", "final_error", AXES),
+    )
+    for part in parts
+}  # fmt: skip
+
+#: What changes by a larger share depends on the step.
+MUCH = 0.05
+
+
+def accuracy() -> None:
+    """Print how paths and indices depend on the step, all without noise."""
+    runs = Runs(*SCENARIOS)
+
+    def path(name: str, values: Values = QUIET, step: float = STEP) -> np.ndarray:
+        return true_control_point(runs.table(name, values, step))[:: round(STEP / step)]
+
+    def y_d(values: Values, step: float) -> np.ndarray:
+        rows = runs.table("fig6", values, step).group(*STANDARD.y_d)
+        return rows[:: round(STEP / step)]
+
+    def starts(name: str) -> list[dict[str, float]]:
+        x = float(runs.table(name, QUIET)["plant.eta.x"][0])
+        return [{"plant.eta0.x": x + 1e-6 * i / 10} for i in range(1, 11)]
+
+    rows = []
+    for name in SCENARIOS:
+        exact, own = path(name, {**RK4, "plant.h_max": STEP / 10}), path(name)
+        moved = max(apart(path(name, {**QUIET, **start}), own) for start in starts(name))
+        rows.append(
+            [f"`{name}`", distances(own, exact), distances(path(name, RK4), exact), length(moved)]
+        )
+    show(["scenario", "`euler`", "`rk4`", "start moved by 1 µm"], rows)
+
+    rows = []
+    for name in REGULAR:
+        for friction, text in ((NO_FRICTION, "0"), (QUIET, "as it is")):
+            limit = path(name, friction, LIMIT)
+            ways = (path(name, {**friction, **values}, h) for values, h in WAYS)
+            rows.append([f"`{name}`", text, *(distances(way, limit) for way in ways)])
+    limit = y_d(QUIET, LIMIT)
+    reference = ["the reference", "", *(distances(y_d(*way), limit) for way in WAYS)]
+    show(["scenario", "`A_f`", *HEADS], [*sorted(rows), reference])
+    for name in ("fig4", "fig5", "fig5-pd"):
+        limit, end = path(name, NO_FRICTION, LIMIT), read_scenario(name).stop_time or 0.0
+        changed = {PortName.read(port): value for port, value in NO_FRICTION.items()}
+        exact = continuous(runs.systems[name].with_parameters(changed), end)
+        split = path(name, {**NO_FRICTION, "controller.h_max": 0.002})
+        print(f"\n`{name}` without friction, from the limit: solve_ivp {distances(exact, limit)}; "
+              f"20 ms with controller.h_max = 2 ms {distances(split, limit)}.")  # fmt: skip
+
+    rows, same = [], []
+    for name in REGULAR:
+        found = [runs.indices(name, [values], h) for values, h in WAYS]
+        for index, column in INDICES.items():
+            values = [float(one[column][0]) for one in found]
+            changes = [abs(value / values[0] - 1.0) for value in values]
+            if max(changes) <= MUCH:
+                same.append(max(changes))
+                continue
+            marks = ["**" * (change > MUCH) for change in changes]
+            cells = [f"{m}{number(v)}{m}" for m, v in zip(marks, values, strict=True)]
+            rows.append([f"`{name}`", index, *cells])
+    show(["scenario", "index", *HEADS], sorted(rows))
+    print(f"\nThe {len(same)} other indices change by {100 * max(same):.1f} % at most.")
+    ends = [
+        runs.indices(CHAOTIC, [{**values, **start} for start in starts(CHAOTIC)], h)
+        for values, h in WAYS
+    ]
+    show(
+        [f"`{CHAOTIC}`", *HEADS],
+        [[index, *(between(one[column]) for one in ends)] for index, column in INDICES.items()],
+    )
+    rows = []
+    for name, until in (("fig5", 100.0), ("fig6", 60.0)):
+        ratios = [runs.variation_ratio(name, until, *way) for way in WAYS]
+        rows += [
+            [f"`{name}`, {until:g} s, {k}", *(number(ratio, 2) for ratio in column)]
+            for k, column in zip(ACTUATORS, np.transpose(ratios), strict=True)
+        ]
+    show(["TV, PD over proposed", *HEADS], rows)
+    free_body()
+
+
+def free_body() -> None:
+    """Energy of a body that nothing drives or brakes, after 20 s over that at the start."""
+    zeros = [*(f"d{i}{i}" for i in range(1, 7)), *(f"tau.{k}" for k in ACTUATORS)]
+    free = {f"plant.{name}": 0.0 for name in (*zeros, "righting.pitch", "righting.roll")}
+    free |= {"plant.nu0.u": 1.0, "plant.nu0.q": 0.3, "plant.nu0.r": 0.5}
+    rows = []
+    for text, values in (
+        ("`euler`, 20 ms", {}),
+        ("`euler`, `h_max` = 2 ms", {"plant.h_max": 0.002}),
+        ("`rk4`, 20 ms", {"plant.integrator": "rk4"}),
+    ):
+        result = simulate("fig3b", {**free, **values}, stop_time=20.0, kind="native")
+        masses = np.array([result.parameters[f"plant.m{i}{i}"] for i in range(1, 7)])
+        energy = result.group(*(f"plant.nu.{k}" for k in "uvwpqr")) ** 2 @ masses
+        rows.append([text, f"{100 * (energy[-1] / energy[0] - 1.0):+.2g} %"])
+    show(["plant", "change of the energy"], rows)
+
+
+def continuous(system: System, stop: float) -> np.ndarray:
+    """The path of the loop whose controller is not sampled, every 20 ms [m].
+
+    Planner and controller go on by Euler's scheme, whose step over its length is the rate.
+    """
+    from scipy.integrate import solve_ivp  # noqa: PLC0415
+
+    setting, h = setting_of(system), 2.0**-10
+    gains, settings = setting.controller, setting.planner
+    begun = closed_loop.begin(setting, (0.0, 0.0, 0.0))
+    control_begun = begun.controller_state
+    if isinstance(control_begun, ControllerState):
+        # Its steps are all of one length, which so does not change.
+        control_begun = control_begun._replace(h=h)
+    start = begun.vehicles.plant, begun.vehicles.planner, control_begun
+
+    def unpacked(t: float, x: np.ndarray) -> tuple[Vehicles, Any, Any]:
+        state, planner, control = like(start, iter(x.tolist()))
+        rotation = rotation_from_quaternion(normalised(state.quaternion))
+        moving = motion_planner.motion(settings.vehicle, planner, settings.tau_d)
+        vehicles = Vehicles(state, rotation, planner, moving)
+        return vehicles, control, closed_loop.scene(setting, vehicles, t, (0.0, 0.0, 0.0))
+
+    def rates(t: float, x: np.ndarray) -> np.ndarray:
+        vehicles, control, seen = unpacked(t, x)
+        measured = closed_loop.measurement(gains, seen)
+        control = closed_loop.gated(gains, control, seen.y)
+        signals = closed_loop.evaluate(gains, control, measured, 0.0)
+        own, state = setting.plant, vehicles.plant
+        tau = plant.applied(own, signals.tau)
+        moving = plant.rates(own.vehicle, own.roll, state, vehicles.rotation, tau, seen.tau_w)
+        planned = motion_planner.step(vehicles.planner, vehicles.moving, h)
+        later = closed_loop.advanced(gains, control, signals, h)
+        rest = np.subtract(flat((planned, later)), flat((vehicles.planner, control))) / h
+        return np.array([*flat(moving), *(0.0 for _ in flat((state.tau, state.water))), *rest])
+
+    times = STEP * np.arange(round(stop / STEP) + 1)
+    found = solve_ivp(
+        rates, (0.0, stop), flat(start), "DOP853", t_eval=times, rtol=1e-9, atol=1e-11
+    )
+    states = zip(found.t, found.y.T, strict=True)
+    return np.array([unpacked(t, x)[2].plant.y for t, x in states])
+
+
+def setting_of(system: System) -> Setting:
+    """The parameters of the components of Fig. 2, as their equations take them."""
+    given: dict[str, Any] = {
+        name: {
+            variable.name: variable.typed(system.value(port), str(port))
+            for variable in component.having("parameter")
+            for port in [PortName(name, variable.name)]
+        }
+        for name, component in system.components.items()
+    }
+    parameters: dict[str, Any] = {
+        name: definition.parameters.of(given[name])
+        for name, definition in definitions_of(system).items()
+    }
+    longest = LongestSteps(*(given[name][H_MAX] for name in LongestSteps._fields))
+    return Setting(**parameters, h_max=longest)
+
+
+def flat(state: Any) -> list[float]:
+    """The numbers of a state, in their order."""
+    return [state] if isinstance(state, float) else [x for part in state for x in flat(part)]
+
+
+def like(state: Any, numbers: Iterator[float]) -> Any:
+    """The state of the same form with other numbers."""
+    if isinstance(state, float):
+        return next(numbers)
+    parts = [like(part, numbers) for part in state]
+    return type(state)(*parts) if hasattr(state, "_fields") else tuple(parts)
+
+
+def apart(path: np.ndarray, other: np.ndarray) -> float:
+    """Largest distance of two paths [m]."""
+    return float(np.linalg.norm(path - other, axis=1).max())
+
+
+def distances(path: np.ndarray, other: np.ndarray) -> str:
+    """The largest, and the root of the mean square."""
+    rms = np.sqrt(np.mean(np.sum((path - other) ** 2, axis=1)))
+    return f"{length(apart(path, other))}; {length(rms)}"
+
+
+def length(x: float) -> str:
+    """A length [m] in a unit that needs neither exponent nor zeros."""
+    units = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "µm": 1e-6, "nm": 1e-9}
+    unit = next((unit for unit, size in units.items() if x >= 0.995 * size), "nm")
+    return f"{number(x / units[unit], 2)} {unit}"
+
+
+def number(x: float, digits: int = 3) -> str:
+    """A number with so many digits and no exponent."""
+    return f"{float(f'{x:.{digits}g}'):,.9g}"
+
+
+def between(values: Sequence[float] | np.ndarray) -> str:
+    """The smallest and the largest of some values."""
+    return " to ".join(dict.fromkeys(number(end) for end in (min(values), max(values))))
+
+
+# What 1 mm of noise does
+
+#: Draws of a run; of a long one; of one with events, which the FMUs make.
+MANY, SOME, FEW = 1000, 30, 100
+FIGURES = ("fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c", "fig5-pd", "fig6-pd")
+FAULTS = ("fault-thruster", "fault-sensor", "current-step")
+
+
+def draws(n: int, values: Values | None = None) -> list[Values]:
+    """The values of draws with the seeds 1 to n."""
+    return [{STD: 0.001, SEED: seed, **(values or {})} for seed in range(1, n + 1)]
+
+
+def noise() -> None:
+    """Print commands, all indices, the times until commands saturate, and scenarios with events."""
+    runs = Runs(*FIGURES, "path", "path-pd")
+    rows = []
+    for name, values in [*((name, {}) for name in FIGURES), ("fig5", {"controller.eps_t": 1.0})]:
+        quiet = runs.indices(name, [{**values, **QUIET}])
+        found = runs.indices(name, draws(MANY, values))
+        (still, peaks), (never, shares) = (
+            [np.column_stack([one[f"{index}.{k}"] for k in ACTUATORS]) for one in (quiet, found)]
+            for index in ("peak_command", "saturated_fraction")
+        )
+        cells = [numbers(still[0]), numbers(100 * never[0]), *map(band, peaks.T)]
+        beyond = f"{100 * np.mean(shares.max(axis=1) > 0.0):.3g} %"
+        cells += [numbers(peaks.max(axis=0)), beyond, numbers(100 * shares.max(axis=0))]
+        rows.append([f"`{name}`" + ", eps_t = 1" * bool(values), *cells])
+    head = ["", "peaks without noise", "% of steps", *(f"peak {k}" for k in ACTUATORS)]
+    show([*head, "largest", "draws beyond a limit", "% of steps, at most"], rows)
+
+    rows = []
+    for name in ("fig4", "fig5", "fig5-pd", "path", "path-pd"):
+        quiet, found = runs.indices(name, [QUIET]), runs.indices(name, draws(MANY))
+        for column in INDICES.values():
+            rows.append([f"`{name}`", column, f"{quiet[column][0]:.4g}", band(found[column], 4)])
+    show(["", "index", "without noise", "with it"], rows)
+
+    rows = []
+    for name, until in (("fig5", 100.0), ("fig6", 60.0), ("fig6", 200.0)):
+        for text, some in (("none", [QUIET]), ("1 mm", draws(SOME))):
+            ratios = [runs.variation_ratio(name, until, values) for values in some]
+            rows.append([f"`{name}`, {until:g} s", text, *map(band, np.transpose(ratios))])
+    show(["TV, PD over proposed", "noise", *ACTUATORS], rows)
+
+    rows = []
+    for name, values in (
+        ("fig4", {}), ("fig4", {"controller.eps_t": 10.0}), ("fig5", {}), ("fig6", {}),
+        ("fig4", {"controller.k_d": 20.0}),
+    ):  # fmt: skip
+        firsts: list[float] = []
+        columns: list[list[float]] = []
+        for one in draws(SOME, values):
+            made = runs.table(name, one, stop_time=1000.0)
+            commands, time = np.abs(made.step_values(*STANDARD.commanded)), made.step_start
+            beyond = (commands > limits(made)[1]).any(axis=1)
+            firsts.append(time[beyond.argmax()] if beyond.any() else np.inf)
+            columns.append([
+                *(100.0 * beyond[time <= until].mean() for until in (200.0, 500.0, 1000.0)),
+                commands[:, 0].max(), made.step_values(STANDARD.theta_hat[0])[-1, 0],
+            ])  # fmt: skip
+        first = f"{np.median(firsts):.4g} ({min(firsts):.4g} to {max(firsts):.4g})"
+        rows.append([f"`{name}` {values}", first, *map(band, np.transpose(columns))])
+    ends = [f"% of steps until {time} s" for time in (200, 500, 1000)]
+    show(["", "first beyond a limit [s]", *ends, "peak u", "theta_hat_1"], rows)
+
+    for name in FAULTS:
+        events, seeds_of_noise = read_scenario(name).events, range(1, FEW + 1)
+        pair = [
+            [
+                fault_measures(simulate(system, {SEED: i}, events=events, stop_time=100.0))
+                for i in seeds_of_noise
+            ]
+            for system in (system_of(name), system_of(f"{name}-pd"))
+        ]
+        rows = [
+            [text, *(band(one[text] for one in runs_of) for runs_of in pair)] for text in pair[0][0]
+        ]
+        show([f"`{name}`", "proposed", "PD"], rows)
+
+
+def fault_measures(made: Table) -> dict[str, float]:
+    """Measure a run with an event at 50 s."""
+    time, size = made.time, size_of(made)
+    command = np.abs(made.step_values("controller.tau.u"))
+    late, outside = time >= 50.0, time[size > 0.5][-1]
+    return {
+        "peak of tau_u [N]": command.max(),
+        "peak of tau_u from 60 s on": command[made.step_start >= 60.0].max(),
+        "largest |e| from 30 to 50 s [m]": size[(time >= 30.0) & (time <= 50.0)].max(),
+        "largest |e| from 50 s on": size[late].max(),
+        "when [s after 50]": time[late][size[late].argmax()] - 50.0,
+        "within 0.5 m [s after 55]": outside - 55.0,
+        "within 0.5 m [s after 60]": outside - 60.0,
+        "largest |e| in the last 5 s": size[time >= 95.0].max(),
+    }
+
+
+# What random seas, links and noise do
+
+#: Over which times the largest errors count [s].
+SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
+    "sea": [(0, 25), (60, 101)],
+    "formation-v": [(25, 121)],
+    "formation-change": [(25, 121)],
+    "formation-lost-link": [(25, 121), (100, 121)],
+    "remus": [(120, 281)],
+}
+
+#: Runs without what is random.
+EVEN: Mapping[str, tuple[str, Values]] = {
+    "sea": (
+        "still water",
+        {"sea.waves.spectrum": "none", "sea.current.speed": 0.0, "sea.current.sigma": 0.0},
+    ),
+    "formation-change": ("no noise", {"auv*.plant.noise.std": 0.0}),
+}
+
+
+def seed_numbers(scenario: str, made: Table, loops: Sequence[Loop]) -> dict[str, float]:
+    """The numbers of a run: of several vehicles the largest, of distances the smallest."""
+    sizes, found = np.array([size_of(made, loop) for loop in loops]), {}
+    for start, end in SPANS[scenario]:
+        here = (made.time >= start) & (made.time < end)
+        text = f"error from {start:g} s to {min(end, made.time[-1]):g} s [m]"
+        found[text] = sizes[:, here].max()
+    commands = [made.step_values(*loop.commanded) for loop in loops]
+    found["peak command u [N]"] = max(np.abs(one[:, 0]).max() for one in commands)
+    found["peak command q, r [N.m]"] = max(np.abs(one[:, 1:]).max() for one in commands)
+    if scenario == "remus":
+        attained = made.step_values(*(f"allocation.tau_attained.{k}" for k in ACTUATORS))
+        beyond = [np.abs(commands[0] - attained) > 1e-9]
+    else:
+        ends = (limits(made, loop) for loop in loops)
+        beyond = [(one < low) | (one > up) for one, (low, up) in zip(commands, ends, strict=True)]
+    for i, actuator in enumerate(ACTUATORS):
+        share = max(one[:, i].mean() for one in beyond)
+        found[f"steps beyond the limits, {actuator} [%]"] = 100.0 * share
+    if len(loops) > 1:
+        found[f"{SMALLEST_DISTANCE_LABEL} [m]"] = smallest_distances(made, loops).min()
+    return found
+
+
+def over_seeds(
+    scenario: str, pd: bool, n: int, values: Values | None = None
+) -> dict[str, np.ndarray]:
+    """The numbers of the run with the scenario's own seeds, and of n with others."""
+    system = system_of(scenario + "-pd" * pd)
+    seeds = [
+        f"{component}.{port}"
+        for component, part in system.components.items()
+        for port in part.variables
+        if port.endswith("seed")
+    ]
+    end, rows = read_scenario(scenario).stop_time, []
+    for k in range(n + 1):
+        own = {seed: 1000 * k + i for i, seed in enumerate(seeds) if k}
+        made = simulate(system, {**(values or {}), **own}, stop_time=end, loop="compiled")
+        rows.append(seed_numbers(scenario, made, loops_of(system)))
+    return {name: np.array([row[name] for row in rows]) for name in rows[0]}
+
+
+def seeds(*scenarios: str, n: int = 60) -> None:
+    """Print the run with the scenario's own seeds and n others, with either controller."""
+    for scenario, pd in product(scenarios or SPANS, (False, True)):
+        print(f"\n{scenario}, {'PD' if pd else 'proposed'}: own seeds; median (5 % to 95 %)")
+        for name, (own, *others) in over_seeds(scenario, pd, n).items():
+            low, middle, high = np.percentile(others, (5, 50, 95))
+            some = f"; not 0 in {100 * np.mean(np.array(others) > 0):.0f} %" * ("%" in name)
+            print(f"  {name:45}{own:8.3f};{middle:8.3f} ({low:.3f} to {high:.3f}){some}")
+        if scenario in EVEN:
+            what, values = EVEN[scenario]
+            even = over_seeds(scenario, pd, 0, values)
+            print(f"  {what}: {', '.join(f'{name} {x[0]:.3f}' for name, x in even.items())}")
+
+
+# The REMUS 100
+
+
+def ell(value: float) -> dict[str, Any]:
+    """Another control point, which begins where the reference does."""
+    known = {f"{name}.ell": value for name in ("plant", "controller", "planner")}
+    return {**known, "plant.eta0.x": -value}
+
+
+#: What is changed, as the page calls it.
+CHANGES: Mapping[str, Values] = {
+    "nothing": {},
+    "current of 0.3 m/s across the first leg": {"plant.current.y": 0.3},
+    "speed measured": {"allocation.measured": True},
+    "nominal speed of 1.0 m/s": {"allocation.speed": 1.0},
+    "nominal speed of 2.5 m/s": {"allocation.speed": 2.5},
+    "no lags": {"plant.fin.T": 0.0, "plant.propeller.T": 0.0},
+    "all of the propeller's torque": {"plant.propeller.torque": 1.0},
+    "ell = 0.35 m": ell(0.35),
+    "ell = 0.1 m": ell(0.1),
+    "lambda = 2.1 m/s": {"controller.lambda": 2.1},
+    "start 3 m aside": {"plant.eta0.y": 3.0},
+    "lambda = 0.15 m/s": {"controller.lambda": 0.15},
+    "lambda = 0.6 m/s": {"controller.lambda": 0.6},
+    "eps_t = 5 W": {"controller.eps_t": 5.0},
+    "gamma = 3": {"controller.gamma": 3.0},
+    "no noise": QUIET,
+    "no noise, fin of 0.03 s": {**QUIET, "plant.fin.T": 0.03},
+    "k_d = 50": {"controller.k_d": 50.0},
+    "noise of 3 mm": {STD: 0.003},
+    "noise of 1 cm": {STD: 0.01},
+    "gains of the paper": {
+        "controller.K1": [10.0, 10.0, 10.0], "controller.K2": [10.0, 10.0, 10.0],
+        "controller.k_d": 50.0, "controller.lambda": 1.0, "controller.eps_t": 1.0,
+    },
+}  # fmt: skip
+
+
+def remus() -> None:
+    """Print a line for each change, for both controllers.
+
+    Its columns are the largest error in the first 40 s and from 120 s on [m], the largest part of
+    the latter across the path [m], the share of steps with a fin at its limit, in pitch and yaw
+    [%], the largest command in yaw [N.m], and the mean rate of the rudder [degrees/s].
+    """
+    heading = f"{'first':>6}{'late':>6}{'across':>6}{'q':>4}{'r':>4}{'yaw':>7}{'rate':>6}"
+    print(f"{'changed':42}{heading}  |{heading}")
+    for name, changes in CHANGES.items():
+        lacking = ("controller.K2", "controller.k_d")
+        shared = {key: value for key, value in changes.items() if key not in lacking}
+        lines = remus_numbers("remus", changes), remus_numbers("remus-pd", shared)
+        print(f"{name:42}{'  |'.join(lines)}", flush=True)
+    for scenario in ("remus", "remus-pd"):
+        result = simulate(scenario, stop_time=1500.0)
+        size, time = size_of(result, AllocatedLoop()), result.time
+        resting = size[(time >= 290.0) & (time < 600.0)].max()
+        later = (f"{size[time.searchsorted(t)]:.2f} m at {t:g} s" for t in (600.0, 1500.0))
+        print(f"after the end, {scenario}: {resting:.2f} m at most, {', '.join(later)}")
+    for name, turn in (("Remus100", steady_turn), ("Prestero", prestero_turn)):
+        for speed in (1.06, 1.5):
+            v, r, N = turn(speed)
+            print(f"turn with 15 degrees of rudder at {speed:g} m/s, {name}: {r:.3f} rad/s, radius "
+                  f"{speed / r:.1f} m, sway {v:.3f} m/s, moment of the rudder {N:.2f} N.m, over "
+                  f"the rate {N / r:.1f} kg.m2/s")  # fmt: skip
+
+
+def remus_numbers(scenario: str, changes: Values) -> str:
+    """A line of numbers about a run."""
+    result = simulate(scenario, changes)
+    if result.failure is not None:
+        return result.failure
+    loop, late = AllocatedLoop(), result.time >= 120.0
+    error, size = tracking_error(result, loop), size_of(result, loop)
+    ahead = result.group(*loop.dy_d)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True) + (ahead == 0.0).all(axis=1)[:, None]
+    beside = error - (error * ahead).sum(axis=1)[:, None] * ahead
+    across = np.linalg.norm(beside, axis=1)[late].max()
+    pairs = ((f"controller.tau.{k}", f"allocation.tau_attained.{k}") for k in "qr")
+    pitch, yaw = (
+        100.0 * (np.abs(np.subtract(*result.step_values(*pair).T)) > 1e-9).mean() for pair in pairs
+    )
+    command = np.abs(result.step_values("controller.tau.r")).max()
+    rate = np.abs(np.diff(np.degrees(result["plant.actuator.delta_r"]))).sum() / result.time[-1]
+    first = size[result.time < 40.0].max()
+    largest = f"{first:6.2f}{size[late].max():6.3f}{across:6.3f}"
+    return f"{largest}{pitch:4.0f}{yaw:4.0f}{command:7.1f}{rate:6.0f}"
+
+
+def steady_turn(speed: float) -> tuple[float, float, float]:
+    """Sway [m/s] and rate of turn [rad/s] of Remus100 with full rudder, and its moment [N.m].
+
+    Args:
+        speed: through the water [m/s], which the surge is held at.
+
+    """
+    parameters, none = Parameters(), (0.0, 0.0, 0.0)
+    u, v, r = speed, 0.0, 0.0
+    actuator = (parameters.tail.delta_max, 0.0, 0.0)
+    mass = inertia(parameters.hull)
+    for _ in range(5_000):
+        state = RemusState(none, none, (u, v, 0.0, 0.0, 0.0, r), actuator, none)
+        rates = accelerations(parameters, mass, state)
+        v, r = v + 0.02 * rates[1], r + 0.02 * rates[5]
+        u = (speed * speed - v * v) ** 0.5
+    return v, r, tail_forces(parameters.tail, state)[5]
+
+
+def prestero_turn(speed: float) -> tuple[float, float, float]:
+    """The same with the coefficients of Prestero (2001) for sway and yaw, at the same angle."""
+    m, v, r = 30.48, 0.0, 0.0
+    u, rudder = speed, -Parameters().tail.delta_max
+    for _ in range(20_000):
+        Y = -1310 * v * abs(v) + 0.632 * r * abs(r) - 28.6 * u * v + 5.22 * u * r
+        N = -3.18 * v * abs(v) - 94.0 * r * abs(r) - 24.0 * u * v - 2.0 * u * r
+        dv = (Y + 9.64 * u * u * rudder - m * u * r) / (m + 35.5)
+        dr = (N - 6.15 * u * u * rudder) / (3.45 + 4.88)
+        v, r = v + 0.005 * dv, r + 0.005 * dr
+        u = (speed * speed - v * v) ** 0.5
+    return v, r, -6.15 * u * u * rudder
+
+
+# Networks
+
+#: Neurons of the layers, of which the first are inputs; seeds of a shape, and inputs of each.
+SHAPES = ((4, 8, 2), (1, 300, 1), (3, 300, 2), (12, 64, 64, 6), (16, 200, 200, 4))
+NETWORKS, INPUTS = 20, 10
+FUNCTIONS: dict[str, Callable[[Any], Any]] = {"Tanh": np.tanh, "Relu": lambda z: np.maximum(z, 0.0)}
+
+
+def networks() -> None:
+    """Compare networks with weights as PyTorch draws them, at inputs of standard deviation 1."""
+    rows = []
+    with TemporaryDirectory() as folder:
+        for sizes, activation in product(SHAPES, FUNCTIONS):
+            path = Path(folder) / "network.onnx"
+            found = [differences(path, sizes, activation, seed) for seed in range(NETWORKS)]
+            largest = [f"{x:.1e}" for x in np.max(found, axis=0)]
+            rows.append([" - ".join(map(str, sizes)), activation.lower(), *largest])
+    show(("neurons", "activation", "to onnxruntime", "to numpy, in double"), rows)
+
+
+def differences(path: Path, sizes: tuple[int, ...], activation: str, seed: int) -> Any:
+    """Distances of a component from onnxruntime and numpy, in parts of its largest output."""
+    import onnx  # noqa: PLC0415
+    import onnxruntime  # noqa: PLC0415
+
+    random, make = np.random.default_rng(seed), onnx.helper
+    constants, nodes, value = {}, [], "x"
+    for i, (n, m) in enumerate(pairwise(sizes)):
+        for name, shape in ((f"W{i}", (m, n)), (f"b{i}", (m,))):
+            constants[name] = (random.uniform(-1.0, 1.0, shape) / np.sqrt(n)).astype(np.float32)
+        nodes.append(make.make_node("Gemm", [value, f"W{i}", f"b{i}"], [f"z{i}"], transB=1))
+        nodes.append(make.make_node(activation, [f"z{i}"], [value := f"a{i}"]))
+    last = f"z{len(sizes) - 2}"
+    graph = make.make_graph(
+        nodes[:-1],
+        "network",
+        [make.make_tensor_value_info("x", onnx.TensorProto.FLOAT, [1, sizes[0]])],
+        [make.make_tensor_value_info(last, onnx.TensorProto.FLOAT, [1, sizes[-1]])],
+        [onnx.numpy_helper.from_array(array, name) for name, array in constants.items()],
+    )
+    opsets = [make.make_opsetid("", 17)]
+    onnx.save(make.make_model(graph, opset_imports=opsets, ir_version=8), str(path))
+    session = onnxruntime.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    component: dict[str, Any] = {"__name__": "component"}
+    exec(component_text("Network", read_network(path), path.name), component)
+    given = random.normal(size=(INPUTS, sizes[0])).astype(np.float32)
+    single = np.array([session.run(None, {"x": x[None]})[0][0] for x in given])
+    own = np.array([[*component["_network"](component["Vector"](map(float, x)))] for x in given])
+    double = given.astype(float)
+    for i in range(len(sizes) - 1):
+        double = double @ constants[f"W{i}"].T.astype(float) + constants[f"b{i}"]
+        double = FUNCTIONS[activation](double) if f"z{i}" != last else double
+    return np.array([np.abs(own - other).max() for other in (single, double)]) / np.abs(own).max()
+
+
+# The best gains
+
+
+def gains(n: int = 1) -> None:
+    """Search the ranges of the study `gains` for the least `late_error` under a limit of commands.
+
+    It makes 136,000 runs by differential evolution, in six to seven minutes of a core. A search
+    finds good gains, and no proof that there are no better ones; `--runs 2` makes each twice.
+    """
+    from scipy.optimize import differential_evolution  # noqa: PLC0415
+
+    study = read_study("gains")
+    assert study.sample and study.stop_time
+    ranges, stop_time = study.sample.ranges, study.stop_time.base
+    for scenario in study.scenario:
+        runs = Runs(scenario)
+        has = runs.systems[scenario].components["controller"].variables
+        searched = [name for name in ranges if name.partition(".")[2] in has]
+        bounds = [(log(ranges[name].low), log(ranges[name].high)) for name in searched]
+
+        def cost(logarithms: Sequence[float], limit: float) -> float:
+            own = dict(zip(searched, map(exp, logarithms), strict=True))  # noqa: B023
+            found = runs.indices(scenario, [{**study.parameters, **own}], stop_time=stop_time)  # noqa: B023
+            peak = max(float(found[f"peak_command.{k}"][0]) for k in ACTUATORS)
+            # Gains whose commands are too large are worse than all others.
+            return log(found["late_error"][0]) if peak <= limit else 10.0 + log(peak / limit)
+
+        for limit in (10.0, 20.0, 80.0):
+            found = [
+                differential_evolution(
+                    cost, bounds, (limit,), maxiter=250, popsize=10, tol=0.0, rng=seed, polish=False
+                )
+                for seed in range(1, n + 1)
+            ]
+            best = min(found, key=lambda one: float(one.fun))
+            others = ", ".join(f"{exp(one.fun):.3g}" for one in found)
+            print(
+                f"{scenario}, commands up to {limit:g}: {exp(best.fun):.3g} m (by seed: {others})"
+            )
+            for name, value in zip(searched, map(exp, best.x), strict=True):
+                print(f"    {name} = {value:.4g}", flush=True)
+
+
+# Studies
+
+#: What column names begin with that tells nothing apart.
+COMPONENT = re.compile(r"^(auv\*\.)?(plant|controller|disturbance|link)\.")
+
+
+def share(column: Any) -> str:
+    """Share of runs whose column is true, with its exact interval of 95 %, as if independent."""
+    from scipy.stats import binomtest  # noqa: PLC0415
+
+    hits, n = int(column.sum()), len(column)
+    low, high = binomtest(hits, n).proportion_ci()
+    return f"{hits} of {n}, {100 * hits / n:.3g} % ({100 * low:.3g} to {100 * high:.3g})"
+
+
+def bound(column: Any) -> str:
+    """Upper bound of the share at 95 % if the column of no run is true: (1 - share)^n = 0.05."""
+    return f"{column.sum()} of {len(column)}, {100 * (1 - 0.05 ** (1 / len(column))):.2g} %"
+
+
+def rank(one: Any, other: Any) -> str:
+    """Spearman's correlation of two columns, and its standard error; it sees no U shapes."""
+    from scipy.stats import spearmanr  # noqa: PLC0415
+
+    return f"{spearmanr(one, other).statistic:.3f} ± {(len(one) - 1) ** -0.5:.3f} (n = {len(one)})"
+
+
+#: The numbers that a line may ask for, from the columns that it names.
+STATISTICS: Mapping[str, Callable[..., str]] = {
+    "n": lambda column: str(len(column)),
+    "median": lambda column: f"{column.median():.5g} (n = {len(column)})",
+    "min": lambda column: f"{column.min():.5g}",
+    "max": lambda column: f"{column.max():.5g}",
+    "share": share,
+    "bound": bound,
+    "rank": rank,
+}
+
+
+def queries(study: str) -> dict[str, Any]:
+    """The part of page_numbers.toml about a study."""
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    found: dict[str, Any] = tomllib.loads(text)[study]
+    return found
+
+
+def lines_of(study: str) -> list[str]:
+    """The lines for a study, with each alternative written out."""
+    found: list[str] = []
+    for line in queries(study)["lines"].strip().splitlines():
+        parts = re.split(r"\{(.*?)\}", line)
+        choices = (part.split(",") if i % 2 else [part] for i, part in enumerate(parts))
+        found += map("".join, product(*choices))
+    return [re.sub(r"NEAR\((\w+); (\S+)\)", r"\2 / 1.1 < \1 < \2 * 1.1", line) for line in found]
+
+
+def parsed(line: str) -> tuple[str, list[str], list[str], str]:
+    """The statistic of a line, its columns, what tells groups apart, and the query."""
+    what, _, where = line.partition(" | ")
+    columns, by = (part.split() for part in what.partition(" by ")[::2])
+    return columns[0], columns[1:] or ["run"], by, where
+
+
+def prepared(study: str, runs: Any) -> Any:
+    """The runs with short names, and with the columns that are made of others."""
+    runs = runs.rename(columns=lambda name: COMPONENT.sub("", name))
+    runs = runs.rename(columns=lambda name: re.sub(r"\W+", "_", name).strip("_"))
+    runs = runs.rename(columns={"lambda": "lam"})
+    if "scenario" in runs:
+        runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
+    runs["failed"] = runs.failure.fillna("") != ""
+    runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
+    # Of several vehicles, the largest.
+    runs["late_error"] = runs.filter(regex="(^|_)late_error$").max(axis=1)
+    runs["lost"] = ~(runs.late_error <= 1.0)
+    runs["saturated"] = runs.filter(like="saturated_fraction").max(axis=1) > 0.0
+    runs["peak"] = runs.filter(like="peak_command").max(axis=1)
+    runs["final_error"] = runs.filter(like="final_error_").max(axis=1)
+    for name, made in queries(study).get("made", {}).items():
+        runs[name] = runs.eval(made)
+    if study == "distance":
+        # The proposed controller's run of a point comes first.
+        first = runs.groupby(["step", "noise_std", "way"]).l2_effort_u.transform("first")
+        runs["effort_ratio"] = runs.l2_effort_u / first
+    for amplitude, other in (("A_f", "A_d"), ("A_d", "A_f")) if study == "robustness" else ():
+        # Whether it is kept with this disturbance, and with all weaker ones on the line.
+        line = runs.sort_values(amplitude).groupby(
+            ["scenario", "step", "noise_std", "omega_d", other]
+        )
+        runs[f"kept_{amplitude[-1]}"] = ~line.lost.cummax()
+    return runs
+
+
+def answer(line: str, runs: Any) -> str:
+    """The numbers of a line."""
+    import pandas as pd  # noqa: PLC0415
+
+    statistic, columns, by, where = parsed(line)
+    part = runs.query(where) if where else runs
+    for tenth in (name for name in by if name.startswith("tenth_")):
+        part = part.assign(**{tenth: pd.qcut(part[tenth.removeprefix("tenth_")], 10, labels=False)})
+    found = []
+    for key, group in part.groupby(by) if by else [((), part)]:
+        names = (f"{value:.3g}" if isinstance(value, float) else str(value) for value in key)
+        number = STATISTICS[statistic](*(group[name] for name in columns))
+        found.append(" ".join((*names, number)))
+    return ", ".join(found)
+
+
+def studies(*folders: str) -> None:
+    """Print the numbers of the studies in some folders."""
+    for folder in folders:
+        result = StudyResult(Path(folder))
+        study = result.record["study"]
+        runs = prepared(study, result.to_dataframe().reset_index())
+        print(f"\n{study}")
+        for line in lines_of(study):
+            print(f"  {line}: {answer(line, runs)}")
+
+
+# Benchmarks
+
+
+def benchmarks(*chosen: str) -> int:
+    """Run the commands of files in benchmarks/results, some or all; 1 if one has failed."""
+    files = {file.stem: file for file in sorted(RESULTS.glob("*.txt"))}
+    if unknown := {*chosen} - files.keys():
+        sys.exit(f"{', '.join(sorted(unknown))}: choose from {', '.join(files)}")
+    failed = [name for name in chosen or files if not is_written(files[name])]
+    return 1 if failed else 0
+
+
+def is_written(file: Path) -> bool:
+    """Run the command of a file and write its output there; False: it failed."""
+    command, where = command_of(file), machine()
+    arguments = [sys.executable, *shlex.split(command)]
+    done = subprocess.run(
+        arguments, cwd=ROOT, check=False, stdout=subprocess.PIPE, encoding="utf-8"
+    )
+    if done.returncode:
+        failure = f"{command}: exit status {done.returncode}"
+        print(f"{file.stem} stays as it is: {failure}", file=sys.stderr)
+        return False
+    text = f"$ python {command}\n{date.today()}, {where}\n\n{done.stdout.rstrip()}\n"
+    file.write_text(text, encoding="utf-8")
+    return True
+
+
+def command_of(file: Path) -> str:
+    """The command in the first line of a file, without `$ python `."""
+    return file.read_text(encoding="utf-8").partition("\n")[0].removeprefix("$ python ")
+
+
+def machine() -> str:
+    """The processor that this runs on, how many cores of it, and how busy they are."""
+    file = Path("/proc/cpuinfo")
+    facts = file.read_text(encoding="utf-8") if file.is_file() else ""
+    listed = re.search(r"^model name\s*: (.+)$", facts, re.MULTILINE)
+    processor = listed[1] if listed else platform.machine()
+    load = f", load {os.getloadavg()[0]:.0f}" if hasattr(os, "getloadavg") else ""
+    return f"{processor}, {os.cpu_count()} cores{load}"
+
+
+#: What there is, by name.
+PAGES: Mapping[str, Callable[..., int | None]] = {
+    one.__name__: one
+    for one in (accuracy, noise, seeds, remus, networks, gains, studies, benchmarks)
+}
+
+
+def main() -> int:
+    """Print the numbers of a page."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("page", choices=PAGES)
+    parser.add_argument(
+        "what", nargs="*",
+        help="seeds: scenarios; studies: folders; benchmarks: files; default: all",
+    )  # fmt: skip
+    parser.add_argument(
+        "--runs", type=int, metavar="N", help="seeds: runs; gains: searches of each"
+    )
+    options = parser.parse_args()
+    runs = {} if options.runs is None else {"n": options.runs}
+    return PAGES[options.page](*options.what, **runs) or 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
