@@ -1,4 +1,4 @@
-"""How the steps of a run are made: one after the other in Python, or many in one compiled call.
+"""The loops that make the steps of a run: one after the other in Python, or many in one C call.
 
 Both make the same calls of FMI in the same order, and the same rows bit for bit.
 """
@@ -28,8 +28,8 @@ LOOPS: tuple[LoopName, ...] = get_args(LoopName)
 #: as so many.
 _SET_UP, _COMPILED = 20, 10_000
 
-#: Of more values than these numpy's library shares products among threads, which takes milliseconds
-#: where the other cores are busy.
+#: Above this number of values numpy's library shares products among threads, which takes
+#: milliseconds where the other cores are busy.
 _MOST_MULTIPLIED = 4_096
 
 
@@ -80,7 +80,7 @@ def step_interpreted(run: Run) -> Iterator[None]:
 
 
 def _watch(values: np.ndarray) -> Callable[[], object]:
-    """What says whether one of some values is not finite."""
+    """A function that looks whether one of some values is not finite."""
     if len(values) > _MOST_MULTIPLIED:
         return lambda: not np.isfinite(values).all()
     # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.

@@ -129,7 +129,7 @@ def check_order(system: System, order: Order | None) -> None:
 
 
 def identity(plan: Plan, events: Sequence[object] = (), inputs: str = "") -> Identity:
-    """What makes a run the one that it is: all that decides its rows.
+    """List all that decides the rows of a run.
 
     Code counts by whole rooms, comments included: it is better to make a run once too often than to
     take another one for it. What other rooms decide is in the plan, the events and the inputs.
@@ -171,7 +171,7 @@ def _parameters(system: System) -> dict[str, str]:
 
 
 def differences(one: Identity, other: Identity) -> list[str]:
-    """What makes two runs two, by the names of an identity."""
+    """The entries in which two identities differ, by their names."""
     return sorted(dict(one.items() ^ other.items()))
 
 

@@ -25,7 +25,7 @@ from orchestrator.machine.errors import InputError, StartError, reason, unforese
 from orchestrator.machine.interrupts import held_interrupts
 
 
-# What overflows on its way is named as the value of a port.
+# A value that overflows on its way is named as the value of a port.
 @np.errstate(all="ignore")
 @default_mode()
 def simulate_plan(

@@ -67,13 +67,13 @@ Reads: TypeAlias = Literal["all", "direct", "states", "only states"]
 READS: tuple[Reads, ...] = get_args(Reads)
 ALL, DIRECT, STATES, ONLY_STATES = READS
 
-#: How a ring is closed: where something about its components has changed; where that or what others
+#: Ways to close a ring: where something about its components has changed; where that or what others
 #: feed it has, which it takes; with what others feed it, in any case.
 Closing: TypeAlias = Literal["check", "renew", "renew always"]
 CLOSINGS: tuple[Closing, ...] = get_args(Closing)
 CHECK, RENEW, RENEW_ALWAYS = CLOSINGS
 
-#: What closes a ring.
+#: Functions that close a ring.
 _CLOSES: Mapping[Closing, Callable[[Ring], object]] = {
     CHECK: Ring.check,
     RENEW: Ring.renew,
@@ -101,7 +101,7 @@ class Arrangement(NamedTuple):
     stages: Sequence[Sequence[str]]
 
     def delays(self, reasons: Mapping[str, str] | None = None) -> list[str]:
-        """Where a ring is opened, in words.
+        """The places where rings are opened, in words.
 
         Args:
             reasons: why components are in no ring that is solved.
@@ -190,7 +190,7 @@ def types_read(reads: Reads, component: Component, outputs: Iterable[str]) -> se
 
 
 class Visit(NamedTuple):
-    """What a component does in a stage.
+    """The work of a component in a stage.
 
     Attributes:
         component: its name.
@@ -232,7 +232,7 @@ class Decimation(NamedTuple):
     at_end: bool = False
 
     def is_due(self, k: int, steps: int) -> bool:
-        """Whether in the communication step after the k-th of so many, or at the end of all."""
+        """True in the communication step after the k-th of so many, or at the end of all."""
         k += self.at_end
         return k % self.every == 0 or k == steps
 
@@ -256,7 +256,7 @@ class Stage(NamedTuple):
 
     @property
     def acts(self) -> bool:
-        """Whether there is anything to do."""
+        """True where there is anything to do."""
         return bool(self.connections or self.visits or self.shows)
 
 
@@ -361,7 +361,7 @@ def _passing_first(
             Stage(visits=[Close(ring_of[name], RENEW_ALWAYS)]) for name in names if name in ring_of
         ]
     place = {name: i for i, names in enumerate(arrangement.stages) for name in names}
-    # What is read when values pass is read after a step too if something takes it before it passes.
+    # An output that is read when values pass is read after a step too if something takes it before.
     early = {
         one.source.component
         for one in system.connections
@@ -393,7 +393,7 @@ def _passing_first(
 def _taken(
     connections: Sequence[Connection], decimation: Mapping[str, int]
 ) -> tuple[list[Stage], list[Connection]]:
-    """What components that take longer steps take, and the others, before any is stepped."""
+    """The stages in which slow components take their inputs, and the connections of the others."""
     taken: dict[int, list[Connection]] = {1: []}
     for connection in connections:
         taken.setdefault(decimation[connection.target.component], []).append(connection)
@@ -451,7 +451,7 @@ class StageCall:
         return self._tried(t.value, h.value)
 
     def failed(self, status: int, function: str) -> Exception:
-        """What it has raised."""
+        """The exception that it has raised."""
         assert self._error is not None
         return self._error
 
@@ -574,7 +574,7 @@ def make_stages(
     """
     for gather, members, decimation in stages:
         if decimation is None:
-            # What most stages are costs no call.
+            # Most stages are like this: it costs no call.
             if gather.is_plain:
                 values[gather.targets] = values[gather.sources]
             elif gather.acts:

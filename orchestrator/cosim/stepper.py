@@ -28,10 +28,10 @@ from orchestrator.machine.libraries import (
 
 SOURCE = Path(__file__).with_name("stepper.c")
 
-#: What it is among what is kept.
+#: Its category in the cache.
 CATEGORY = "loop"
 
-#: What it offers.
+#: Its function.
 _FUNCTION = "advance"
 
 #: Libraries that this process has loaded, by cache folders.
@@ -74,7 +74,7 @@ class CStage(Structure):
 
 
 class CRun(Structure):
-    """What the steps of a run are made of."""
+    """All that the steps of a run need."""
 
     _fields_ = (
         ("stages", POINTER(CStage)),
@@ -168,7 +168,7 @@ def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:
 def load_stepper() -> CDLL | None:
     """Load the library that was compiled earlier; None: there is none."""
     folder = users_folder()
-    # What is loaded needs no second look: short runs would take longer for it.
+    # A library that is loaded is not looked up again: short runs would take longer for it.
     if folder not in _in_use and (library := find_library(CATEGORY, key_of(), _FUNCTION)):
         _in_use[folder] = library
     return _in_use.get(folder)
