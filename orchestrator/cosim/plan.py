@@ -188,8 +188,8 @@ def code_of(*packages: str) -> str:
         specification = find_spec(package)
         assert specification is not None and specification.submodule_search_locations
         [root] = specification.submodule_search_locations
-        found = (path for path in Path(root).rglob("*") if path.suffix in (".c", ".h", ".py"))
-        for path in sorted(found):
+        sources = (path for path in Path(root).rglob("*") if path.suffix in (".c", ".h", ".py"))
+        for path in sorted(sources):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()

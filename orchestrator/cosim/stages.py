@@ -178,15 +178,15 @@ def types_read(reads: Reads, component: Component, outputs: Iterable[str]) -> se
         outputs: names of them.
 
     """
-    found: dict[str, set[bool]] = {}
+    feedthroughs: dict[str, set[bool]] = {}
     for name in outputs:
         direct = component.has_feedthrough(name)
-        found.setdefault(component.variables[name].type, set()).add(direct)
+        feedthroughs.setdefault(component.variables[name].type, set()).add(direct)
     if reads == ALL:
-        return {*found}
+        return {*feedthroughs}
     if reads == ONLY_STATES:
-        return {one for one, direct in found.items() if direct == {False}}
-    return {one for one, direct in found.items() if (reads == DIRECT) in direct}
+        return {fmi_type for fmi_type, direct in feedthroughs.items() if direct == {False}}
+    return {fmi_type for fmi_type, direct in feedthroughs.items() if (reads == DIRECT) in direct}
 
 
 class Visit(NamedTuple):
@@ -295,30 +295,30 @@ def stages_of(
     if order == FEEDTHROUGH:
         return _passing_first(system, arrangement, decimation, gathered)
     ring_of = {ring[0]: ring for ring in rings}
-    found: list[Stage] = []
+    stepping: list[Stage] = []
     shown: list[Stage] = []
     for names, connections in zip(arrangement.stages, gathered, strict=True):
         slow, taken = _taken(connections, decimation)
-        found += slow
+        stepping += slow
         fast = [Visit(name) for name in names if decimation[name] == 1]
         here = [ring_of[name] for name in names if name in ring_of]
         if here:
             # All are stepped before one takes what another has come to.
-            found += [Stage(taken, [Close(ring, CHECK) for ring in here]), Stage(visits=fast)]
+            stepping += [Stage(taken, [Close(ring, CHECK) for ring in here]), Stage(visits=fast)]
             if order != JACOBI:
-                found.append(Stage(visits=[Close(ring, RENEW_ALWAYS) for ring in here]))
+                stepping.append(Stage(visits=[Close(ring, RENEW_ALWAYS) for ring in here]))
         else:
-            found.append(Stage(taken, fast))
+            stepping.append(Stage(taken, fast))
         for name in names:
             if (n := decimation[name]) > 1:
                 early, later = _shown(system.components[name], order)
-                found += [
+                stepping += [
                     Stage(visits=[Visit(name)], decimation=Decimation(n)),
                     Stage(shows=early, decimation=Decimation(n)),
                 ]
                 shown.append(Stage(shows=later, decimation=Decimation(n, at_end=True)))
     renewed = [Stage(visits=[Close(ring, RENEW)]) for ring in rings]
-    return Stages(_acting(found + shown + renewed))
+    return Stages(_acting(stepping + shown + renewed))
 
 
 def _passing_first(

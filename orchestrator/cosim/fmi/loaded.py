@@ -145,11 +145,11 @@ class LoadedInstance:
         """Derivatives of some outputs with one input at the same time."""
         unknowns, knowns = self._arrays(outputs), self._arrays([of])
         seed = [float(port == of) for ports in knowns for port in ports]
-        found = self._call(
+        values = self._call(
             "derivatives", self._references(unknowns), self._references(knowns), seed,
             sum(map(len, unknowns)),
         )  # fmt: skip
-        by_name = dict(zip((port for ports in unknowns for port in ports), found, strict=True))
+        by_name = dict(zip((port for ports in unknowns for port in ports), values, strict=True))
         return [by_name[port] for port in outputs]
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:

@@ -202,10 +202,10 @@ class _Slave:
         self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], n: int
     ) -> list[float]:
         """Derivatives of n values of some variables with others."""
-        found: list[float] = self.getDirectionalDerivative(  # type: ignore[attr-defined]
+        values: list[float] = self.getDirectionalDerivative(  # type: ignore[attr-defined]
             unknowns, knowns, seed, *self._counted(n)
         )
-        return found
+        return values
 
     def returned_at(self) -> float | None:
         """The time at which it has returned from that step, which it had to make in full [s]."""
@@ -217,7 +217,7 @@ class _Slave:
 
 
 class _Lenient:
-    """A library in which optional functions are found that are not there."""
+    """A library in which optional functions that are missing can be looked up."""
 
     def __init__(self, dll: Any, needed: re.Pattern[str]) -> None:
         self._dll, self._needed = dll, needed
@@ -378,7 +378,7 @@ def _log_of_fmi3(environment: int | None, status: int, _: bytes, message: bytes 
 def _bearing(name: bytes | None) -> Hearer | None:
     """The instance with a name: some FMUs do not hand the environment back."""
     text = (name or b"").decode(errors="replace")
-    return next((found for found in _hearers.values() if found.name == text), None)
+    return next((hearer for hearer in _hearers.values() if hearer.name == text), None)
 
 
 def _callbacks() -> fmi2CallbackFunctions:
