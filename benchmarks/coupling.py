@@ -18,11 +18,10 @@ from time import perf_counter
 import numpy as np
 
 from orchestrator.cosim.experiment import COUPLINGS, Experiment
-from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.loop import choose_loop, compile_stepper
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.stepper import compile_stepper
 from orchestrator.cosim.system.structure import System
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))

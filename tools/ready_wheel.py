@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from hatchling.builders.wheel import WheelBuilder
 
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
-from orchestrator.cosim import stepper
+from orchestrator.cosim import loop
 from orchestrator.live import assembly, module
 from orchestrator.live.presets import bundled
 from orchestrator.machine.compilers import COMPILERS, compiler_for, library
@@ -55,12 +55,12 @@ def write_ready(folder: Path) -> None:
             (place / name).write_bytes(content)
     machines = platforms(FMI_VERSIONS[-1], "all")
     compiler = compiler_for(machines)
-    source = stepper.SOURCE
+    source = loop.SOURCE
     for machine in machines:
         content = library(
             compiler, machine, source.stem, {source.name: source.read_bytes()}, source.name
         )
-        place = folder / stepper.CATEGORY / stepper.key_of(machine.name)
+        place = folder / loop.CATEGORY / loop.key_of(machine.name)
         place.mkdir(parents=True)
         (place / f"{source.stem}{machine.ending}").write_bytes(content)
 

@@ -1,4 +1,4 @@
-"""How components are coupled: at the start, and in every step."""
+"""The coupling of components: at the start, and in every step."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class _Settling:
 
     @property
     def places(self) -> dict[str, int]:
-        """Where in that order each component is."""
+        """The place of each component in that order."""
         return {name: i for i, unit in enumerate(self._units) for name in unit.names}
 
     def settle(self) -> None:

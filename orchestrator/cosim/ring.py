@@ -28,8 +28,8 @@ from orchestrator.machine.texts import real
 #: absolutely; what brings it nearer is done until it is within rounding.
 _REST, _ROUNDING = (1e-10, 1e-12), (1e-14, 1e-14)
 
-#: How often discrete values go round, how many steps Newton's method makes, and how often one of
-#: them is halved.
+#: Limits of the rounds of discrete values, of the steps of Newton's method, and of the halvings of
+#: one step.
 _MOST_ROUNDS, _MOST_STEPS, _MOST_HALVINGS = 1000, 50, 10
 
 #: A derivative is used again while each step leaves at most this share of the difference.
@@ -71,7 +71,7 @@ class _Part:
         self.row.show(self.instance.name)
 
     def changes(self) -> np.ndarray:
-        """How its outputs change with its inputs, by differences: (sources, unknowns)."""
+        """Derivatives of its outputs with its inputs by differences: (sources, unknowns)."""
         values = self.row.values
         found = np.zeros((len(self.sources), len(self.unknowns)))
         here = values[self.sources]
@@ -85,7 +85,7 @@ class _Part:
         return found
 
     def derivatives(self) -> np.ndarray:
-        """How its outputs change with its inputs, as the FMU says it, or by differences."""
+        """Derivatives of its outputs with its inputs, from the FMU or by differences."""
         if self.outputs and self.instance.gives_derivatives:
             with suppress(ComponentFailed):
                 outputs = [variable.name for variable in self.outputs]
@@ -180,7 +180,7 @@ class Ring:
 
     @property
     def is_closed(self) -> bool:
-        """Whether each input has what arrives there."""
+        """True where each input has the value that arrives there."""
         return not _differ(*self._looked(), self._rest).any()
 
     def check(self) -> None:
@@ -257,7 +257,7 @@ class Ring:
             part.exchange()
 
     def _looked(self) -> tuple[np.ndarray, np.ndarray]:
-        """What the inputs have, and what arrives there."""
+        """The values of the inputs, and those that arrive there."""
         values, targets = self._values, self._targets
         held = values[targets]
         for gather in self._inner:
@@ -267,7 +267,7 @@ class Ring:
         return held, arriving
 
     def _derivative(self) -> np.ndarray:
-        """Of what the inputs that are Reals have, less what arrives there."""
+        """The derivative of the inputs that are Reals, less the values that arrive there."""
         n = len(self._targets)
         found = np.zeros((n, n))
         factors = np.concatenate([gather.factors for gather in self._inner])
@@ -349,7 +349,7 @@ def _differ(
 
 
 def _is_real(system: System, connection: Connection) -> bool:
-    """Whether a connection goes from a Real to a Real."""
+    """True for a connection from a Real to a Real."""
     return all(
         system.components[end.component].variables[end.port].family == "Real"
         for end in (connection.source, connection.target)
@@ -371,7 +371,7 @@ def _near(held: float, variable: Variable) -> float:
 
 
 def _number(text: str | None, otherwise: float) -> float:
-    """What a description says of a variable, if it says a number."""
+    """The number that a description gives, if it gives one."""
     with suppress(ValueError):
         return otherwise if text is None else real(text)
     return otherwise

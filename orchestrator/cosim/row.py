@@ -112,11 +112,11 @@ class Row:
                 self.values[self.columns[port]] = number
 
     def number(self, value: Value) -> float:
-        """What stands for a value in the row."""
+        """The number that stands for a value in the row."""
         return self.strings.stand_in(value)
 
     def number_of(self, port: PortName, value: float) -> float:
-        """What stands for a value of a port in the row."""
+        """The number that stands for a value of a port in the row."""
         return self.standing[port].number(value) if port in self.standing else float(value)
 
     def value(self, port: PortName) -> Value:
@@ -125,7 +125,7 @@ class Row:
         return self.standing[port].value(number) if port in self.standing else number
 
     def inputs_of(self, fmi_type: str) -> list[int]:
-        """Where the inputs of a type are."""
+        """The columns of the inputs of a type."""
         return self._inputs.get(fmi_type, [])
 
     def wrong(self, components: Iterable[str], passed: bool = False) -> str | None:
@@ -170,7 +170,7 @@ class Row:
         return passed_on
 
     def _passes(self, port: PortName, causality: str) -> bool:
-        """Whether a port is no state."""
+        """True for an input, and an output with direct feedthrough."""
         return causality == "input" or self._components[port.component].has_feedthrough(port.port)
 
     def moving(self, before: np.ndarray) -> list[PortName]:
@@ -181,14 +181,14 @@ class Row:
         return [port for port, column in self.columns.items() if not same[column]]
 
     def places(self, connections: Sequence[Connection]) -> tuple[np.ndarray, np.ndarray]:
-        """Where the targets and the sources of some connections are."""
+        """The columns of the targets and of the sources of some connections."""
         return (
             np.array([self.columns[c.target] for c in connections], dtype=np.intp),
             np.array([self.columns[c.source] for c in connections], dtype=np.intp),
         )
 
     def hidden(self, ports: Sequence[PortName]) -> tuple[np.ndarray, np.ndarray]:
-        """Where the columns and the hidden places of some outputs are, as far as they have any."""
+        """The columns and the hidden places of those of some outputs that have both."""
         known = [port for port in ports if port in self._hidden]
         return (
             np.array([self.columns[port] for port in known], dtype=np.intp),
@@ -233,7 +233,7 @@ class Gathering:
 
     @classmethod
     def along(cls, row: Row, connections: Sequence[Connection]) -> Gathering:
-        """What inputs take from outputs along some connections."""
+        """The values that inputs take along some connections."""
         gathering = cls(*row.places(connections))
         for place, connection in enumerate(connections):
             match connection.transformation:
@@ -294,7 +294,7 @@ class Overrides:
                 self._fed.setdefault(column, []).append((gathering, place))
         self._own = {column: _factor_and_offset(fed) for column, fed in self._fed.items()}
         self._targets = [connection.target for connection in connections]
-        # Of inputs that nothing feeds: what they would have, and what is done to it.
+        # For inputs that nothing feeds: the value without a change, its factor and its offset.
         self._open: dict[int, tuple[float, float, float]] = {}
 
     def override(self, target: PortName, value: Value) -> None:
@@ -325,7 +325,7 @@ class Overrides:
         self._row.values[column] = value
 
     def supplied(self, target: PortName) -> float:
-        """What an input has that nothing feeds, before it is altered."""
+        """The value of an input that nothing feeds, before it is altered."""
         column = self._row.columns[target]
         value, *_ = self._open.get(column, (float(self._row.values[column]),))
         return value
@@ -338,7 +338,7 @@ class Overrides:
                 gathering.move(self._row.values, place)
 
     def state(self) -> dict[str, Any]:
-        """What is done to them, as JSON has it."""
+        """The changes, as JSON has them."""
         return {
             "fed": [(column, *_factor_and_offset(fed)) for column, fed in self._fed.items()],
             "open": list(self._open.items()),

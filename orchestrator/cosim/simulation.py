@@ -26,7 +26,7 @@ from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.machine.texts import literal
 
 
-# What overflows on its way is named as the value of a port.
+# A value that overflows on its way is named as the value of a port.
 @np.errstate(all="ignore")
 @default_mode()
 def simulate_plan(
@@ -81,7 +81,7 @@ def simulate_plan(
                 _units(system, row.columns),
             )
         (stages, passing), gatherings = coupling.stages()
-        with _told(header, observers, surroundings) as tell:
+        with _observed(header, observers, surroundings) as tell:
             blocks = Blocks(len(row.shown), observers, surroundings.ours, row.inputs_of("Float32"))
             interrupts.hand_over = blocks.hand_over
             if passing is None:
@@ -228,7 +228,7 @@ def _explained() -> Iterator[None]:
 
 
 @contextmanager
-def _told(
+def _observed(
     header: Header, observers: Sequence[Observer], surroundings: Surroundings
 ) -> Iterator[Callable[[Ending], None]]:
     """Tell observers of the beginning, and of the end even where one of them fails."""

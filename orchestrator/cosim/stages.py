@@ -61,13 +61,13 @@ Reads: TypeAlias = Literal["all", "direct", "states", "only states"]
 READS: tuple[Reads, ...] = get_args(Reads)
 ALL, DIRECT, STATES, ONLY_STATES = READS
 
-#: How a ring is closed: where something about its components has changed; where that or what others
+#: Ways to close a ring: where something about its components has changed; where that or what others
 #: feed it has, which it takes; with what others feed it, in any case.
 Closing: TypeAlias = Literal["check", "renew", "renew always"]
 CLOSINGS: tuple[Closing, ...] = get_args(Closing)
 CHECK, RENEW, RENEW_ALWAYS = CLOSINGS
 
-#: What closes a ring.
+#: Functions that close a ring.
 _CLOSES: Mapping[Closing, Callable[[Ring], object]] = {
     CHECK: Ring.check,
     RENEW: Ring.renew,
@@ -95,7 +95,7 @@ class Arrangement(NamedTuple):
     stages: Sequence[Sequence[str]]
 
     def delays(self, reasons: Mapping[str, str] | None = None) -> list[str]:
-        """Where a ring is opened, in words.
+        """The places where rings are opened, in words.
 
         Args:
             reasons: why components are in no ring that is solved.
@@ -172,19 +172,19 @@ def types_read(reads: Reads, component: Component, outputs: Iterable[str]) -> se
         outputs: names of them.
 
     """
-    found: dict[str, set[bool]] = {}
+    feedthroughs: dict[str, set[bool]] = {}
     for name in outputs:
         direct = component.has_feedthrough(name)
-        found.setdefault(component.variables[name].type, set()).add(direct)
+        feedthroughs.setdefault(component.variables[name].type, set()).add(direct)
     if reads == ALL:
-        return {*found}
+        return {*feedthroughs}
     if reads == ONLY_STATES:
-        return {one for one, direct in found.items() if direct == {False}}
-    return {one for one, direct in found.items() if (reads == DIRECT) in direct}
+        return {fmi_type for fmi_type, direct in feedthroughs.items() if direct == {False}}
+    return {fmi_type for fmi_type, direct in feedthroughs.items() if (reads == DIRECT) in direct}
 
 
 class Visit(NamedTuple):
-    """What a component does in a stage.
+    """The work of a component in a stage.
 
     Attributes:
         component: its name.
@@ -226,7 +226,7 @@ class Decimation(NamedTuple):
     at_end: bool = False
 
     def is_due(self, k: int, steps: int) -> bool:
-        """Whether in the communication step after the k-th of so many, or at the end of all."""
+        """True in the communication step after the k-th of so many, or at the end of all."""
         k += self.at_end
         return k % self.every == 0 or k == steps
 
@@ -250,7 +250,7 @@ class Stage(NamedTuple):
 
     @property
     def acts(self) -> bool:
-        """Whether there is anything to do."""
+        """True where there is anything to do."""
         return bool(self.connections or self.visits or self.shows)
 
 
@@ -289,30 +289,30 @@ def stages_of(
     if order == FEEDTHROUGH:
         return _passing_first(system, arrangement, decimation, gathered)
     ring_of = {ring[0]: ring for ring in rings}
-    found: list[Stage] = []
+    stepping: list[Stage] = []
     shown: list[Stage] = []
     for names, connections in zip(arrangement.stages, gathered, strict=True):
         slow, taken = _taken(connections, decimation)
-        found += slow
+        stepping += slow
         fast = [Visit(name) for name in names if decimation[name] == 1]
         here = [ring_of[name] for name in names if name in ring_of]
         if here:
             # All are stepped before one takes what another has come to.
-            found += [Stage(taken, [Close(ring, CHECK) for ring in here]), Stage(visits=fast)]
+            stepping += [Stage(taken, [Close(ring, CHECK) for ring in here]), Stage(visits=fast)]
             if order != JACOBI:
-                found.append(Stage(visits=[Close(ring, RENEW_ALWAYS) for ring in here]))
+                stepping.append(Stage(visits=[Close(ring, RENEW_ALWAYS) for ring in here]))
         else:
-            found.append(Stage(taken, fast))
+            stepping.append(Stage(taken, fast))
         for name in names:
             if (n := decimation[name]) > 1:
                 early, later = _shown(system.components[name], order)
-                found += [
+                stepping += [
                     Stage(visits=[Visit(name)], decimation=Decimation(n)),
                     Stage(shows=early, decimation=Decimation(n)),
                 ]
                 shown.append(Stage(shows=later, decimation=Decimation(n, at_end=True)))
     renewed = [Stage(visits=[Close(ring, RENEW)]) for ring in rings]
-    return Stages(_acting(found + shown + renewed))
+    return Stages(_acting(stepping + shown + renewed))
 
 
 def _passing_first(
@@ -355,7 +355,7 @@ def _passing_first(
             Stage(visits=[Close(ring_of[name], RENEW_ALWAYS)]) for name in names if name in ring_of
         ]
     place = {name: i for i, names in enumerate(arrangement.stages) for name in names}
-    # What is read when values pass is read after a step too if something takes it before it passes.
+    # An output that is read when values pass is read after a step too if something takes it before.
     early = {
         one.source.component
         for one in system.connections
@@ -387,7 +387,7 @@ def _passing_first(
 def _taken(
     connections: Sequence[Connection], decimation: Mapping[str, int]
 ) -> tuple[list[Stage], list[Connection]]:
-    """What components that take longer steps take, and the others, before any is stepped."""
+    """The stages in which slow components take their inputs, and the connections of the others."""
     taken: dict[int, list[Connection]] = {1: []}
     for connection in connections:
         taken.setdefault(decimation[connection.target.component], []).append(connection)
@@ -445,7 +445,7 @@ class StageCall:
         return self._tried(t.value, h.value)
 
     def failed(self, status: int, function: str) -> Exception:
-        """What it has raised."""
+        """The exception that it has raised."""
         assert self._error is not None
         return self._error
 
@@ -568,7 +568,7 @@ def make_stages(
     """
     for gather, members, decimation in stages:
         if decimation is None:
-            # What most stages are costs no call.
+            # Most stages are like this: it costs no call.
             if gather.is_plain:
                 values[gather.targets] = values[gather.sources]
             elif gather.acts:

@@ -1,4 +1,4 @@
-/* The loop of a run, compiled: stepper.py calls it, and loop.py says the same in Python.
+/* The loop of a run, compiled: loop.py calls it, and says the same in Python.
  *
  * It makes one step after the other through the FMUs' own functions, and a row after each, until
  * Python has to look: the block of rows is full, it is time to, or a step has gone wrong.

@@ -36,7 +36,7 @@ _MOST_PROCESSES = 61
 
 
 def can_isolate() -> bool:
-    """Whether processes can be forked, and inherit sockets by their numbers."""
+    """Whether processes inherit sockets by their numbers."""
     return sys.platform != "win32"
 
 

@@ -14,7 +14,7 @@ from uuid import uuid4
 
 import pytest
 
-from orchestrator.cosim import stepper
+from orchestrator.cosim import loop
 from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.machine.disk import process_folder, sealed
 from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, locate
@@ -83,7 +83,7 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
     subprocess.run(["cc", "-shared", "-fPIC", "-o", tmp_path / "planted.so", source], check=True)
     forged = Path(mkdtemp())
     monkeypatch.setenv("XDG_CACHE_HOME", str(forged))
-    write_cached("loop", stepper.key_of(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
+    write_cached("loop", loop.key_of(), {"stepper.so": (tmp_path / "planted.so").read_bytes()})
     monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
     for path in (forged, *forged.rglob("*")):
         path.chmod(0o777)
@@ -112,15 +112,15 @@ def test_what_another_user_has_put_into_the_cache_is_not_run(
     assert mentions(line, f"auv-fmu: warning: {open_folder / 'auv-fmu'}")
     assert not planted.exists()
     with pytest.warns(UserWarning, match="only you can write"):
-        assert not read_cached("loop", stepper.key_of())
+        assert not read_cached("loop", loop.key_of())
 
 
 def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, open_folder):
     subprocess.run(["chmod", "-R", "go-w", open_folder / "auv-fmu"], check=True)
     for folder in (open_folder / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)
-    assert stepper.load_stepper() is None
-    assert stepper.compile_stepper().advance
+    assert loop.load_stepper() is None
+    assert loop.compile_stepper().advance
     assert not planted.exists()
 
 

@@ -16,10 +16,10 @@ from orchestrator.cosim.fmi.instance import ComponentFailed
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.hooks.hook import Run
+from orchestrator.cosim.loop import compile_stepper
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.stepper import compile_stepper
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError

@@ -28,8 +28,8 @@ from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.libraries import compile_library, find_compiler
 
-#: How ELF files of 32 and of 64 bits say where they have what: the place and form of that part of
-#: their header, and the length and form of the entries for their segments.
+#: Headers of ELF files of 32 and of 64 bits: place and form of the part about tables, and length
+#: and form of the entries for segments.
 _ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
 
 #: The kind of segments that are mapped into memory.
@@ -46,7 +46,7 @@ _FLAGS = (
 #: The headers of FMI, for FMUs that come without them.
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
-#: What compiled libraries are in the user's cache folder.
+#: Category of compiled libraries in the cache.
 _CATEGORY = "sources"
 
 #: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
@@ -104,7 +104,7 @@ def name_with_fmu(component: Component) -> str:
 
 
 def runs_python(folder: Path) -> bool:
-    """Whether an unpacked FMU is one of PythonFMU's."""
+    """True for an unpacked FMU that PythonFMU has made."""
     return (folder / "resources" / "slavemodule.txt").is_file()
 
 
@@ -131,7 +131,7 @@ def check_place(folder: Path) -> None:
 
 
 def binary_of(component: Component, folder: Path) -> Path:
-    """Where the library of an unpacked FMU for this machine is, if it has one.
+    """The path of the library of an unpacked FMU for this machine, if it has one.
 
     fmpy knows only the old names of platforms, which FMI 2.0.4 has for x86, and some tools for ARM.
     """
@@ -143,7 +143,7 @@ def binary_of(component: Component, folder: Path) -> Path:
 
 
 def _platform(component: Component) -> str:
-    """What the FMU's version calls the folder of this machine's libraries."""
+    """The name of the folder of this machine's libraries in the FMU's version."""
     platform: str = slave_class(component).platform
     return platform
 
@@ -212,7 +212,7 @@ def check_binary(component: Component, folder: Path) -> None:
 
 
 def _is_cut_short(path: Path) -> bool:
-    """Whether an ELF file ends before what its header tells of: reading that ends the process.
+    """True for an ELF file that is shorter than its header says: reading the rest ends the process.
 
     The loaders of other systems look for themselves.
     """
@@ -271,7 +271,7 @@ def _copied(folder: Path) -> Path:
 
 
 class Sources(NamedTuple):
-    """What is compiled.
+    """Sources that are compiled.
 
     Attributes:
         files: translation units.
@@ -351,6 +351,6 @@ def _compiled(component: Component, sources: Sources) -> bytes:
 
 
 def _key(component: Component) -> str:
-    """Of the FMU, the flags and the kind of machine."""
+    """A digest of the FMU, the flags and the kind of machine."""
     made_of = "\0".join((component.digest, *_FLAGS, sysconfig.get_platform()))
     return sha256(made_of.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""What a run asks of a component, wherever its FMU is, and what that has to say."""
+"""The calls of a component in a run, wherever its FMU is, its failures and its messages."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fmpy.fmi2 import fmi2Discard, fmi2Warning
 from orchestrator.cosim.fmi.transfer import CMember
 from orchestrator.cosim.system.values import StringTable, Value
 
-#: What a component is asked for in every step, one after the other.
+#: Calls of a component in every step, in their order.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "doStep", "getting outputs"
 
 #: Messages that are kept: an FMU may have something to say in every step.
@@ -76,7 +76,7 @@ class Instance(Protocol):
 
     @property
     def do_exchange(self) -> Callable[[c_double, c_double, int], int] | None:
-        """What stands in place of doStep where values only pass; None: nothing is called."""
+        """The call in place of doStep where values only pass; None: there is none."""
 
     @property
     def do_step(self) -> Callable[[c_double, c_double, int], int]:
@@ -86,7 +86,7 @@ class Instance(Protocol):
         """The same calls as pointers, for an FMU in this process."""
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
-        """What to raise after a call that has ended with a status.
+        """Make the exception for a call that has ended with a status.
 
         Args:
             status: worse than a warning.
@@ -118,7 +118,7 @@ class Instance(Protocol):
         """Set all inputs, then read all outputs."""
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
-        """How some outputs change with one input at the same time.
+        """Derivatives of some outputs with one input at the same time.
 
         Raises:
             ComponentFailed: the FMU does not say it.
@@ -200,7 +200,7 @@ class Log:
         return (*self._remarks, *self._said, *([f"and {more} more messages"] * (more > 0)))
 
     def state(self) -> dict[str, Any]:
-        """All of it, as JSON has it."""
+        """The content, as JSON has it."""
         return {
             "remarks": self._remarks,
             "said": self._said,

@@ -175,7 +175,7 @@ def place_instances(
 
 @contextmanager
 def _has_room(component: Component) -> Iterator[bool]:
-    """Whether this process may have one more instance, which then counts until the end."""
+    """Look for room for one more instance in this process, which it then has until the end."""
     if not component.is_once_per_process:
         yield True
         return
@@ -464,7 +464,7 @@ class IsolatedInstance:
         self._take_outputs()
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
-        """How some outputs change with one input at the same time."""
+        """Derivatives of some outputs with one input at the same time."""
         values = self._ask("derivatives", list(outputs), of)
         self._check(isinstance(values, list) and len(values) == len(outputs))
         self._check(all(type(value) is float for value in values))
@@ -511,7 +511,7 @@ class IsolatedInstance:
         self._ask("restore", state)
 
     def pointers(self) -> CMember:
-        """There are none: its calls are messages to another process."""
+        """Refuse: its calls are messages to another process."""
         raise NotImplementedError
 
     def failed(self, status: int, function: str) -> ComponentFailed:
@@ -519,11 +519,11 @@ class IsolatedInstance:
         return ComponentFailed(f"{self.name}: {function} ended with status {status}")
 
     def do_step(self, t: c_double, h: c_double, _: int) -> int:
-        """Have a step begun, whose end the first of `get_outputs` waits for."""
+        """Begin a step; the first of `get_outputs` waits for its end."""
         return self._begin(_STEP, t.value, h.value)
 
     def do_exchange(self, t: c_double, _h: c_double, _: int) -> int:
-        """Have values exchanged, in the same way; the step has no length."""
+        """Exchange values in the same way, as in a step of no length."""
         return self._begin(_EXCHANGE, t.value, 0.0)
 
     def _begin(self, call: str, t: float, h: float) -> int:
@@ -619,7 +619,7 @@ class IsolatedInstance:
         return value
 
     def _waited(self, seconds: float) -> None:
-        # What it has started may hold the connection open.
+        # If it has ended, a process that it has started may hold the connection open.
         self._status(0.0)
         if self._interrupts and seconds >= _PATIENCE:
             self._hangs = True
@@ -811,7 +811,7 @@ class Served:
         self._outputs = _Ports(self._component, "output", row.values[first:], row.strings)
 
     def _asked(self) -> Callable[[], Any]:
-        """What the next request asks for."""
+        """The call that the next request asks for."""
         request = self._channel.receive()
         if "call" in request:
             return partial(getattr(self._instance, request["call"]), *request["arguments"])

@@ -104,7 +104,7 @@ class LoadedInstance:
         return CMember(
             self._fmu.component,
             self._stepped.do_step,
-            self._stepped.told,
+            self._stepped.result,
             (CMove * len(inputs))(*inputs),
             (CMove * len(outputs))(*outputs),
             len(inputs),
@@ -141,14 +141,14 @@ class LoadedInstance:
         restore_mode()
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
-        """How some outputs change with one input at the same time."""
+        """Derivatives of some outputs with one input at the same time."""
         unknowns, knowns = self._arrays(outputs), self._arrays([of])
         seed = [float(port == of) for ports in knowns for port in ports]
-        found = self._call(
+        values = self._call(
             "derivatives", self._references(unknowns), self._references(knowns), seed,
             sum(map(len, unknowns)),
         )  # fmt: skip
-        by_name = dict(zip((port for ports in unknowns for port in ports), found, strict=True))
+        by_name = dict(zip((port for ports in unknowns for port in ports), values, strict=True))
         return [by_name[port] for port in outputs]
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
@@ -221,7 +221,7 @@ class LoadedInstance:
     def free(self) -> None:
         """Free the instance; its library stays loaded."""
         if self._library.corrupted:
-            # What it was given by us must stay where it is, too.
+            # The memory that it was given by us must stay where it is, too.
             return
         if self._kept:
             with suppress(FMICallException):
@@ -289,7 +289,7 @@ class LoadedInstance:
             raise self._failed(error) from error
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
-        """What to raise after a call that has ended with a status."""
+        """Make the exception for a call that has ended with a status."""
         restore_mode()
         # First of all: what an FMU is asked now may make it complain of the question.
         failure = self._failed(FMICallException(function=function, status=status))

@@ -43,7 +43,7 @@ from fmpy.logging import addLoggerProxy
 from orchestrator.cosim.fmi.surroundings import restore_mode
 from orchestrator.cosim.fmi.transfer import (
     DO_STEP_TYPES,
-    CTold,
+    CStepResult,
     DoStepCallback,
     Moved,
     address_of,
@@ -51,28 +51,29 @@ from orchestrator.cosim.fmi.transfer import (
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.values import TYPES
 
-#: What FMUs need: of FMI 2.0 all except what goes with a capability, of FMI 3.0 what a run does.
+#: Functions that FMUs must have: of FMI 2.0 all but those of a capability, of FMI 3.0 those that a
+#: run calls.
 _NEEDED_IN_2 = re.compile(r"(?!.*(FMUstate|Derivative|Status|CancelStep|DebugLogging)).*")
 _NEEDED_IN_3 = re.compile(
     r"fmi3(InstantiateCoSimulation|FreeInstance|EnterInitializationMode|ExitInitializationMode|"
     r"DoStep|Terminate|Reset|[GS]et((Float|U?Int)\d+|Boolean|String))"
 )
 
-#: How often is looked whether a step has ended that goes on after its call [s].
+#: Interval of looks at a step that goes on after its call [s].
 _GLANCE = 1e-3
 
 
 class Stepped(NamedTuple):
-    """What steps an FMU in the compiled loop.
+    """The doStep of an FMU for the compiled loop.
 
     Attributes:
         do_step: where the function is.
-        told: where FMI 3.0's tells how the step has ended; None: that of FMI 2.0 does not.
+        result: into which FMI 3.0 writes how a step has ended; None: FMI 2.0 does not.
 
     """
 
     do_step: int | None
-    told: Any = None
+    result: Any = None
 
 
 class Hearer(Protocol):
@@ -90,7 +91,7 @@ class Hearer(Protocol):
 
 
 class _Slave:
-    """What is the same in all versions.
+    """The common part of all versions.
 
     Attributes:
         prefix: of the names of functions.
@@ -108,7 +109,7 @@ class _Slave:
     _functions: Mapping[str, Any]
 
     def moved(self, fmi_type: str) -> Moved:
-        """How values of a type are moved."""
+        """The way in which values of a type are moved."""
         raise NotImplementedError
 
     def _loadFunctions(self) -> None:
@@ -175,7 +176,7 @@ class _Slave:
         return partial(called, ctypes.c_void_p.from_param(self.component))
 
     def address(self, name: str) -> int | None:
-        """Where one of the FMU's functions is."""
+        """The address of one of the FMU's functions."""
         return address_of(self.dll[f"{self.prefix}{name}"])
 
     def set(self, fmi_type: str, references: Sequence[int], values: Sequence[Any]) -> None:
@@ -200,11 +201,11 @@ class _Slave:
     def derivatives(
         self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], n: int
     ) -> list[float]:
-        """How n values of some variables change with others."""
-        found: list[float] = self.getDirectionalDerivative(  # type: ignore[attr-defined]
+        """Derivatives of n values of some variables with others."""
+        values: list[float] = self.getDirectionalDerivative(  # type: ignore[attr-defined]
             unknowns, knowns, seed, *self._counted(n)
         )
-        return found
+        return values
 
     def returned_at(self) -> float | None:
         """The time at which it has returned from that step, which it had to make in full [s]."""
@@ -216,7 +217,7 @@ class _Slave:
 
 
 class _Lenient:
-    """A library in which optional functions are found that are not there."""
+    """A library in which optional functions that are missing can be looked up."""
 
     def __init__(self, dll: Any, needed: re.Pattern[str]) -> None:
         self._dll, self._needed = dll, needed
@@ -239,7 +240,7 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
     prefix, platform, needed = "fmi2", fmpy.platform, _NEEDED_IN_2
 
     def moved(self, fmi_type: str) -> Moved:
-        """How values of a type are moved."""
+        """The way in which values of a type are moved."""
         function = "Integer" if fmi_type == "Enumeration" else fmi_type
         c_types = {"Boolean": ctypes.c_int, "String": fmi2String}
         return Moved(function, c_types.get(fmi_type, TYPES[fmi_type].c_type))
@@ -290,7 +291,7 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
     prefix, platform, needed = "fmi3", fmpy.platform_tuple, _NEEDED_IN_3
 
     def moved(self, fmi_type: str) -> Moved:
-        """How values of a type are moved."""
+        """The way in which values of a type are moved."""
         function = "Int64" if fmi_type == "Enumeration" else fmi_type
         c_types = {"Enumeration": ctypes.c_int64, "String": fmi2String}
         return Moved(function, c_types.get(fmi_type, TYPES[fmi_type].c_type), is_counted=True)
@@ -324,29 +325,29 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
 
     def stepping(self, component: Component) -> tuple[Callable[..., int], Stepped]:
         """Its doStep, and the same for the compiled loop."""
-        self._told = told = CTold()
+        self._result = result = CStepResult()
         called = self.function("DoStep")
         outputs = [
-            ctypes.c_void_p.from_param(addressof(told) + getattr(type(told), name).offset)
-            for name, _ in told._fields_
+            ctypes.c_void_p.from_param(addressof(result) + getattr(type(result), name).offset)
+            for name, _ in result._fields_
         ]
 
         def do_step(t: Any, h: Any, no_rollback: int) -> int:
             status: int = called(t, h, no_rollback, *outputs)
-            is_over = told.terminate or told.early
+            is_over = result.terminate or result.early
             return int(fmi2Discard) if is_over and status in (fmi2OK, fmi2Warning) else status
 
-        return do_step, Stepped(self.address("DoStep"), ctypes.pointer(told))
+        return do_step, Stepped(self.address("DoStep"), ctypes.pointer(result))
 
     def ended_at(self) -> float | None:
         """The time at which it has ended the run in a step that it has discarded [s]."""
-        told = self._told
-        return float(told.last) if told.terminate else None
+        result = self._result
+        return float(result.last) if result.terminate else None
 
     def returned_at(self) -> float | None:
         """The time at which it has returned from that step, which it had to make in full [s]."""
-        told = self._told
-        return float(told.last) if told.early else None
+        result = self._result
+        return float(result.last) if result.early else None
 
 
 def slave_class(component: Component) -> type[FMU2OfOthers | FMU3OfOthers]:
@@ -354,7 +355,7 @@ def slave_class(component: Component) -> type[FMU2OfOthers | FMU3OfOthers]:
     return FMU3OfOthers if component.description.fmiMajorVersion == 3 else FMU2OfOthers
 
 
-#: What hears an instance, by the environments that FMUs hand back with every message.
+#: Hearers of instances, by the environments that FMUs hand back with every message.
 _hearers: dict[int, Hearer] = {}
 _environments = count(1)
 
@@ -377,7 +378,7 @@ def _log_of_fmi3(environment: int | None, status: int, _: bytes, message: bytes 
 def _bearing(name: bytes | None) -> Hearer | None:
     """The instance with a name: some FMUs do not hand the environment back."""
     text = (name or b"").decode(errors="replace")
-    return next((found for found in _hearers.values() if found.name == text), None)
+    return next((hearer for hearer in _hearers.values() if hearer.name == text), None)
 
 
 def _callbacks() -> fmi2CallbackFunctions:

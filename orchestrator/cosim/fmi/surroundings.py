@@ -1,4 +1,4 @@
-"""What FMUs may change of this process, such as its floating-point mode, and how it is undone."""
+"""Parts of this process that FMUs may change, such as its floating-point mode, and their repair."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class Surroundings:
                     os.chdir(folder)
 
     def put_back(self) -> None:
-        """Have all as it was; never in a copy of the process."""
+        """Put all back as it was; never in a copy of the process."""
         self.end_copy()
         if self._is_ours:
             for now, before in self._modules:

@@ -31,7 +31,7 @@ DoStepCallback = CFUNCTYPE(fmi2Status, *DO_STEP_TYPES)
 #: A function of Python in place of one that moves values.
 _MoveCallback = CFUNCTYPE(fmi2Status)
 
-#: What the compiled loop does with values, by their types in C: see stepper.c.
+#: Numbers of conversions in the compiled loop, by types in C: see stepper.c.
 _KINDS = {
     c_type: kind
     for kind, c_type in enumerate(
@@ -49,7 +49,7 @@ _LOOKED_UP = (ctypes.c_int64, ctypes.c_uint64, fmi2String)
 
 
 class Moved(NamedTuple):
-    """How values of a type are moved.
+    """The way in which values of a type are moved.
 
     Attributes:
         function: the one of FMI, without its prefix and Get or Set.
@@ -79,8 +79,8 @@ class CMove(Structure):
     )
 
 
-class CTold(Structure):
-    """What doStep of FMI 3.0 tells: see stepper.c."""
+class CStepResult(Structure):
+    """Results of doStep of FMI 3.0: see stepper.c."""
 
     _fields_ = (
         ("event", ctypes.c_bool),
@@ -96,7 +96,7 @@ class CMember(Structure):
     _fields_ = (
         ("component", c_void_p),
         ("do_step", c_void_p),
-        ("told", POINTER(CTold)),
+        ("result", POINTER(CStepResult)),
         ("inputs", POINTER(CMove)),
         ("outputs", POINTER(CMove)),
         ("n_inputs", c_size_t),
@@ -209,7 +209,7 @@ class PortBlock:
         return self._strings.integer(number)
 
     def _get_each(self, call: Callable[[], int]) -> int:
-        # What an FMU leaves as it is must not be what it gave before.
+        # A value that an FMU leaves as it is must not be one that it gave before.
         ctypes.memset(self._values, 0, ctypes.sizeof(self._values))
         status = call()
         if status in (fmi2OK, fmi2Warning):

@@ -126,10 +126,6 @@ class StringTable:
         """Begin with the empty text."""
         self.restore([""])
 
-    def __len__(self) -> int:
-        """How many there are."""
-        return len(self._texts)
-
     def number(self, text: str) -> int:
         """The number of a text, which it gets if it has none."""
         found = self._numbers.setdefault(text, len(self._texts))
@@ -166,10 +162,6 @@ class StringTable:
         """
         size = abs(number)
         return int(number) if size < _BEYOND else int(self.text((size - _BEYOND) / _APART))
-
-    def since(self, n: int) -> list[str]:
-        """All texts but the first so many."""
-        return self._texts[n:]
 
     def state(self) -> list[str]:
         """All of them, as JSON has them."""

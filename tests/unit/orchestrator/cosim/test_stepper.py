@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cosim import loop, stepper
+from orchestrator.cosim import loop
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.machine import libraries
 from orchestrator.machine.cache import write_cached
@@ -91,14 +91,14 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
 @pytest.mark.parametrize("length", [3000, *slow(0, 100, -1)])
 def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
     # In another process: this one would hold on to the library.
-    code = "from orchestrator.cosim import stepper; print(stepper.compile_stepper()._name)"
+    code = "from orchestrator.cosim import loop; print(loop.compile_stepper()._name)"
     [place] = map(Path, subprocess.check_output([sys.executable, "-c", code]).decode().split())
     content = place.read_bytes()
     place.write_bytes(content[:length])
     loaded = []
     monkeypatch.setattr(libraries, "CDLL", lambda path: loaded.append(path) or CDLL(path))
-    assert stepper.load_stepper() is None
-    assert stepper.compile_stepper().advance
+    assert loop.load_stepper() is None
+    assert loop.compile_stepper().advance
     assert loaded and str(place) not in loaded
     # Whatever that is, it is not ours to overwrite.
     assert place.read_bytes() == content[:length]
@@ -110,9 +110,9 @@ def test_a_library_without_the_function_is_no_library(cache, tmp_path):
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
     subprocess.run(["cc", "-shared", "-o", other, source], check=True)
-    write_cached("loop", stepper.key_of(), {"stepper.so": other.read_bytes()})
-    assert stepper.load_stepper() is None
-    assert stepper.compile_stepper().advance
+    write_cached("loop", loop.key_of(), {"stepper.so": other.read_bytes()})
+    assert loop.load_stepper() is None
+    assert loop.compile_stepper().advance
 
 
 @needs_compiler
@@ -121,7 +121,7 @@ def test_what_others_have_in_the_cache_stays(cache):
     for path in own:
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         path.write_text("mine")
-    stepper.compile_stepper()
+    loop.compile_stepper()
     assert [path.read_text() for path in own] == ["mine"] * 3
 
 
@@ -133,7 +133,7 @@ def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monke
     monkeypatch.setenv("PATH", f"{tmp_path}{os.pathsep}{os.environ['PATH']}")
     monkeypatch.setattr("orchestrator.machine.compilers._LIMIT", 0.5)
     with pytest.raises(InputError, match=r"cannot be compiled: .*/cc has not ended after 0\.5 s$"):
-        stepper.compile_stepper()
+        loop.compile_stepper()
     session = int((tmp_path / "session").read_text())
     assert eventually(lambda: not members(session))
 
@@ -145,7 +145,7 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
         f'#!/bin/sh\necho compiled >> {tmp_path}/log\nexec {shutil.which("cc")} "$@"\n'
     )
     (tmp_path / "cc").chmod(0o755)
-    code = "from orchestrator.cosim import stepper; stepper.compile_stepper().advance"
+    code = "from orchestrator.cosim import loop; loop.compile_stepper().advance"
     environment = {**os.environ, "PATH": f"{tmp_path}{os.pathsep}{os.environ['PATH']}"}
     processes = [
         subprocess.Popen([sys.executable, "-P", "-c", code], env=environment) for _ in range(4)
@@ -159,7 +159,7 @@ def test_processes_that_compile_at_once_do_so_once(tmp_path, cache):
 def test_compilers_have_nothing_to_say(tmp_path, command):
     if shutil.which(command) is None:
         pytest.skip(f"{command} is not installed")
-    arguments = [*FLAGS, *STRICT, stepper.SOURCE, "-o", tmp_path / "library"]
+    arguments = [*FLAGS, *STRICT, loop.SOURCE, "-o", tmp_path / "library"]
     subprocess.run([command, *arguments], check=True)
 
 
@@ -168,6 +168,6 @@ def test_zig_compiles_it_where_there_is_no_other(tmp_path, cache, monkeypatch):
     pytest.importorskip("ziglang", reason="ziglang is not installed")
     monkeypatch.setattr(shutil, "which", lambda _: None)
     with pytest.raises(InputError):
-        stepper.compile_stepper(in_no_time=True)
-    assert stepper.compile_stepper().advance
-    assert stepper.load_stepper() is not None
+        loop.compile_stepper(in_no_time=True)
+    assert loop.compile_stepper().advance
+    assert loop.load_stepper() is not None
